@@ -1,0 +1,1 @@
+"""vergence: visual servoing that keeps the target in view and the arm clear of its limits."""

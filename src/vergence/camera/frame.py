@@ -1,0 +1,28 @@
+"""A picture as a driver delivers it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTruth:
+    """What only a simulated camera knows about its picture; for evaluation and exact perception."""
+
+    T_world_target: FloatArray  # (4, 4)
+    T_world_camera: FloatArray  # (4, 4)
+    points_px: FloatArray  # (M, 2) the target's features, truly projected
+    depth_m: FloatArray  # (M,) their depth along the optical axis
+    visible: BoolArray  # (M,) in the picture and in front of the camera
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One picture: when it was exposed, and where the arms stood at that instant."""
+
+    camera: str
+    time: float  # s, of exposure
+    image: ImageArray | None  # (height, width) grey; None from a driver that makes no pictures
+    joints: Mapping[str, FloatArray]  # arm name to joint positions at exposure, rad or m
+    truth: FrameTruth | None = None

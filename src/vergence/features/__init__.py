@@ -1,0 +1,6 @@
+"""Visual features: what is seen, and how it moves when the camera does."""
+
+from vergence.features.observation import ImagePoints, Observation, TargetState
+from vergence.features.points import interaction_matrix_points
+
+__all__ = ["ImagePoints", "Observation", "TargetState", "interaction_matrix_points"]

@@ -1,0 +1,37 @@
+"""What perception hands on: image points with covariance, and a target state where a filter runs."""
+
+from dataclasses import dataclass
+
+from vergence.arrays import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class ImagePoints:
+    """The points measured in one picture of one camera."""
+
+    camera: str
+    time: float  # s, of exposure
+    points_px: FloatArray  # (M, 2); where a point was not found, its last or predicted place
+    covariance_px: FloatArray  # (M, 2, 2) px²
+    found: BoolArray  # (M,)
+    reasons: tuple[str, ...]  # (M,) empty where found, else why not
+
+
+@dataclass(frozen=True, slots=True)
+class TargetState:
+    """Pose and velocity of the target as a filter believes them."""
+
+    time: float  # s
+    T_world_target: FloatArray  # (4, 4)
+    velocity: FloatArray  # (6,) v and ω of the target's origin along world axes, m/s and rad/s
+    covariance: FloatArray  # (12, 12) of (position, rotation, v, ω), world axes, SI
+    consistent: bool  # whether the innovations agree with the covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """All that one outer tick has seen."""
+
+    time: float  # s, of the newest picture in it
+    views: tuple[ImagePoints, ...]  # one a picture that arrived
+    target: TargetState | None = None

@@ -1,0 +1,31 @@
+"""Image points as visual features."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+
+
+@njit(cache=True)
+def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return the interaction matrix L of image points, (2M, 6): ṡ = L v_camera.
+
+    Two rows a point:
+    [-1/Z, 0, x/Z, xy, -(1 + x²), y] and [0, -1/Z, y/Z, 1 + y², -xy, -x].
+    [Nelson1995] eq. (13) is this in pixels, its first entry printed with the wrong sign;
+    [Mezouar2001] section 5.
+
+    Args:
+        points: normalized coordinates, (M, 2).
+        depth: Z of each point along the optical axis, (M,), m.
+    """
+    L = np.empty((2 * len(points), 6))
+    for j in range(len(points)):
+        x, y, inverse_depth = points[j, 0], points[j, 1], 1.0 / depth[j]
+        row = L[2 * j]
+        row[0], row[1], row[2] = -inverse_depth, 0.0, x * inverse_depth
+        row[3], row[4], row[5] = x * y, -(1.0 + x * x), y
+        row = L[2 * j + 1]
+        row[0], row[1], row[2] = 0.0, -inverse_depth, y * inverse_depth
+        row[3], row[4], row[5] = 1.0 + y * y, -x * y, -x
+    return L

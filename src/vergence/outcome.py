@@ -1,0 +1,35 @@
+"""How a run ends: failure is a result with a name, a reason and a time."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class OutcomeKind(StrEnum):
+    """The names of the ways a run can end."""
+
+    COMPLETED = "completed"
+    TARGET_LOST = "target lost"
+    JOINT_LIMIT = "joint limit"
+    SINGULARITY = "singularity"
+    IMAGE_LATE = "image late"
+    DRIVER_SILENT = "driver silent"
+    INFEASIBLE = "infeasible"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of a run."""
+
+    kind: OutcomeKind
+    reason: str  # one sentence for a person: what happened, to what
+    time: float  # s since the start of the run
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the task was done to its end."""
+        return self.kind is OutcomeKind.COMPLETED
+
+    def __str__(self) -> str:
+        """Kind, time and reason on one line."""
+        return f"{self.kind.value} at {self.time:.2f} s: {self.reason}"

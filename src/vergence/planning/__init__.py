@@ -1,0 +1,5 @@
+"""Planning: what the features or the target's pose should be, and when."""
+
+from vergence.planning.reference import Reference
+
+__all__ = ["Reference"]
