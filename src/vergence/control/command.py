@@ -1,0 +1,18 @@
+"""What a law asks of an arm."""
+
+from dataclasses import dataclass, field
+
+from vergence.arrays import FloatArray
+from vergence.outcome import OutcomeKind
+
+
+@dataclass(frozen=True, slots=True)
+class JointCommand:
+    """Joint rates for the next outer period, and how the law came to them."""
+
+    velocity: FloatArray  # (n,) rad/s or m/s
+    v_camera: FloatArray  # (6,) the camera twist these rates were made from, m/s and rad/s
+    manipulability: float = float("nan")  # w'(q) of [Nelson1995] eq. (26), SI units
+    penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
+    active: tuple[str, ...] = field(default=())  # constraints that shaped the command
+    fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
