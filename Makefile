@@ -1,0 +1,61 @@
+# `make` lists the targets. Every target sets up what it needs: nothing has to be installed before
+# but Python 3.11 or newer, git and make.
+
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+RENDERS := $(VENV)/.renders
+
+PYTEST_ARGS ?=
+
+# Images are rendered without a screen.
+export MUJOCO_GL ?= egl
+
+.PHONY: help setup test-images demo test lint check bench format clean
+
+help:
+	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
+	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
+	@echo "make check    everything CI checks: formatting, lints, types, tests"
+	@echo "make lint     formatting, lints and types only"
+	@echo "make format   format the code and apply the safe fixes"
+	@echo "make bench    run the benchmarks, peers beside us"
+	@echo "make setup    only set up: the virtual environment and the renderer"
+	@echo "make clean    remove everything that was built, the virtual environment too"
+
+setup: $(INSTALLED) $(RENDERS)
+
+$(INSTALLED): pyproject.toml constraints.txt scripts/make-venv
+	@scripts/make-venv $(VENV)
+	@touch $@
+
+$(RENDERS): $(INSTALLED) scripts/ensure-rendering
+	@scripts/ensure-rendering $(BIN)/python
+	@touch $@
+
+test-images:
+	@scripts/ensure-test-images
+
+demo: setup
+	$(BIN)/vergence run puma560
+
+test: setup test-images
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: $(INSTALLED)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+check: lint test
+
+bench: setup
+	$(BIN)/python benchmarks/run.py
+
+format: $(INSTALLED)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
