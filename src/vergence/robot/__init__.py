@@ -1,0 +1,43 @@
+"""Robots: an arm as a controller sees it."""
+
+from vergence.robot.arm import Arm
+from vergence.robot.chain import (
+    Chain,
+    ChainState,
+    chain_state,
+    forward_kinematics,
+    jacobian,
+    to_tip_axes,
+    world_jacobian,
+)
+from vergence.robot.manipulability import (
+    Manipulability,
+    determinant_measure,
+    joint_limit_penalty,
+    manipulability,
+    per_joint_limit_penalty,
+    relative_manipulability,
+    transmissibility_measure,
+    yoshikawa_measure,
+)
+from vergence.robot.state import JointState
+
+__all__ = [
+    "Arm",
+    "Chain",
+    "ChainState",
+    "JointState",
+    "Manipulability",
+    "chain_state",
+    "determinant_measure",
+    "forward_kinematics",
+    "jacobian",
+    "joint_limit_penalty",
+    "manipulability",
+    "per_joint_limit_penalty",
+    "relative_manipulability",
+    "to_tip_axes",
+    "transmissibility_measure",
+    "world_jacobian",
+    "yoshikawa_measure",
+]
