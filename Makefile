@@ -11,7 +11,7 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-images demo test lint check bench format clean
+.PHONY: help setup test-images demo test lint check bench peers format clean
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
@@ -20,6 +20,7 @@ help:
 	@echo "make lint     formatting, lints and types only"
 	@echo "make format   format the code and apply the safe fixes"
 	@echo "make bench    run the benchmarks, peers beside us"
+	@echo "make peers    build and install what the benchmarks compare us with (ViSP, Python packages)"
 	@echo "make setup    only set up: the virtual environment and the renderer"
 	@echo "make clean    remove everything that was built, the virtual environment too"
 
@@ -51,6 +52,9 @@ check: lint test
 
 bench: setup
 	$(BIN)/python benchmarks/run.py
+
+peers:
+	@scripts/make-peers
 
 format: $(INSTALLED)
 	$(BIN)/ruff format .

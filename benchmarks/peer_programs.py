@@ -1,0 +1,78 @@
+"""Peers that run as programs beside us: one is started, asked line by line, and ended with us.
+
+`make peers` builds and installs them under `build/peers`.
+"""
+
+import atexit
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+
+from harness import Missing, Peer
+
+PROJECT = Path(__file__).parents[1]
+SOURCES = PROJECT / "benchmarks" / "peers"
+BUILT = PROJECT / "build" / "peers"
+THREAD_COUNTS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+ONE_THREAD = dict.fromkeys(THREAD_COUNTS, "1")
+
+
+class Program:
+    """A peer program that answers `CASE CALLS` with the seconds per call."""
+
+    def __init__(self, command: tuple[str, ...]) -> None:
+        self._process = subprocess.Popen(
+            [*command, "serve"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+            env=os.environ | ONE_THREAD,
+        )
+        atexit.register(self._process.terminate)
+        self.name = self._answer()
+
+    def _answer(self) -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline().strip()
+        if not line or line.startswith("error"):
+            raise RuntimeError(f"peer program {self._process.args}: {line or 'it ended'}")
+        return line
+
+    def seconds_per_call(self, case: str, count: int) -> float:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{case} {count}\n")
+        return float(self._answer())
+
+
+@cache
+def program(*command: str) -> Program:
+    """The running program of a command; one for the whole benchmark run."""
+    return Program(command)
+
+
+def peer(case: str, *command: str) -> Peer:
+    running = program(*command)
+    return Peer(running.name, lambda count: running.seconds_per_call(case, count))
+
+
+def visp(case: str) -> Peer | Missing:
+    """A case of `peers/visp_tick.cpp`."""
+    built = BUILT / "visp_tick"
+    if not built.is_file():
+        return Missing("ViSP", "apt-get install libvisp-dev g++, then make peers")
+    return peer(case, str(built))
+
+
+def machinevision(case: str) -> Peer | Missing:
+    """A case of `peers/machinevision_tick.py`."""
+    return python_peer("machinevision-toolbox", SOURCES / "machinevision_tick.py", case)
+
+
+def python_peer(name: str, script: Path, case: str) -> Peer | Missing:
+    """A case of a script that runs in the peers' own virtual environment."""
+    python = BUILT / "venv" / "bin" / "python"
+    if not python.is_file():
+        return Missing(name, "make peers")
+    return peer(case, str(python), str(script))
