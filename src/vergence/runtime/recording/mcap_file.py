@@ -1,0 +1,51 @@
+"""An MCAP file being written: a channel for each topic, opened when it is first used."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import foxglove
+import foxglove.channels
+
+from vergence.runtime.recording.messages import nanoseconds
+from vergence.runtime.recording.numbers import dumps
+
+
+class McapFile:
+    """Writes messages by topic; `flush` makes everything before it readable."""
+
+    def __init__(self, path: Path) -> None:
+        self._context = foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        self._writer = foxglove.open_mcap(path, allow_overwrite=True, context=self._context)
+
+    def numbers(
+        self, topic: str, time: float, schema: dict[str, Any], message: Mapping[str, Any]
+    ) -> None:
+        """Write a JSON message."""
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = foxglove.Channel(topic, schema=schema, context=self._context)
+            self._channels[topic] = channel
+        channel.log(dumps(message), log_time=nanoseconds(time))
+
+    def typed(self, topic: str, time: float, message: object) -> None:
+        """Write one of Foxglove's own messages."""
+        channel = self._channels.get(topic)
+        if channel is None:
+            kind = getattr(foxglove.channels, f"{type(message).__name__}Channel")
+            channel = kind(topic, context=self._context)
+            self._channels[topic] = channel
+        channel.log(message, log_time=nanoseconds(time))
+
+    def metadata(self, name: str, words: dict[str, str]) -> None:
+        """Write named words about the file."""
+        self._writer.write_metadata(name, words)
+
+    def flush(self) -> None:
+        """Finish the current chunk and hand it to the operating system."""
+        self._writer.flush()
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        self._writer.close()

@@ -1,0 +1,129 @@
+"""Reads a run back from its folder."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from vergence.arrays import ImageArray
+from vergence.errors import InputError
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.runtime.recording import wire
+from vergence.runtime.recording.mcap_contents import McapContents, messages_on
+from vergence.runtime.recording.recorder import RECORDING
+from vergence.runtime.recording.run_info import RunInfo
+from vergence.runtime.recording.traces import (
+    ArmTrace,
+    CameraTrace,
+    Row,
+    TargetTrace,
+    arm_trace,
+    camera_trace,
+    target_trace,
+)
+
+_PICTURES = "/image"  # how the topics end that are read one by one
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened once."""
+
+    time: float  # s since the start of the run
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A run as its folder tells it; open one with `Recording.open`."""
+
+    folder: Path
+    info: RunInfo
+    version: str  # of the vergence that wrote it
+    arms: Mapping[str, ArmTrace]
+    cameras: Mapping[str, CameraTrace]
+    target: TargetTrace | None  # where a filter ran
+    events: tuple[Event, ...]  # in order of time
+    outcome: Outcome | None  # None if the run was cut off before it could say
+    summary: Mapping[str, float | str | None]
+    complete: bool  # whether the file ends as it should
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Self:
+        """Read the recording in a run folder, up to the cut if it was cut off.
+
+        Raises:
+            InputError: if there is no recording, or it is not one of ours.
+        """
+        path = _recording_path(Path(folder))
+        contents = McapContents.read(path, leave_out=_PICTURES)
+        info, version = _introduction(path, contents)
+        target = _rows(contents, "/target")
+        end = contents.metadata.get("outcome")
+        return cls(
+            folder=path.parent,
+            info=info,
+            version=version,
+            arms={
+                name: arm_trace(_rows(contents, f"/arm/{name}/state"), len(arm.names))
+                for name, arm in info.arms.items()
+            },
+            cameras={
+                name: camera_trace(_rows(contents, f"/camera/{name}/features"))
+                for name in info.cameras
+            },
+            target=target_trace(target) if target else None,
+            events=tuple(_event(message) for message in contents.messages.get("/events", ())),
+            outcome=_outcome(end) if end else None,
+            summary=json.loads(end["summary"]) if end else {},
+            complete=contents.complete and end is not None,
+        )
+
+    @property
+    def duration(self) -> float:
+        """Time of the last tick, s."""
+        arms = (trace.time for trace in self.arms.values())
+        cameras = (trace.received for trace in self.cameras.values())
+        return max((float(time[-1]) for time in (*arms, *cameras) if len(time)), default=0.0)
+
+    def images(self, camera: str) -> Iterator[tuple[float, ImageArray]]:
+        """Yield the kept pictures of a camera with their time of exposure, in order."""
+        import cv2
+
+        for message in messages_on(self.folder / RECORDING, f"/camera/{camera}{_PICTURES}"):
+            parts = wire.fields(message)
+            jpeg = np.frombuffer(wire.bytes_of(parts, 2), np.uint8)
+            image = cv2.imdecode(jpeg, cv2.IMREAD_GRAYSCALE)
+            yield wire.time_of(parts, 1), np.asarray(image, dtype=np.uint8)
+
+
+def _recording_path(folder: Path) -> Path:
+    path = folder / RECORDING if folder.is_dir() else folder
+    if path.name != RECORDING or not path.is_file():
+        raise InputError(str(folder), "", "no recording there", f"a run folder with a {RECORDING}")
+    return path
+
+
+def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
+    """Return what the file says about the run, and the version that wrote it."""
+    about = contents.metadata.get("vergence")
+    if about is None:
+        raise InputError(str(path), "", "a file that does not begin as one", "a run's recording")
+    return RunInfo.from_json(json.loads(about["info"]), about["text"]), about["version"]
+
+
+def _rows(contents: McapContents, topic: str) -> list[Row]:
+    return [json.loads(message) for message in contents.messages.get(topic, ())]
+
+
+def _event(message: bytes) -> Event:
+    parts = wire.fields(message)
+    return Event(wire.time_of(parts, 1), wire.text_of(parts, 4), wire.text_of(parts, 3))
+
+
+def _outcome(end: Mapping[str, str]) -> Outcome:
+    return Outcome(OutcomeKind(end["kind"]), end["reason"], float(end["time"]))

@@ -1,0 +1,20 @@
+"""What the loop tells its listeners each time round."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vergence.control import JointCommand
+from vergence.features import Observation
+from vergence.planning import Reference
+from vergence.runtime.driver import Sample
+
+
+@dataclass(frozen=True, slots=True)
+class TickRecord:
+    """One turn of the outer loop: what came in, what was wanted, what went out."""
+
+    time: float  # s since the start of the run
+    sample: Sample  # joints and the pictures that arrived
+    observation: Observation | None  # what perception made of them; None if none arrived
+    reference: Reference | None  # what the law aimed at
+    commands: Mapping[str, JointCommand]  # by arm; empty while the cell holds
