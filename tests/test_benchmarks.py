@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import cycle
 
 import pytest
+
 from harness import Block, Missing, Peer, compare, measured, row
 
 
