@@ -6,6 +6,7 @@ from typing import Any
 
 import foxglove
 import foxglove.channels
+import foxglove.mcap
 
 from vergence.runtime.recording.messages import nanoseconds
 from vergence.runtime.recording.numbers import dumps
@@ -17,7 +18,11 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         self._context = foxglove.Context()
         self._channels: dict[str, Any] = {}
-        self._writer = foxglove.open_mcap(path, allow_overwrite=True, context=self._context)
+        # Chunks are small: handing them to other threads would cost more than compressing them.
+        options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
+        self._writer = foxglove.open_mcap(
+            path, allow_overwrite=True, context=self._context, writer_options=options
+        )
 
     def numbers(
         self, topic: str, time: float, schema: dict[str, Any], message: Mapping[str, Any]

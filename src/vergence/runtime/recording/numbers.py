@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray
 
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+
 
 def numbers(values: ArrayLike) -> list[Any]:
     """Return the values as nested lists, null where they are not finite."""
@@ -29,7 +31,7 @@ def array(values: Sequence[Any]) -> FloatArray:
 
 def dumps(message: Mapping[str, Any]) -> bytes:
     """Encode a message on one line."""
-    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
+    return _ENCODER.encode(message).encode()
 
 
 def finite(summary: Mapping[str, float | str]) -> dict[str, float | str | None]:

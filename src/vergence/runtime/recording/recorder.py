@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Frame
 from vergence.features import ImagePoints
@@ -53,6 +55,7 @@ class Recorder:
         (folder / CELL).write_text(info.text, encoding="utf-8")
         self._file = McapFile(folder / RECORDING)
         self._introduce()
+        _warm_up()
 
     def tick(self, record: TickRecord) -> None:
         """Record one turn of the loop."""
@@ -155,6 +158,12 @@ def _source(frame: Frame | None, view: ImagePoints | None) -> tuple[str, float]:
     taken = frame if frame is not None else view
     assert taken is not None
     return taken.camera, taken.time
+
+
+def _warm_up() -> None:
+    """Load and compile what the first tick would otherwise wait for."""
+    messages.transforms(0.0, {"": np.eye(4)})
+    _jpeg(np.zeros((8, 8), dtype=np.uint8), 50)
 
 
 def _jpeg(image: ImageArray, quality: int) -> bytes:
