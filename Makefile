@@ -11,7 +11,8 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-images demo test lint check bench peers format clean
+.PHONY: help setup test-images demo test bench peers format clean
+.PHONY: check lint lint-format lint-rules lint-types
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
@@ -43,9 +44,15 @@ demo: setup
 test: setup test-images
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-lint: $(INSTALLED)
+lint: lint-format lint-rules lint-types
+
+lint-format: $(INSTALLED)
 	$(BIN)/ruff format --check .
+
+lint-rules: $(INSTALLED)
 	$(BIN)/ruff check .
+
+lint-types: $(INSTALLED)
 	$(BIN)/mypy
 
 check: lint test

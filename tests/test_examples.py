@@ -1,0 +1,21 @@
+"""Every example runs from start to end, and says what it did."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_every_example_runs_and_says_what_it_did(tmp_path: Path) -> None:
+    for example in sorted(EXAMPLES.glob("*.py")):
+        run = subprocess.run(
+            [sys.executable, "-W", "error", str(example)],
+            cwd=tmp_path,
+            env={"MUJOCO_GL": "egl", "MPLBACKEND": "Agg"} | os.environ,
+            capture_output=True,
+            text=True,
+        )
+        assert run.returncode == 0, f"{example.name}:\n{run.stderr}"
+        assert run.stdout, example.name
