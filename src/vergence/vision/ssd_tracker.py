@@ -1,0 +1,130 @@
+"""The SSD pyramid tracker."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vergence.arrays import FloatArray, ImageArray, frozen
+from vergence.vision.alignment import AREA_PX, PATCH_PX
+from vergence.vision.image import grey_image
+from vergence.vision.ssd import make_workspace
+from vergence.vision.tracker_state import (
+    CONTRAST,
+    DEFORMED,
+    DISAGREES,
+    FIT_PX,
+    FOUND,
+    LEFT,
+    LOST_CORRELATION,
+    LOST_SHIFT_PX,
+    LOST_STRETCH,
+    NO_MATCH,
+    NO_TEMPLATE,
+    empty_output,
+    empty_state,
+    start_points,
+    track_points,
+)
+from vergence.vision.tracks import Tracks
+
+_REASONS = {
+    FOUND: "",
+    LEFT: "left the image",
+    NO_MATCH: f"no match: correlation {{:.2f}}, below {LOST_CORRELATION}",
+    DISAGREES: f"no match: alignment {{:.1f}} px from the search, above {LOST_SHIFT_PX}",
+    DEFORMED: f"no match: stretched by {{:.2f}} since the last image, above {LOST_STRETCH}",
+    CONTRAST: "no match: contrast changed to {:.2f} of the template's",
+    NO_TEMPLATE: f"no template: less than {FIT_PX:.0f} px from the border of the first image",
+}
+
+
+class SsdTracker:
+    """Follows image points by the pyramid search of [Nelson1995] section 2.3 and an alignment.
+
+    Each point is searched within ±32 px of where it is expected, on three resolutions of a window
+    of the image; then a patch around it is aligned, affinely and with gain and bias, to a key
+    template, which gives the place to a few hundredths of a pixel. Key templates are renewed when
+    the alignment measures a stretch of more than 1.2, never otherwise; so the place does not creep
+    with the number of images. A lost point is searched for again with the templates it had.
+
+    Example:
+        >>> tracker = SsdTracker(first_image, points_px)
+        >>> tracks = tracker.track(next_image)
+        >>> tracks.points_px[tracks.found]
+
+    Attributes:
+        points_px: where the points were last found, (M, 2).
+    """
+
+    def __init__(self, image: ImageArray, points_px: ArrayLike) -> None:
+        """Take the templates.
+
+        Args:
+            image: the first image, grey, (height, width). From one that cannot be used no
+                templates come, and the points are lost with that reason in every image.
+            points_px: the points in it, (M, 2), with fraction.
+
+        Raises:
+            ShapeError: if points_px is not (M, 2).
+        """
+        start = frozen(points_px, (None, 2), "points_px")
+        count = len(start)
+        self._state = empty_state(count)
+        self._state.points[:] = start
+        self._work = make_workspace()
+        self._area = np.zeros((AREA_PX, AREA_PX), np.float32)
+        self._sample = np.zeros(PATCH_PX * PATCH_PX, np.float32)
+        grey, reason = grey_image(image)
+        self._no_template = f"no template: first {reason}" if reason else _REASONS[NO_TEMPLATE]
+        if grey is not None and np.isfinite(start).all():
+            start_points(grey, self._state)
+
+    @property
+    def points_px(self) -> FloatArray:
+        """Where the points were last found, (M, 2)."""
+        return self._state.points.copy()
+
+    def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
+        """Find the points in a new image.
+
+        Args:
+            image: grey, (height, width).
+            predicted_px: where to look, (M, 2); None, or a row that is not finite, for where the
+                point was last found.
+
+        Returns:
+            Places with covariance; a point that is not found keeps the place where it was
+            expected and has its reason.
+
+        Raises:
+            ShapeError: if predicted_px is not (M, 2).
+        """
+        state = self._state
+        out = empty_output(len(state.points))
+        out.points[:] = state.points
+        if predicted_px is not None:
+            predicted = frozen(predicted_px, state.points.shape, "predicted_px")
+            usable = np.isfinite(predicted).all(axis=1)
+            out.points[usable] = predicted[usable]
+        grey, reason = grey_image(image)
+        if grey is None:
+            out.covariance[:] = np.eye(2) * 1e4
+            reasons = (reason,) * len(state.points)
+        else:
+            track_points(grey, state, self._work, self._area, self._sample, out)
+            reasons = tuple(
+                self._reason(int(verdict), detail)
+                for verdict, detail in zip(out.verdicts, out.detail, strict=True)
+            )
+        return Tracks(
+            out.points,
+            out.covariance,
+            out.verdicts == FOUND,
+            reasons,
+            out.residuals,
+            out.correlations,
+        )
+
+    def _reason(self, verdict: int, detail: float) -> str:
+        if verdict == NO_TEMPLATE:
+            return self._no_template
+        return _REASONS[verdict].format(detail)

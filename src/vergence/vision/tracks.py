@@ -1,0 +1,33 @@
+"""What a point tracker is and what it answers."""
+
+from typing import NamedTuple, Protocol
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+
+
+class Tracks(NamedTuple):
+    """Where the points are in one image."""
+
+    points_px: FloatArray  # (M, 2); where a point was not found, where it was expected
+    covariance_px: FloatArray  # (M, 2, 2) px²; where not found, of the search range
+    found: BoolArray  # (M,)
+    reasons: tuple[str, ...]  # (M,) empty where found, else why not
+    residuals: FloatArray  # (M,) grey levels, root mean square; NaN where nothing was compared
+    correlations: FloatArray  # (M,) with the template, -1 … 1; NaN where nothing was compared
+
+    def __bool__(self) -> bool:
+        """Whether every point was found."""
+        return bool(self.found.all())
+
+
+class PointTracker(Protocol):
+    """Follows points from image to image: the place for a tracker of one's own."""
+
+    def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
+        """Measure the points in a new image.
+
+        Args:
+            image: grey, (height, width).
+            predicted_px: where to look, (M, 2); None for where the points were last.
+        """
+        ...

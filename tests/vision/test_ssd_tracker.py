@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vergence.errors import ShapeError
+from vergence.vision import SsdTracker
+
+
+def picture(rng: np.random.Generator, height: int = 240, width: int = 320) -> NDArray[np.uint8]:
+    """Random texture with detail at every level of the pyramid."""
+    import cv2
+
+    layers = [
+        cv2.GaussianBlur(rng.standard_normal((height, width)), (0, 0), sigma)
+        for sigma in (1.5, 4.0, 12.0)
+    ]
+    total = sum(layer / layer.std() for layer in layers)
+    return np.clip(128 + 30 * total, 0, 255).astype(np.uint8)
+
+
+POINTS = np.array([[100.3, 90.7], [160.0, 120.0], [220.5, 60.25]])
+
+
+@pytest.fixture
+def image() -> NDArray[np.uint8]:
+    return picture(np.random.default_rng(1))
+
+
+def test_points_in_the_same_image_stay_where_they_are(image: NDArray[np.uint8]) -> None:
+    tracks = SsdTracker(image, POINTS).track(image)
+    assert tracks.found.all()
+    np.testing.assert_allclose(tracks.points_px, POINTS, atol=2e-3)
+
+
+@pytest.mark.parametrize("shift", [(1, 0), (-5, 7), (32, -32), (-31, 30), (17, 2)])
+def test_whole_pixel_shift_up_to_32_px_is_found(
+    image: NDArray[np.uint8], shift: tuple[int, int]
+) -> None:
+    tracks = SsdTracker(image, POINTS).track(np.roll(image, shift, axis=(1, 0)))
+    assert tracks.found.all(), tracks.reasons
+    np.testing.assert_allclose(tracks.points_px, POINTS + shift, atol=5e-3)
+
+
+@pytest.mark.parametrize("fraction", [(0.5, 0.5), (0.25, -0.3), (-0.4, 0.1)])
+def test_fraction_of_a_pixel_is_measured(
+    image: NDArray[np.uint8], fraction: tuple[float, float]
+) -> None:
+    import cv2
+
+    warp = np.array([[1, 0, 3 + fraction[0]], [0, 1, -6 + fraction[1]]])
+    moved = cv2.warpAffine(image, warp, (320, 240), flags=cv2.INTER_CUBIC)
+    tracks = SsdTracker(image, POINTS).track(moved)
+    np.testing.assert_allclose(tracks.points_px, POINTS + warp[:, 2], atol=0.05)
+
+
+def test_change_of_light_moves_nothing(image: NDArray[np.uint8]) -> None:
+    dimmed = np.rint(0.6 * image + 20).astype(np.uint8)
+    tracks = SsdTracker(image, POINTS).track(dimmed)
+    assert tracks.found.all(), tracks.reasons
+    np.testing.assert_allclose(tracks.points_px, POINTS, atol=0.02)
+
+
+def test_prediction_moves_the_search(image: NDArray[np.uint8]) -> None:
+    moved = np.roll(image, (50, 40), axis=(1, 0))
+    tracks = SsdTracker(image, POINTS).track(moved, POINTS + (45.0, 44.0))
+    np.testing.assert_allclose(tracks.points_px, POINTS + (50, 40), atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (np.zeros((0, 0), np.uint8), "image empty"),
+        (None, "image empty"),
+        (np.zeros((10, 12), np.uint8), "image smaller than the window: 12 x 10, 24 needed"),
+        (np.full((240, 320), np.nan), "image not finite"),
+        (np.zeros((240, 320, 3), np.uint8), "image not grey: shape (240, 320, 3)"),
+    ],
+)
+def test_unusable_image_loses_points_with_reason_and_next_one_finds_them(
+    image: NDArray[np.uint8], bad: NDArray[np.uint8], reason: str
+) -> None:
+    tracker = SsdTracker(image, POINTS)
+    tracks = tracker.track(bad)
+    assert not tracks
+    assert tracks.reasons == (reason,) * 3
+    np.testing.assert_array_equal(tracks.points_px, POINTS)
+    assert tracker.track(image)
+
+
+def test_unusable_first_image_gives_no_template(image: NDArray[np.uint8]) -> None:
+    tracks = SsdTracker(np.zeros((0, 0), np.uint8), POINTS).track(image)
+    assert tracks.reasons == ("no template: first image empty",) * 3
+
+
+def test_point_whose_window_does_not_fit_has_no_template(image: NDArray[np.uint8]) -> None:
+    tracks = SsdTracker(image, [[3.0, 100.0], [100.0, 100.0]]).track(image)
+    assert tracks.found.tolist() == [False, True]
+    assert "border" in tracks.reasons[0]
+
+
+def test_wrong_shape_of_points_is_an_error(image: NDArray[np.uint8]) -> None:
+    with pytest.raises(ShapeError, match="points_px"):
+        SsdTracker(image, [1.0, 2.0, 3.0])
