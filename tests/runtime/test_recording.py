@@ -64,7 +64,8 @@ def rng() -> np.random.Generator:
 
 
 def recorder_with(folder: Path, records: list[TickRecord]) -> Recorder:
-    recorder = Recorder(folder, INFO)
+    recorder = Recorder(folder)
+    recorder.begin(INFO)
     for record in records:
         recorder.tick(record)
     return recorder
@@ -180,7 +181,7 @@ def test_numbers_that_are_not_finite_read_back_as_nan(tmp_path: Path) -> None:
 
 
 def test_a_changing_number_of_points_is_filled_up(tmp_path: Path, rng: np.random.Generator) -> None:
-    recorder = Recorder(tmp_path, INFO)
+    recorder = recorder_with(tmp_path, [])
     for count in (1, 3):
         view = ImagePoints(
             "wall", float(count), np.ones((count, 2)), np.ones((count, 2, 2)),
@@ -232,7 +233,7 @@ def test_nothing_is_recorded_after_the_end(tmp_path: Path, records: list[TickRec
 
 
 def test_a_run_that_never_ticked_is_readable(tmp_path: Path) -> None:
-    Recorder(tmp_path, INFO).close(DONE, {})
+    recorder_with(tmp_path, []).close(DONE, {})
     recording = Recording.open(tmp_path)
     assert recording.duration == 0.0
     assert recording.cameras["wrist"].error_px.shape == (0, 0)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from vergence.outcome import Outcome
+from vergence.runtime.recording.run_info import RunInfo
 from vergence.runtime.recording.tick import TickRecord
 
 
@@ -12,6 +13,10 @@ class Listener(Protocol):
 
     It is called from inside the loop, so it must be quick: well below one millisecond a tick.
     """
+
+    def begin(self, info: RunInfo) -> None:
+        """Take note of what is about to run; called once, before everything else."""
+        ...
 
     def tick(self, record: TickRecord) -> None:
         """Take note of one turn of the loop."""

@@ -13,8 +13,8 @@ from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime.recording import wire
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
-from vergence.runtime.recording.recorder import RECORDING
 from vergence.runtime.recording.run_info import RunInfo
+from vergence.runtime.recording.tape import RECORDING
 from vergence.runtime.recording.traces import (
     ArmTrace,
     CameraTrace,

@@ -2,26 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
+from vergence.robot import Arm
+from vergence.runtime.driver import Driver
 from vergence.runtime.recording.numbers import array, numbers
-
-
-class _Limits(Protocol):
-    """The part of an arm that a recording keeps."""
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def q_min(self) -> FloatArray: ...
-    @property
-    def q_max(self) -> FloatArray: ...
-    @property
-    def rate_max(self) -> FloatArray: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +27,7 @@ class ArmInfo:
             object.__setattr__(self, name, frozen(getattr(self, name), (len(self.names),), name))
 
     @classmethod
-    def of(cls, arm: _Limits) -> Self:
+    def of(cls, arm: Arm) -> Self:
         """Keep names and limits of an arm."""
         return cls(tuple(arm.names), arm.q_min, arm.q_max, arm.rate_max)
 
@@ -67,12 +56,26 @@ class RunInfo:
     seed: int | None = None
     arms: Mapping[str, ArmInfo] = field(default_factory=dict)
     cameras: Mapping[str, Camera] = field(default_factory=dict)
+    task_camera: str = ""  # the one whose points the reference speaks of; the first if empty
+
+    def __post_init__(self) -> None:
+        if not self.task_camera:
+            object.__setattr__(self, "task_camera", next(iter(self.cameras), ""))
+
+    @classmethod
+    def of(
+        cls, driver: Driver, cell: str, text: str, seed: int | None, task_camera: str = ""
+    ) -> Self:
+        """Keep what a driver and a cell file say."""
+        arms = {name: ArmInfo.of(arm) for name, arm in driver.arms.items()}
+        return cls(cell, text, seed, arms, dict(driver.cameras), task_camera)
 
     def as_json(self) -> dict[str, Any]:
         """Return JSON values of all but the text."""
         return {
             "cell": self.cell,
             "seed": self.seed,
+            "task_camera": self.task_camera,
             "arms": {name: arm.as_json() for name, arm in self.arms.items()},
             "cameras": {name: _camera_json(camera) for name, camera in self.cameras.items()},
         }
@@ -86,6 +89,7 @@ class RunInfo:
             data["seed"],
             {name: ArmInfo.from_json(arm) for name, arm in data["arms"].items()},
             {name: Camera(**camera) for name, camera in data["cameras"].items()},
+            data["task_camera"],
         )
 
 
