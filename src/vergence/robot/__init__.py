@@ -20,7 +20,7 @@ from vergence.robot.manipulability import (
     transmissibility_measure,
     yoshikawa_measure,
 )
-from vergence.robot.state import JointState
+from vergence.robot.state import JointState, Sample, Setpoint
 
 __all__ = [
     "Arm",
@@ -28,6 +28,8 @@ __all__ = [
     "ChainState",
     "JointState",
     "Manipulability",
+    "Sample",
+    "Setpoint",
     "chain_state",
     "determinant_measure",
     "forward_kinematics",

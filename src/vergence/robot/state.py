@@ -1,8 +1,10 @@
-"""Where an arm is."""
+"""Where an arm is, and where it should be."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vergence.arrays import FloatArray
+from vergence.camera import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,3 +14,20 @@ class JointState:
     time: float  # s
     position: FloatArray  # (n,) rad, m for sliding joints
     velocity: FloatArray  # (n,) rad/s or m/s
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """Where an arm's joints should be now, and how fast they should move."""
+
+    position: FloatArray  # (n,) rad or m
+    velocity: FloatArray  # (n,) rad/s or m/s
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a cell has to say at one instant."""
+
+    time: float  # s since the start of the run
+    joints: Mapping[str, JointState]  # of every arm, by name
+    frames: tuple[Frame, ...]  # the pictures that arrived since the last sample, oldest first

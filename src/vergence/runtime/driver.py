@@ -1,29 +1,12 @@
 """What the loop asks of a cell, simulated or real."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
-from vergence.arrays import FloatArray
-from vergence.camera import Camera, Frame
-from vergence.robot import Arm, JointState
+from vergence.camera import Camera
+from vergence.robot import Arm, Sample, Setpoint
 
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """What the cell has to say at one instant."""
-
-    time: float  # s since the start of the run
-    joints: Mapping[str, JointState]  # of every arm, by name
-    frames: tuple[Frame, ...]  # the pictures that arrived since the last sample, oldest first
-
-
-@dataclass(frozen=True, slots=True)
-class Setpoint:
-    """Where an arm's joints should be now, and how fast they should move."""
-
-    position: FloatArray  # (n,) rad or m
-    velocity: FloatArray  # (n,) rad/s or m/s
+__all__ = ["Driver", "Sample", "Setpoint"]
 
 
 class Driver(Protocol):

@@ -1,0 +1,188 @@
+"""A work cell as its file describes it."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr, ValidationError
+
+from vergence.cell.schema import (
+    ArmTable,
+    CameraTable,
+    Law,
+    Positive,
+    SceneTable,
+    Table,
+    TargetTable,
+    TaskTable,
+)
+from vergence.errors import InputError, nearest
+
+BUILT_IN = Path(__file__).parents[1] / "cells"
+
+
+class Cell(Table):
+    """Arms, cameras, a target, a task and a law: all that a run depends on."""
+
+    name: str
+    duration_s: Positive
+    seed: Annotated[int, Field(ge=0)] = 0
+    inner_rate_hz: Annotated[float, Field(ge=100)] = 500.0
+    scene: SceneTable = SceneTable()
+    arms: dict[str, ArmTable] = Field(min_length=1)
+    cameras: dict[str, CameraTable] = Field(min_length=1)
+    target: TargetTable
+    task: TaskTable
+    law: Law
+    _path: Path = PrivateAttr(default=Path())
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def path(self) -> Path:
+        """The file it was read from; models are looked for beside it."""
+        return self._path
+
+    @property
+    def text(self) -> str:
+        """The file's text, overrides appended as comments."""
+        return self._text
+
+    @property
+    def outer_rate_hz(self) -> float:
+        """The rate of the fastest camera."""
+        return max(camera.rate_hz for camera in self.cameras.values())
+
+    def resolve(self, model: Path) -> Path:
+        """Return a model's path as seen from the cell's file."""
+        return model if model.is_absolute() else self._path.parent / model
+
+    def replace(self, **tables: Any) -> "Cell":
+        """Return a copy with some tables replaced; nested keys by dictionaries, as in the file."""
+        values = _merge(self.model_dump(), tables)
+        return _validate(values, self._path, self._text)
+
+
+def built_in_cells() -> tuple[str, ...]:
+    """Return the names of the cells that come with vergence."""
+    return tuple(sorted(folder.name for folder in BUILT_IN.iterdir() if _cell_file(folder)))
+
+
+def load_cell(
+    name_or_path: str | Path, overrides: Mapping[str, str] | None = None, seed: int | None = None
+) -> Cell:
+    """Read a cell.
+
+    Args:
+        name_or_path: the name of a built-in cell, a cell file, or a folder that holds `cell.toml`.
+        overrides: dotted keys and TOML values that replace what the file says, such as
+            ``{"target.motion.velocity_m_s": "[0.2, 0, 0]"}``.
+        seed: replaces the file's seed.
+
+    Raises:
+        InputError: if there is no such cell or anything in it cannot be used.
+    """
+    path = _find(name_or_path)
+    try:
+        text = path.read_text()
+        values = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(path), "", str(error), "a TOML file") from None
+    for key, value in (overrides or {}).items():
+        values = _merge(values, _nested(key, value))
+        text += f"\n# set: {key} = {value}"
+    if seed is not None:
+        values["seed"] = seed
+        text += f"\n# set: seed = {seed}"
+    return _validate(values, path, text)
+
+
+def _find(name_or_path: str | Path) -> Path:
+    for candidate in (Path(name_or_path), BUILT_IN / name_or_path):
+        if candidate.is_file():
+            return candidate.resolve()
+        if found := _cell_file(candidate):
+            return found.resolve()
+    allowed = "a cell file, or a built-in cell: " + nearest(str(name_or_path), built_in_cells())
+    raise InputError("cell", "", name_or_path, allowed)
+
+
+def _cell_file(folder: Path) -> Path | None:
+    file = folder / "cell.toml"
+    return file if file.is_file() else None
+
+
+def _nested(key: str, value: str) -> dict[str, Any]:
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value  # a bare word is meant as a string
+    for part in reversed(key.split(".")):
+        parsed = {part: parsed}
+    return dict(parsed)
+
+
+def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(values)
+    for key, change in changes.items():
+        old = merged.get(key)
+        both = isinstance(change, Mapping) and isinstance(old, dict)
+        merged[key] = _merge(old, change) if both and old is not None else change
+    return merged
+
+
+def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
+    try:
+        cell = Cell.model_validate(values)
+    except ValidationError as error:
+        raise _explain(error, str(path), values) from None
+    cell._path, cell._text = path, text
+    _check_names(cell)
+    return cell
+
+
+def _explain(error: ValidationError, source: str, values: Any) -> InputError:
+    """Turn pydantic's first complaint into ours: file, key, given, allowed."""
+    first = error.errors()[0]
+    parts = [str(part) for part in first["loc"]]
+    key = ".".join(parts)
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(parts[:-1])
+        return InputError(source, key, "a key that is not known", nearest(parts[-1], known))
+    if first["type"] == "missing":
+        return InputError(source, key, "nothing", "a value; this key is required")
+    message = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return InputError(source, key, first["input"], message)
+
+
+def _known_keys(parts: list[str]) -> list[str]:
+    tables: dict[str, type[Table]] = {
+        "scene": SceneTable,
+        "arms": ArmTable,
+        "cameras": CameraTable,
+        "target": TargetTable,
+        "task": TaskTable,
+    }
+    if not parts:
+        return list(Cell.model_fields)
+    table = tables.get(parts[0])
+    return list(table.model_fields) if table else []
+
+
+def _check_names(cell: Cell) -> None:
+    def check(key: str, name: str, known: Mapping[str, Any]) -> None:
+        if name not in known:
+            raise InputError(str(cell.path), key, name, nearest(name, known))
+
+    check("task.arm", cell.task.arm, cell.arms)
+    check("task.camera", cell.task.camera, cell.cameras)
+    for name, camera in cell.cameras.items():
+        if camera.arm is not None:
+            check(f"cameras.{name}.arm", camera.arm, cell.arms)
+    if cell.cameras[cell.task.camera].arm != cell.task.arm:
+        raise InputError(
+            str(cell.path),
+            "task.camera",
+            f"{cell.task.camera}, which {cell.task.arm} does not carry",
+            f"a camera with arm = {cell.task.arm!r}",
+        )

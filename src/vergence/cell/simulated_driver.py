@@ -1,0 +1,169 @@
+"""The cell in simulation, behind the same border as a real one."""
+
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera, Frame, FrameTruth
+from vergence.cell.cell import Cell
+from vergence.cell.motion import target_pose
+from vergence.cell.renderer import CameraRenderer, choose_renderer
+from vergence.geometry import se3_inverse, transform_points
+from vergence.robot import Arm, JointState, Sample, Setpoint
+
+
+class SimulatedDriver:
+    """Renders the cameras and moves the arms of a cell, in lock-step with the loop.
+
+    Pictures are exposed at the camera's rate and arrive its latency later. With `images` off they
+    carry no image, only the truth, for perception that is exact by construction.
+    """
+
+    def __init__(self, cell: Cell, images: bool = True) -> None:
+        if images:
+            choose_renderer()
+        from vergence.cell.world import World
+
+        self.cell = cell
+        self.world = World(cell)
+        self._pose = target_pose(cell.target, cell.target.motion, cell.seed)
+        features = cell.target.features
+        self._features = np.array(features if features else np.empty((0, 3)), dtype=np.float64)
+        self._tick = 0
+        self._exposed = dict.fromkeys(cell.cameras, 0)
+        self._queue: deque[tuple[float, Frame]] = deque()
+        self._renderers = {}
+        if images:
+            self._renderers = {
+                name: CameraRenderer(
+                    self.world.model,
+                    name,
+                    self.world.cameras[name],
+                    table.noise_grey,
+                    np.random.default_rng([cell.seed, 2, number]),
+                )
+                for number, (name, table) in enumerate(cell.cameras.items())
+            }
+        self.world.move_target(self._pose(0.0))
+        self.world.update()
+        self._expose()
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return self.world.arms
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The cameras by name."""
+        return self.world.cameras
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """The rate of the physics and of the servos."""
+        return self.cell.inner_rate_hz
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._tick / self.cell.inner_rate_hz
+
+    @property
+    def features(self) -> FloatArray:
+        """The features in the target's frame, (M, 3), m."""
+        return self._features
+
+    def first_frame(self, camera: str) -> Frame:
+        """Return what a camera sees at the start, without its latency."""
+        return self._frame(camera)
+
+    def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
+        """Make image points the target's features: where their rays meet it, (M, 3).
+
+        So the truth is known of features that were picked in the image. A ray that misses the
+        target gives NaN.
+        """
+        T_world_camera = self.world.camera_pose(camera)
+        T_target_world = se3_inverse(self._pose(self.time))
+        points = np.full((len(points_px), 3), np.nan)
+        for j, (x, y) in enumerate(self.cameras[camera].normalize(points_px)):
+            ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
+            ray /= np.linalg.norm(ray)
+            distance, body = self.world.ray(T_world_camera[:3, 3].copy(), ray)
+            if self.world.belongs_to_target(body):
+                met = T_world_camera[:3, 3] + distance * ray
+                points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
+        self._features = points
+        self._queue.clear()
+        for name in self._exposed:
+            self._exposed[name] = 0
+        self._expose()
+        return points
+
+    def read(self) -> Sample:
+        """Return joints now and the pictures that have arrived since the last call."""
+        arrived = []
+        waiting: deque[tuple[float, Frame]] = deque()
+        for arrival, frame in self._queue:
+            if arrival <= self.time + 1e-9:
+                arrived.append(frame)
+            else:
+                waiting.append((arrival, frame))
+        self._queue = waiting
+        joints = {
+            name: JointState(
+                self.time, self.world.joint_position(name), self.world.joint_velocity(name)
+            )
+            for name in self.arms
+        }
+        return Sample(self.time, joints, tuple(sorted(arrived, key=lambda frame: frame.time)))
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Advance the world by one inner period."""
+        for name, setpoint in setpoints.items():
+            self.world.command(name, setpoint.position, setpoint.velocity)
+        self._tick += 1
+        self.world.move_target(self._pose(self.time))
+        self.world.step()
+        self._expose()
+
+    def close(self) -> None:
+        """Free the graphics contexts."""
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def _expose(self) -> None:
+        fresh = False
+        for name, table in self.cell.cameras.items():
+            due = int(np.floor(self._exposed[name] * self.inner_rate_hz / table.rate_hz))
+            if self._tick < due:
+                continue
+            if not fresh:
+                self.world.update()
+                fresh = True
+            arrival = (due + table.latency_frames * self.inner_rate_hz / table.rate_hz) / (
+                self.inner_rate_hz
+            )
+            self._exposed[name] += 1
+            self._queue.append((arrival, self._frame(name)))
+
+    def _frame(self, camera: str) -> Frame:
+        image = self._renderers[camera].take(self.world.data) if self._renderers else None
+        joints = {name: self.world.joint_position(name) for name in self.arms}
+        return Frame(camera, self.time, image, joints, self._truth(camera))
+
+    def _truth(self, camera: str) -> FrameTruth:
+        T_world_target = self._pose(self.time)
+        T_world_camera = self.world.camera_pose(camera)
+        T_camera_target = se3_inverse(T_world_camera) @ T_world_target
+        points = transform_points(T_camera_target, self._features)
+        intrinsics = self.cameras[camera]
+        depth = points[:, 2].copy()
+        in_front = depth > 1e-3
+        points_px = np.full((len(points), 2), np.nan)
+        points_px[in_front] = intrinsics.project(points[in_front])
+        visible = in_front.copy()
+        visible[in_front] = intrinsics.contains(points_px[in_front])
+        return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
