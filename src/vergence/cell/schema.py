@@ -141,8 +141,9 @@ class OptimalTrackingTable(Table):
     S: Annotated[float, Field(ge=0)] = 0.0
     penalty: Literal["product", "per_joint"] = "product"
     penalty_k: Positive = 1e5
-    depth_m: Positive | Literal["initial", "true"] = "initial"
+    depth_m: Positive | Literal["initial"] = "initial"  # what the start shows, held constant
     avoidance_speed_max_m_s: Positive = 0.5
+    singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
 
 
 Law = Annotated[OptimalTrackingTable, Field()]

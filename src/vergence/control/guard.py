@@ -80,6 +80,7 @@ class Guard:
         self._dt = dt
         self._position = np.clip(start, arm.q_min, arm.q_max)
         self._velocity = np.zeros(arm.joint_count)
+        self.joint_count = arm.joint_count
         self.at_limit: BoolArray = np.zeros(arm.joint_count, dtype=np.bool_)
 
     @property

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from vergence.control import JointCommand
 from vergence.features import Observation
 from vergence.planning import Reference
-from vergence.runtime.driver import Sample
+from vergence.robot import Sample
 
 
 @dataclass(frozen=True, slots=True)

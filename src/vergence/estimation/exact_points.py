@@ -1,0 +1,42 @@
+"""Perception without images: true projections, with noise if wanted."""
+
+import numpy as np
+
+from vergence.camera import Frame
+from vergence.features import ImagePoints, Observation
+
+
+class ExactPoints:
+    """Observes the target's features as a simulated camera truly projects them.
+
+    Args:
+        camera: the camera's name; other cameras' frames are passed over.
+        noise_px: standard deviation of the noise on each coordinate.
+        rng: draws the noise.
+    """
+
+    def __init__(
+        self, camera: str, noise_px: float = 0.0, rng: np.random.Generator | None = None
+    ) -> None:
+        self._camera = camera
+        self._noise_px = noise_px
+        self._rng = rng or np.random.default_rng(0)
+
+    def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
+        """Return the points in the frames that arrived, or None if none did."""
+        views = tuple(self._view(frame) for frame in frames if frame.camera == self._camera)
+        return Observation(views[-1].time, views) if views else None
+
+    def _view(self, frame: Frame) -> ImagePoints:
+        assert frame.truth is not None
+        truth = frame.truth
+        noise = self._rng.normal(0.0, 1.0, truth.points_px.shape) * self._noise_px
+        covariance = np.eye(2) * max(self._noise_px, 1e-3) ** 2
+        return ImagePoints(
+            frame.camera,
+            frame.time,
+            np.where(truth.visible[:, None], truth.points_px + noise, np.nan),
+            np.broadcast_to(covariance, (len(noise), 2, 2)),
+            truth.visible,
+            tuple("" if seen else "left the image" for seen in truth.visible),
+        )

@@ -1,0 +1,24 @@
+"""Runtime: the loop, what it asks of a driver, and the recording of a run."""
+
+from vergence.runtime.driver import Driver
+from vergence.runtime.loop import Loop, Patience
+from vergence.runtime.recording import Listener, Recorder, Recording, TickRecord
+from vergence.runtime.session import RunResult, build_law, run_cell
+from vergence.runtime.stages import Perception, Planner
+from vergence.runtime.summary import Summary
+
+__all__ = [
+    "Driver",
+    "Listener",
+    "Loop",
+    "Patience",
+    "Perception",
+    "Planner",
+    "Recorder",
+    "Recording",
+    "RunResult",
+    "Summary",
+    "TickRecord",
+    "build_law",
+    "run_cell",
+]

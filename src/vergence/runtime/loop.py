@@ -1,0 +1,185 @@
+"""The one loop: driver, perception, planning, control, and back to the driver."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control import Guard, JointCommand, Law
+from vergence.features import Observation
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.robot import Sample
+from vergence.runtime.driver import Driver
+from vergence.runtime.recording import Listener, TickRecord
+from vergence.runtime.stages import Perception, Planner
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long the loop holds the arm still and hopes before it ends the run."""
+
+    image_s: float = 0.5  # without any picture
+    target_s: float = 0.2  # with pictures, but none of the features found
+
+
+class Loop:
+    """Runs one arm's task; simulated or real is the driver's business.
+
+    Each outer tick reads the cell, looks, and asks the law for joint rates; each inner tick hands a
+    guarded set-point to the driver, so that whatever the law says no joint passes its limits. The
+    k-th outer tick begins at inner tick ⌊k · inner/outer⌋, exact also where 26 Hz meets 500 Hz.
+
+    Args:
+        driver: the cell.
+        arm: name of the arm that is moved; the others hold their place.
+        perception: looks at the pictures.
+        planner: says what is wanted.
+        law: says how to get there.
+        outer_rate_hz: how often to look.
+        listeners: hear of every tick and event.
+        patience: how long to hold before giving up.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        arm: str,
+        perception: Perception,
+        planner: Planner,
+        law: Law,
+        *,
+        outer_rate_hz: float,
+        listeners: Sequence[Listener] = (),
+        patience: Patience | None = None,
+    ) -> None:
+        self._driver, self._arm = driver, arm
+        self._perception, self._planner, self._law = perception, planner, law
+        self._outer_rate_hz = outer_rate_hz
+        self._listeners = listeners
+        self._patience = patience or Patience()
+        dt = 1.0 / driver.inner_rate_hz
+        joints = driver.read().joints
+        self._guards = {n: Guard(a, joints[n].position, dt) for n, a in driver.arms.items()}
+        self._hold = np.zeros(driver.arms[arm].joint_count)
+        self._inner_tick = 0
+        self._last_picture = self._last_seen = 0.0
+        self._lost: set[int] = set()
+        self._last_command: JointCommand | None = None
+
+    def run(self, duration_s: float) -> Outcome:
+        """Run until the time is over, the task has failed, or Ctrl-C; then stop the arm."""
+        try:
+            outcome = self._run(duration_s)
+        except KeyboardInterrupt:
+            time = self._inner_tick / self._driver.inner_rate_hz
+            outcome = Outcome(OutcomeKind.STOPPED, "stopped by the user", time)
+        self._brake()
+        if not outcome.succeeded:
+            self._tell(outcome.time, outcome.kind.value, outcome.reason)
+        return outcome
+
+    def _run(self, duration_s: float) -> Outcome:
+        outer_tick = 0
+        while True:
+            sample = self._driver.read()
+            if sample.time >= duration_s:
+                reason = f"ran for {duration_s:g} s with the target in view"
+                return Outcome(OutcomeKind.COMPLETED, reason, sample.time)
+            observation = self._perception.observe(sample.frames)
+            command, outcome = self._decide(sample, observation)
+            if outcome is not None:
+                return outcome
+            outer_tick += 1
+            rates = self._hold if command is None else command.velocity
+            next_tick = int(outer_tick * self._driver.inner_rate_hz / self._outer_rate_hz + 1e-9)
+            if limited := self._move(rates, next_tick):
+                joints = " and ".join(limited)
+                reason = f"{joints} at the end of its range, driven against it"
+                return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
+
+    @property
+    def _now(self) -> float:
+        return self._inner_tick / self._driver.inner_rate_hz
+
+    def _decide(
+        self, sample: Sample, observation: Observation | None
+    ) -> tuple[JointCommand | None, Outcome | None]:
+        """Return the command for the next period, None to hold, or how the run ends."""
+        time = sample.time
+        if observation is None:
+            if time - self._last_picture > self._patience.image_s:
+                waited = time - self._last_picture
+                reason = f"no picture for {waited:.2f} s"
+                return None, Outcome(OutcomeKind.IMAGE_LATE, reason, time)
+            self._record(sample, None, self._last_command)
+            return self._last_command, None
+        self._last_picture = time
+        self._report_losses(time, observation)
+        if not any(view.found.any() for view in observation.views):
+            self._last_command = None
+            self._record(sample, observation, None)
+            if time - self._last_seen > self._patience.target_s:
+                return None, Outcome(OutcomeKind.TARGET_LOST, _why_lost(observation), time)
+            return None, None
+        self._last_seen = time
+        reference = self._planner.reference(observation.time)
+        command = self._law.command(observation, reference, sample.joints[self._arm])
+        self._last_command = command
+        self._record(sample, observation, command)
+        if command.fault is not None:
+            return None, Outcome(*command.fault, time)
+        return command, None
+
+    def _move(self, rates: FloatArray, until_tick: int) -> list[str]:
+        """Step the driver to an inner tick; return the joints stuck at a limit all the while."""
+        guard = self._guards[self._arm]
+        stuck = np.ones(len(rates), dtype=np.bool_)
+        while self._inner_tick < until_tick:
+            setpoints = {
+                name: other.step(rates if name == self._arm else np.zeros(other.joint_count))
+                for name, other in self._guards.items()
+            }
+            stuck &= guard.at_limit
+            self._driver.step(setpoints)
+            self._inner_tick += 1
+        names = self._driver.arms[self._arm].names
+        return [name for name, at_limit in zip(names, stuck, strict=True) if at_limit]
+
+    def _brake(self) -> None:
+        """Bring every arm to rest within its acceleration limits."""
+        while any(guard.moving for guard in self._guards.values()):
+            self._driver.step(
+                {n: guard.step(np.zeros(guard.joint_count)) for n, guard in self._guards.items()}
+            )
+            self._inner_tick += 1
+
+    def _record(
+        self, sample: Sample, observation: Observation | None, command: JointCommand | None
+    ) -> None:
+        if not self._listeners:
+            return
+        seen_at = sample.time if observation is None else observation.time
+        reference = self._planner.reference(seen_at)
+        commands = {} if command is None else {self._arm: command}
+        record = TickRecord(sample.time, sample, observation, reference, commands)
+        for listener in self._listeners:
+            listener.tick(record)
+
+    def _report_losses(self, time: float, observation: Observation) -> None:
+        view = observation.views[-1]
+        lost = set(np.flatnonzero(~view.found).tolist())
+        for feature in sorted(lost - self._lost):
+            self._tell(time, "feature lost", f"feature {feature}: {view.reasons[feature]}")
+        for feature in sorted(self._lost - lost):
+            self._tell(time, "feature found", f"feature {feature} is back")
+        self._lost = lost
+
+    def _tell(self, time: float, name: str, text: str) -> None:
+        for listener in self._listeners:
+            listener.event(time, name, text)
+
+
+def _why_lost(observation: Observation) -> str:
+    reasons = sorted({reason for view in observation.views for reason in view.reasons if reason})
+    return "no feature found: " + "; ".join(reasons)

@@ -1,0 +1,27 @@
+"""The stages of the loop that users may replace, as the loop sees them."""
+
+from typing import Protocol
+
+from vergence.camera import Frame
+from vergence.features import Observation
+from vergence.planning import Reference
+
+
+class Perception(Protocol):
+    """Turns pictures into an observation."""
+
+    def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
+        """Return what the frames show, or None if none of them concerns it."""
+        ...
+
+
+class Planner(Protocol):
+    """Knows what is wanted when."""
+
+    def reference(self, time: float) -> Reference:
+        """Return what the law should aim at.
+
+        Args:
+            time: exposure of the picture that the law compares it with, s.
+        """
+        ...
