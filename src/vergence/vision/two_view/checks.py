@@ -1,0 +1,81 @@
+"""What makes a set of matches unusable, found before any equation is solved."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray, IntArray
+
+
+@njit(cache=True)
+def distinct_count(points: FloatArray, tolerance: float) -> int:
+    """Return how many of the points (N, D) are farther than the tolerance from all before them."""
+    count = 0
+    for j in range(len(points)):
+        alone = True
+        for i in range(j):
+            if np.sum((points[j] - points[i]) ** 2) <= tolerance * tolerance:
+                alone = False
+                break
+        count += alone
+    return count
+
+
+@njit(cache=True)
+def fewest_off_a_line(points: FloatArray, tolerance: float) -> int:
+    """Return the smallest number of points (N, 2) that any line leaves farther than the tolerance.
+
+    Every pair of points gives a line; above about sixty points only some of the pairs are tried.
+    """
+    count = len(points)
+    stride = max(1, count * count // 3600)
+    fewest, pair = count, 0
+    for i in range(count):
+        for j in range(i + 1, count):
+            pair += 1
+            along = points[j] - points[i]
+            length = np.sqrt(np.sum(along**2))
+            if pair % stride != 0 or length <= tolerance:
+                continue
+            off = 0
+            for k in range(count):
+                d = points[k] - points[i]
+                off += abs(along[0] * d[1] - along[1] * d[0]) > tolerance * length
+            fewest = min(fewest, off)
+    return fewest
+
+
+@njit(cache=True)
+def triangle_area(points: FloatArray, a: int, b: int, c: int) -> float:
+    """Return twice the area of the triangle of three of the points (N, 2)."""
+    p, q, r = points[a], points[b], points[c]
+    area: float = abs((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+    return area
+
+
+@njit(cache=True)
+def widest_triples(m_star: FloatArray, m: FloatArray, wanted: int) -> IntArray:
+    """Return the triples of points, (wanted, 3), that span the largest triangles.
+
+    What counts is the smaller of a triangle's areas in the two views. The triples are drawn from
+    at most sixteen points, spread over the list, and come best first.
+    """
+    stride = max(1, len(m) // 16)
+    triples = np.zeros((wanted, 3), np.int64)
+    areas = np.full(wanted, -1.0)
+    for a in range(0, len(m), stride):
+        for b in range(a + stride, len(m), stride):
+            for c in range(b + stride, len(m), stride):
+                area = min(triangle_area(m_star, a, b, c), triangle_area(m, a, b, c))
+                worst = np.argmin(areas)
+                if area > areas[worst]:
+                    areas[worst] = area
+                    triples[worst] = np.array([a, b, c])
+    return triples[np.argsort(-areas)]
+
+
+def chi_square_quantile(freedom: int, normal_quantile: float = 3.09) -> float:
+    """Return the χ² quantile by the formula of Wilson and Hilferty; 3.09 is 99.9 %."""
+    if freedom <= 0:
+        return 0.0
+    spread = 2.0 / (9.0 * freedom)
+    return float(freedom * (1.0 - spread + normal_quantile * spread**0.5) ** 3)

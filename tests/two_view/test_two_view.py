@@ -1,0 +1,180 @@
+"""The reconstruction of an unknown object from two pictures."""
+
+import numpy as np
+import pytest
+from two_view_scenes import CAMERA, pair, pose_facing, shape
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError, ShapeError
+from vergence.geometry import se3_inverse, so3_exp, so3_log, transform_points
+from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem, estimate_two_view
+
+
+def estimate(current: FloatArray, desired: FloatArray, **options: object) -> TwoView:
+    result = estimate_two_view(current, desired, CAMERA, **options)  # type: ignore[arg-type]
+    assert isinstance(result, TwoView), str(result)
+    return result
+
+
+def refusal(current: FloatArray, desired: FloatArray) -> TwoViewFailure:
+    result = estimate_two_view(current, desired, CAMERA)
+    assert isinstance(result, TwoViewFailure)
+    assert not result
+    return result
+
+
+def distance_of(view: TwoView, points_star: FloatArray) -> float:
+    """Return the true d* of the plane that the estimate chose."""
+    return float(np.nanmedian(points_star[:, 2] / view.rho_star))
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("seed", range(10))
+def test_exact_matches_give_the_exact_motion_and_shape(flat: bool, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    views = pair(random, shape(random, flat=flat))
+    view = estimate(views.current_px, views.desired_px, noise_px=0.1)
+    candidates = [view] if view.alternative is None else [view, view.alternative]
+    truth = views.T_star_camera
+    turns = [so3_log(c.rotation.T @ truth[:3, :3]) for c in candidates]
+    view = candidates[int(np.argmin([np.linalg.norm(turn) for turn in turns]))]
+    d = distance_of(view, views.points_star)
+    assert view.planar == flat
+    assert view.inliers.all()
+    np.testing.assert_allclose(view.T_star_camera(d), truth, atol=1e-7)
+    np.testing.assert_allclose(view.points_star(d), views.points_star, atol=1e-7)
+    current = transform_points(se3_inverse(truth), views.points_star)
+    np.testing.assert_allclose(d * view.rho, current[:, 2], atol=1e-7)
+
+
+def test_parts_of_a_reconstruction_agree_as_the_paper_says() -> None:
+    random = np.random.default_rng(3)
+    views = pair(random, shape(random))
+    view = estimate(views.current_px, views.desired_px, noise_px=0.1)
+    rays_star = np.column_stack((view.m_star, np.ones(9)))
+    rays = np.column_stack((CAMERA.normalize(views.current_px), np.ones(9)))
+    np.testing.assert_allclose(1 / view.rho_star, rays_star @ view.normal - view.delta, atol=1e-9)
+    # (2) with β e = δ Rᵀ t_d: what the homography leaves over is parallax along the epipole.
+    mapped = rays_star @ view.homography.T + np.outer(
+        view.delta, view.rotation.T @ view.translation
+    )
+    np.testing.assert_allclose(mapped / mapped[:, 2:], rays, atol=1e-8)
+    np.testing.assert_allclose(mapped[:, 2], view.rho / view.rho_star, atol=1e-8)
+
+
+def test_reference_plane_lies_on_the_chosen_points() -> None:
+    random = np.random.default_rng(5)
+    views = pair(random, shape(random))
+    view = estimate(views.current_px, views.desired_px, noise_px=0.1, reference=[1, 4, 6])
+    np.testing.assert_allclose(view.delta[[1, 4, 6]], 0.0, atol=1e-9)
+
+
+def test_flat_object_without_a_hint_is_taken_to_face_the_camera() -> None:
+    random = np.random.default_rng(8)
+    views = pair(random, shape(random, flat=True))
+    view = estimate(views.current_px, views.desired_px)
+    assert view.alternative is not None
+    assert view.normal[2] >= view.alternative.normal[2]
+    other = estimate(views.current_px, views.desired_px, normal_hint=view.alternative.normal)
+    np.testing.assert_allclose(other.normal, view.alternative.normal, atol=1e-9)
+
+
+def test_covariance_matches_the_spread_of_repeated_measurements() -> None:
+    random = np.random.default_rng(11)
+    points = shape(random, 20)
+    views = pair(random, points)
+    upsilons, predicted = [], []
+    for _ in range(300):
+        noise = 0.2 * random.normal(size=(2, 20, 2))
+        view = estimate(
+            views.current_px + noise[0],
+            views.desired_px + noise[1],
+            noise_px=0.2,
+            reference=[0, 1, 2],
+        )
+        upsilons.append(view.upsilon)
+        predicted.append(np.diag(view.covariance))
+    # 300 samples know a variance to within 8 %; the rest is curvature.
+    ratio = np.var(upsilons, axis=0) / np.mean(predicted, axis=0)
+    assert (ratio > 0.6).all()
+    assert (ratio < 1.5).all()
+
+
+def test_noise_of_nine_marks_leaves_about_one_degree() -> None:
+    random = np.random.default_rng(2)
+    errors = []
+    for _ in range(60):
+        views = pair(random, shape(random), 0.3)
+        result = estimate_two_view(views.current_px, views.desired_px, CAMERA, noise_px=0.3)
+        if result:
+            turn = so3_log(result.rotation.T @ views.T_star_camera[:3, :3])
+            errors.append(np.degrees(np.linalg.norm(turn)))
+    assert len(errors) >= 58
+    assert np.median(errors) < 2.0
+
+
+@pytest.mark.parametrize(("flat", "count", "wrong"), [(False, 30, 8), (True, 20, 7), (False, 9, 1)])
+def test_wrong_matches_are_dropped(flat: bool, count: int, wrong: int) -> None:
+    random = np.random.default_rng(17)
+    views = pair(random, shape(random, count, flat))
+    current = views.current_px.copy()
+    current[:wrong] += random.choice([-1.0, 1.0], (wrong, 2)) * random.uniform(25, 60, (wrong, 2))
+    view = estimate(current, views.desired_px, noise_px=0.3)
+    assert not view.inliers[:wrong].any()
+    assert view.inliers[wrong:].all()
+    assert np.isnan(view.rho[:wrong]).all()
+
+
+def test_matches_at_random_are_refused() -> None:
+    random = np.random.default_rng(23)
+    current, desired = random.uniform(0, 480, (2, 12, 2))
+    assert refusal(current, desired).problem is TwoViewProblem.WRONG_MATCHES
+
+
+def test_turn_without_translation_is_refused_with_the_rotation() -> None:
+    random = np.random.default_rng(29)
+    points = transform_points(pose_facing(random), shape(random))
+    R = so3_exp(np.array([0.02, -0.03, 0.4]))
+    failure = refusal(CAMERA.project(points @ R.T), CAMERA.project(points))
+    assert failure.problem is TwoViewProblem.NO_TRANSLATION
+    assert failure.rotation is not None
+    np.testing.assert_allclose(failure.rotation, R.T, atol=1e-8)
+
+
+def test_same_picture_twice_is_no_translation() -> None:
+    random = np.random.default_rng(31)
+    px = CAMERA.project(transform_points(pose_facing(random), shape(random)))
+    assert refusal(px, px).problem is TwoViewProblem.NO_TRANSLATION
+
+
+def test_three_points_are_too_few() -> None:
+    px = np.array([[10.0, 10.0], [50.0, 20.0], [30.0, 90.0]])
+    assert refusal(px, px + 5).problem is TwoViewProblem.TOO_FEW
+
+
+def test_six_points_in_space_are_refused() -> None:
+    random = np.random.default_rng(37)
+    views = pair(random, shape(random, 6))
+    assert refusal(views.current_px, views.desired_px).problem is TwoViewProblem.WRONG_MATCHES
+
+
+def test_coincident_points_are_refused() -> None:
+    random = np.random.default_rng(41)
+    points = shape(random, 3)[[0, 1, 2, 0, 1, 2, 0, 1, 2]]
+    views = pair(random, points)
+    assert refusal(views.current_px, views.desired_px).problem is TwoViewProblem.COINCIDENT
+
+
+def test_collinear_points_are_refused() -> None:
+    random = np.random.default_rng(43)
+    points = np.outer(np.linspace(-1, 1, 9), [0.1, 0.05, 0.02])
+    points[4] += [0.0, 0.05, 0.0]
+    views = pair(random, points)
+    assert refusal(views.current_px, views.desired_px).problem is TwoViewProblem.COLLINEAR
+
+
+def test_bad_arguments_are_named() -> None:
+    with pytest.raises(ShapeError, match="points_star_px"):
+        estimate_two_view(np.zeros((9, 2)), np.zeros((8, 2)), CAMERA)
+    with pytest.raises(InputError, match="reference"):
+        estimate_two_view(np.zeros((9, 2)), np.zeros((9, 2)), CAMERA, reference=np.array([1, 12]))
