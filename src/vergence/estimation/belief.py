@@ -1,0 +1,40 @@
+"""What the filter believes about the target."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.estimation.consistency import Consistency
+from vergence.features import TargetState
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Pose, velocity, and the covariance of their error, at one time; a value.
+
+    The error is (δp, δθ, δv, δω) along world axes: p + δp, exp(δθ) R, v + δv, ω + δω.
+    """
+
+    time: float  # s
+    T_world_target: FloatArray  # (4, 4)
+    velocity: FloatArray  # (6,) (v, ω) of the target's origin along world axes, m/s and rad/s
+    covariance: FloatArray  # (12, 12)
+    consistency: Consistency = field(default_factory=Consistency)
+    seen: float = -np.inf  # s, exposure of the last picture that was used
+    doubts: int = 0  # pictures in a row that contradicted the prediction and were not used
+
+    @property
+    def honest_covariance(self) -> FloatArray:
+        """The covariance, (12, 12), enlarged while the innovations say that it is too small."""
+        return self.covariance * self.consistency.scale
+
+    def state(self) -> TargetState:
+        """Return the belief as perception hands it on."""
+        return TargetState(
+            self.time,
+            self.T_world_target,
+            self.velocity,
+            self.honest_covariance,
+            self.consistency.holds and self.doubts == 0,
+        )

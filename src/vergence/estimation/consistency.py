@@ -1,0 +1,55 @@
+"""Do the innovations agree with the covariance? The normalised innovation squared over a window."""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Self
+
+NORMAL_QUANTILE = 3.09  # one in a thousand
+
+
+def chi_square_quantile(freedom: float, z: float = NORMAL_QUANTILE) -> float:
+    """Return the quantile of χ² that a standard normal variable has at z.
+
+    n (1 - 2/(9n) + z √(2/(9n)))³, good to 1 % from one degree of freedom on (Wilson and Hilferty).
+    """
+    spread = 2.0 / (9.0 * freedom)
+    return freedom * max(0.0, 1.0 - spread + z * sqrt(spread)) ** 3
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """A fading sum of normalised innovations squared (NIS), and what is to be expected of it.
+
+    With weights w_i = fading^i the sum Σ w_i NIS_i has mean Σ w_i n_i and variance 2 Σ w_i² n_i for
+    n_i degrees of freedom: nearly a · χ²(mean / a) with a = Σ w_i² n_i / Σ w_i n_i.
+    """
+
+    square: float = 0.0  # Σ w NIS
+    freedom: float = 0.0  # Σ w n
+    spread: float = 0.0  # Σ w² n
+
+    def add(self, square: float, freedom: int, fading: float) -> Self:
+        """Return the sums with the NIS of one more picture, of `freedom` numbers."""
+        return type(self)(
+            fading * self.square + square,
+            fading * self.freedom + freedom,
+            fading * fading * self.spread + freedom,
+        )
+
+    @property
+    def ratio(self) -> float:
+        """NIS over its expectation: about 1 for an honest filter, above if it is overconfident."""
+        return self.square / self.freedom if self.freedom > 0.0 else 1.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the innovations are no larger than chance allows, one time in a thousand."""
+        if self.freedom <= 0.0:
+            return True
+        unit = self.spread / self.freedom
+        return self.square <= unit * chi_square_quantile(self.freedom / unit)
+
+    @property
+    def scale(self) -> float:
+        """By how much the covariance must grow to agree with the innovations: 1 while it does."""
+        return 1.0 if self.holds else self.ratio

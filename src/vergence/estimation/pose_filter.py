@@ -1,0 +1,234 @@
+"""The default filter of the target's pose: an error-state Kalman filter on SE(3)."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.errors import InputError
+from vergence.estimation.belief import Belief
+from vergence.estimation.information import compress, joseph_update, keep_rows
+from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
+from vergence.estimation.motion import correct_pose, predict_covariance, predict_pose
+from vergence.estimation.target_filter import (
+    Update,
+    Verdict,
+    require_covariance,
+    require_finite,
+    unused,
+)
+from vergence.estimation.view import View
+
+MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
+CONSENSUS = 4  # points from which on a majority can overrule the prediction
+
+
+class Correction(NamedTuple):
+    """What the update kernel returns."""
+
+    T_world_target: FloatArray  # (4, 4)
+    velocity: FloatArray  # (6,)
+    covariance: FloatArray  # (12, 12)
+    square: float  # normalised innovation squared of the points kept
+    kept: BoolArray  # (M,)
+    squares: FloatArray  # (M,)
+
+
+@njit(cache=True)
+def correct(
+    T_world_target: FloatArray,
+    velocity: FloatArray,
+    P: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+    gate: float,
+) -> Correction:
+    """Correct a predicted state by one picture, without the points beyond the gate.
+
+    Args:
+        T_world_target: predicted pose, (4, 4).
+        velocity: predicted (v, ω), (6,).
+        P: predicted covariance, (12, 12).
+        T_camera_world: inverse pose of the camera at the exposure, (4, 4).
+        points: in the target's frame, (M, 3), m.
+        measured: normalized coordinates, (M, 2).
+        covariance: of the measured points, (M, 2, 2).
+        gate: on the Mahalanobis distance squared of a point.
+    """
+    rows = whitened_rows(T_world_target, T_camera_world, points, measured, covariance)
+    squares = mahalanobis_squared(rows, P)
+    kept = squares <= gate
+    rows = keep_rows(rows, kept)
+    rest = compress(rows)
+    correction, P, square = joseph_update(P, rows)
+    return Correction(
+        correct_pose(T_world_target, correction),
+        velocity + correction[6:],
+        P,
+        square + rest,
+        kept,
+        squares,
+    )
+
+
+@njit(cache=True)
+def residual_squares(
+    T_world_target: FloatArray,
+    P: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+) -> FloatArray:
+    """Return the Mahalanobis distance squared of each point of a picture, (M,)."""
+    rows = whitened_rows(T_world_target, T_camera_world, points, measured, covariance)
+    return mahalanobis_squared(rows, P)
+
+
+@dataclass(frozen=True, slots=True)
+class PoseFilter:
+    """Pose and velocity of a rigid target from any number of cameras, fixed or carried.
+
+    State (p, R, v, ω) with constant velocity, error (δp, δθ, δv, δω) along world axes; see
+    `motion` and `measurement` for the equations. It replaces the roll-pitch-yaw state of
+    [Lippiello2005] eq. (7) to (18), which is singular at pitch ±90°. The filter itself is a value;
+    what it knows about a target is a `Belief`, handed in and returned.
+
+    A point beyond the gate is left out only while the prediction agrees with most of its picture.
+    Where the gate would throw out the majority, not the points but the prediction is in doubt: then
+    the covariance is enlarged until the median point has its expected distance, and the picture is
+    used if one pose then explains the majority.
+    """
+
+    acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
+    angular_acceleration_density: float = 0.25  # rad²/s³
+    gate: float = 13.8  # χ² with 2 degrees of freedom: one good point in a thousand is lost
+    fading: float = 0.9  # weight of the past in the consistency test, for each picture
+    doubts_allowed: int = 3  # contradicting pictures in a row before small ones are believed too
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration_density", "angular_acceleration_density", "gate"):
+            if not getattr(self, name) > 0.0:
+                raise InputError("PoseFilter", name, getattr(self, name), "a number above zero")
+        if not 0.0 < self.fading < 1.0:
+            raise InputError("PoseFilter", "fading", self.fading, "between 0 and 1")
+
+    def start(
+        self,
+        time: float,
+        T_world_target: FloatArray,
+        velocity: FloatArray | None = None,
+        covariance: FloatArray | None = None,
+    ) -> Belief:
+        """Return the belief to start from.
+
+        Args:
+            time: s.
+            T_world_target: a rough pose, (4, 4).
+            velocity: (v, ω) along world axes, (6,); zero by default.
+            covariance: of (δp, δθ, δv, δω), (12, 12), symmetric and at least semidefinite; by
+                default 3 cm, 0.1 rad, 0.2 m/s and 0.5 rad/s. [Lippiello2005] starts with zero,
+                which makes the first gains zero.
+
+        Raises:
+            InputError: if the covariance is not one, or anything is not finite.
+        """
+        if covariance is None:
+            covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
+        covariance = frozen(covariance, (12, 12), "covariance")
+        pose = frozen(T_world_target, (4, 4), "T_world_target")
+        rates = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
+        require_finite(pose, "PoseFilter", "T_world_target")
+        require_finite(rates, "PoseFilter", "velocity")
+        require_covariance(covariance, "PoseFilter")
+        return Belief(time, pose, rates, covariance)
+
+    def predict(self, belief: Belief, time: float) -> Belief:
+        """Return the belief at another time, later or (for a look back over latency) earlier.
+
+        While the innovations are inconsistent the target is taken to accelerate accordingly more.
+        Going back moves the pose only; the covariance grows as it would going forward.
+        """
+        dt = time - belief.time
+        if dt == 0.0:
+            return belief
+        scale = belief.consistency.scale
+        density = np.array(
+            [scale * self.acceleration_density, scale * self.angular_acceleration_density]
+        )
+        return replace(
+            belief,
+            time=time,
+            T_world_target=predict_pose(belief.T_world_target, belief.velocity, dt),
+            covariance=predict_covariance(belief.covariance, belief.velocity, abs(dt), density),
+        )
+
+    def update(self, belief: Belief, view: View) -> Update:
+        """Predict to the exposure of a picture and correct by its points."""
+        belief = self.predict(belief, view.time)
+        if view.size == 0:
+            return unused(belief, view, Verdict.EMPTY)
+        found = self._correct(belief, belief.covariance, view, belief.consistency.scale)
+        if 2 * np.count_nonzero(found.kept) >= view.size:
+            return self._used(belief, found, Verdict.USED)
+        return self._overruled(belief, view, found)
+
+    def _correct(
+        self, belief: Belief, covariance: FloatArray, view: View, scale: float
+    ) -> Correction:
+        corrected: Correction = correct(
+            belief.T_world_target,
+            belief.velocity,
+            covariance,
+            view.T_camera_world,
+            view.points,
+            view.measured,
+            view.covariance,
+            self.gate * scale,
+        )
+        return corrected
+
+    def _used(
+        self, belief: Belief, found: Correction, verdict: Verdict, enlarged: float = 1.0
+    ) -> Update:
+        freedom = 2 * int(np.count_nonzero(found.kept))
+        # One picture counts as if its points were at the gate at most, to be forgotten in time.
+        square = min(enlarged * found.square, 0.5 * self.gate * freedom)
+        after = Belief(
+            belief.time,
+            found.T_world_target,
+            found.velocity,
+            found.covariance,
+            belief.consistency.add(square, freedom, self.fading),
+            seen=belief.time,
+        )
+        return Update(after, verdict, found.kept, found.squares)
+
+    def _overruled(self, belief: Belief, view: View, first: Correction) -> Update:
+        """Believe the picture rather than the prediction, if its majority agrees on a pose."""
+        median = float(np.median(first.squares))
+        believed = view.size >= CONSENSUS or belief.doubts >= self.doubts_allowed
+        if believed and np.isfinite(median):
+            enlarged = max(1.0, median / MEDIAN)
+            found = self._correct(belief, enlarged * belief.covariance, view, 1.0)
+            agreeing = found.kept & (self._squares(found, view) <= self.gate)
+            if 2 * np.count_nonzero(agreeing) >= view.size:
+                update = self._used(belief, found, Verdict.RECOVERED, enlarged)
+                return update._replace(squares=first.squares)
+        refused = unused(replace(belief, doubts=belief.doubts + 1), view, Verdict.CONTRADICTED)
+        return refused._replace(squares=first.squares)
+
+    def _squares(self, found: Correction, view: View) -> FloatArray:
+        squares: FloatArray = residual_squares(
+            found.T_world_target,
+            found.covariance,
+            view.T_camera_world,
+            view.points,
+            view.measured,
+            view.covariance,
+        )
+        return squares

@@ -1,0 +1,147 @@
+"""The filter of [Lippiello2005]: position, roll-pitch-yaw and their rates."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray, frozen
+from vergence.errors import InputError
+from vergence.estimation.information import compress, joseph_update, keep_rows
+from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
+from vergence.estimation.rpy_belief import RpyBelief
+from vergence.estimation.target_filter import (
+    Update,
+    Verdict,
+    require_covariance,
+    require_finite,
+    unused,
+)
+from vergence.estimation.view import View
+from vergence.geometry import matrix_to_rpy, rpy_rates_to_omega, rpy_to_matrix, se3
+
+PAPER_NOISE = 1e-6 * np.repeat([0.0, 0.0, 5.0, 20.0], 3)  # Q per frame, section V
+
+
+@njit(cache=True)
+def predict_rpy(
+    w: FloatArray, P: FloatArray, dt: float, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return A w and A P Aᵀ + diag(noise), A = [[I, dt I], [0, I]]: eq. (7), (11)."""
+    state, half = w.copy(), P.copy()
+    for i in range(6):
+        state[i] += dt * w[6 + i]
+        for j in range(12):
+            half[i, j] += dt * P[6 + i, j]
+    predicted = half.copy()
+    for i in range(12):
+        for j in range(6):
+            predicted[i, j] += dt * half[i, 6 + j]
+        predicted[i, i] += noise[i]
+    return state, predicted
+
+
+@njit(cache=True)
+def rpy_rows(
+    w: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+) -> FloatArray:
+    """Return the whitened measurement [C | ζ - g(w)], (2M, 7), eq. (9), (14) to (18).
+
+    The columns of roll, pitch and yaw are those of a rotation along world axes times T_o, (17b).
+    """
+    rpy = w[3:6]
+    T_world_target = se3(rpy_to_matrix(rpy), w[0:3])
+    rows = whitened_rows(T_world_target, T_camera_world, points, measured, covariance)
+    To = rpy_rates_to_omega(rpy)
+    for i in range(len(rows)):
+        a, b, c = rows[i, 3], rows[i, 4], rows[i, 5]
+        for j in range(3):
+            rows[i, 3 + j] = a * To[0, j] + b * To[1, j] + c * To[2, j]
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class RpyPoseFilter:
+    """The extended Kalman filter of [Lippiello2005] section III, kept for reproduction.
+
+    State w = (o, φ, ϑ, ψ, rates), eq. (7) to (18), with these corrections: the noise of a
+    measurement is in normalized coordinates (the paper gives px²: divide by the focal length in
+    pixels, squared); the zero block of (14) has 6 columns; the Joseph form replaces (12b). Angles
+    are never wrapped inside. Near pitch ±90° the state is singular and the estimate unreliable:
+    `PoseFilter` has no such place.
+    """
+
+    noise: FloatArray = field(default_factory=lambda: PAPER_NOISE)  # diagonal of Q, (12,), a frame
+    frame_period: float = 1.0 / 26.0  # s, the frame that Q is meant for
+    gate: float = np.inf  # on the Mahalanobis distance squared; the paper has none
+    fading: float = 0.9  # weight of the past in the consistency test, for each picture
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", frozen(self.noise, (12,), "noise"))
+        if not self.frame_period > 0.0:
+            raise InputError("RpyPoseFilter", "frame_period", self.frame_period, "above zero")
+
+    def start(
+        self,
+        time: float,
+        T_world_target: FloatArray,
+        velocity: FloatArray | None = None,
+        covariance: FloatArray | None = None,
+    ) -> RpyBelief:
+        """Return the belief to start from, at rest or with a twist (v, ω).
+
+        Args:
+            time: s.
+            T_world_target: a rough pose, (4, 4).
+            velocity: (v, ω) along world axes, (6,); zero by default.
+            covariance: of the state (o, φ, ϑ, ψ, rates), (12, 12); by default 3 cm, 0.1 rad,
+                0.2 m/s, 0.5 rad/s. The paper's is zero: then the first two gains are zero.
+
+        Raises:
+            InputError: if the covariance is not one, or anything is not finite.
+        """
+        if covariance is None:
+            covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
+        covariance = frozen(covariance, (12, 12), "covariance")
+        pose = frozen(T_world_target, (4, 4), "T_world_target")
+        twist = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
+        require_finite(pose, "RpyPoseFilter", "T_world_target")
+        require_finite(twist, "RpyPoseFilter", "velocity")
+        require_covariance(covariance, "RpyPoseFilter")
+        rpy = matrix_to_rpy(pose)
+        w = np.concatenate((pose[:3, 3], rpy, twist))
+        if twist[3:].any():
+            w[9:] = np.linalg.solve(rpy_rates_to_omega(rpy), twist[3:])
+        return RpyBelief(time, w, covariance)
+
+    def predict(self, belief: RpyBelief, time: float) -> RpyBelief:
+        """Return the belief at another time; Q counts in proportion to the frames between."""
+        dt = time - belief.time
+        if dt == 0.0:
+            return belief
+        noise = self.noise * (abs(dt) / self.frame_period)
+        w, P = predict_rpy(belief.vector, belief.vector_covariance, dt, noise)
+        return replace(belief, time=time, vector=w, vector_covariance=P)
+
+    def update(self, belief: RpyBelief, view: View) -> Update:
+        """Predict to the exposure of a picture and correct by its points, eq. (11) to (13)."""
+        belief = self.predict(belief, view.time)
+        w, P = belief.vector, belief.vector_covariance
+        rows = rpy_rows(w, view.T_camera_world, view.points, view.measured, view.covariance)
+        squares = mahalanobis_squared(rows, P)
+        kept = np.isfinite(squares) & (squares <= self.gate)
+        if not kept.any():
+            verdict = Verdict.CONTRADICTED if view.size else Verdict.EMPTY
+            doubts = belief.doubts + (view.size > 0)
+            return unused(replace(belief, doubts=doubts), view, verdict)._replace(squares=squares)
+        rows = keep_rows(rows, kept)
+        rest = compress(rows)
+        correction, P, square = joseph_update(P, rows)
+        count = 2 * int(np.count_nonzero(kept))
+        consistency = belief.consistency.add(square + rest, count, self.fading)
+        after = RpyBelief(view.time, w + correction, P, consistency, seen=view.time)
+        return Update(after, Verdict.USED, kept, squares)

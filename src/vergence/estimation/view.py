@@ -1,0 +1,74 @@
+"""What one picture says, in the form the filters take it in."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.camera import Camera
+from vergence.features import ImagePoints
+from vergence.geometry import se3_inverse
+
+
+class View(NamedTuple):
+    """The usable points of one picture, and where its camera stood at the exposure."""
+
+    camera: str
+    time: float  # s, of exposure
+    T_camera_world: FloatArray  # (4, 4) inverse pose of the camera at the exposure
+    features: IntArray  # (M,) which features of the target were measured
+    points: FloatArray  # (M, 3) their places in the target's frame, m
+    measured: FloatArray  # (M, 2) normalized coordinates
+    covariance: FloatArray  # (M, 2, 2) of `measured`, positive definite
+
+    @property
+    def size(self) -> int:
+        """How many points there are."""
+        return len(self.points)
+
+
+def view_of(
+    image_points: ImagePoints,
+    camera: Camera,
+    T_world_camera: FloatArray,
+    target_points: FloatArray,
+    features: IntArray | None = None,
+) -> View:
+    """Prepare measured image points for a filter.
+
+    Points not found, not finite, or with a covariance that is not positive definite carry no
+    usable information and are left out, so that they can never harden a pose.
+
+    Args:
+        image_points: as measured, in pixels.
+        camera: the model of the camera that measured them.
+        T_world_camera: its pose at the exposure, (4, 4).
+        target_points: all features in the target's frame, (F, 3), m.
+        features: which feature each measured point is, (M,); by default point j is feature j.
+    """
+    if features is None:
+        features = np.arange(len(image_points.points_px))
+    usable = usable_points(image_points.points_px, image_points.covariance_px, image_points.found)
+    chosen = features[usable]
+    return View(
+        image_points.camera,
+        image_points.time,
+        se3_inverse(T_world_camera),
+        chosen,
+        target_points[chosen],
+        camera.normalize(image_points.points_px[usable]),
+        camera.normalize_covariance(image_points.covariance_px[usable]),
+    )
+
+
+@njit(cache=True)
+def usable_points(points_px: FloatArray, covariance_px: FloatArray, found: BoolArray) -> BoolArray:
+    """Tell which points (M,) were found, are finite, and have a positive definite covariance."""
+    usable = np.empty(len(points_px), dtype=np.bool_)
+    for n in range(len(points_px)):
+        C = covariance_px[n]
+        finite = np.isfinite(points_px[n, 0] + points_px[n, 1] + C[0, 0] + C[1, 0] + C[1, 1])
+        positive = C[0, 0] > 0.0 and C[0, 0] * C[1, 1] > C[1, 0] * C[1, 0]
+        usable[n] = found[n] and finite and positive
+    return usable

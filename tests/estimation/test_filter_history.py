@@ -1,0 +1,92 @@
+import numpy as np
+from estimation_scene import HAND, WALL, moving, pose_error, view
+
+from vergence.estimation import FilterHistory, PoseFilter, Verdict
+
+
+def pictures(rng, seconds=1.0):
+    """Two cameras of 26 and 40 Hz, not in step, with some wrong matches."""
+    views = [view(rng, k / 26, moving(k / 26), WALL, "wall", outliers=0.1) for k in range(1, 27)]
+    views += [
+        view(rng, k / 40, moving(k / 40), HAND, "hand", outliers=0.1)
+        for k in range(1, int(40 * seconds))
+    ]
+    return sorted(views, key=lambda v: (v.time, v.camera))
+
+
+def fed(views, horizon=0.5):
+    filter_ = PoseFilter()
+    history = FilterHistory(filter_, filter_.start(0.0, moving(0.0)), horizon)
+    verdicts = []
+    for picture in views:
+        history, update = history.add(picture)
+        verdicts.append(update.verdict)
+    return history, verdicts
+
+
+def test_arrival_order_does_not_change_the_belief():
+    views = pictures(np.random.default_rng(1))
+    ordered, _ = fed(views)
+    late = sorted(views, key=lambda v: v.time + (0.15 if v.camera == "hand" else 0.02))
+    assert [v.time for v in late] != [v.time for v in views]
+    delayed, verdicts = fed(late)
+    np.testing.assert_array_equal(
+        delayed.belief.T_world_target, ordered.belief.T_world_target, strict=True
+    )
+    np.testing.assert_array_equal(delayed.belief.covariance, ordered.belief.covariance)
+    assert delayed.belief is delayed.entries[-1].after
+    assert Verdict.TOO_LATE not in verdicts
+
+
+def test_shuffled_arrival_gives_the_same_belief():
+    rng = np.random.default_rng(2)
+    views = pictures(rng, seconds=0.4)[:20]
+    ordered, _ = fed(views)
+    for _ in range(3):
+        shuffled, _ = fed([views[i] for i in rng.permutation(len(views))])
+        np.testing.assert_array_equal(shuffled.belief.T_world_target, ordered.belief.T_world_target)
+
+
+def test_late_picture_counts_at_its_exposure():
+    # Used at its arrival instead, 0.2 s of motion would be taken for noise.
+    rng = np.random.default_rng(3)
+    filter_ = PoseFilter()
+    views = [view(rng, k / 26, moving(k / 26, 2.0), HAND, "hand") for k in range(40)]
+    history = FilterHistory(filter_, filter_.start(-0.01, moving(0.0)))
+    wrong = filter_.start(-0.01, moving(0.0))
+    for k, picture in enumerate(views):
+        history, _ = history.add(picture)
+        wrong = filter_.update(wrong, picture._replace(time=picture.time + 0.2)).belief
+        now = picture.time + 0.2
+        if k > 20:
+            truth = moving(now, 2.0)
+            honest = pose_error(history.at(now).T_world_target, truth)
+            late = pose_error(wrong.T_world_target, truth)
+            assert np.linalg.norm(honest[:3]) < 0.5 * np.linalg.norm(late[:3])
+
+
+def test_same_picture_twice_counts_once():
+    views = pictures(np.random.default_rng(4))[:10]
+    once, _ = fed(views)
+    twice, verdicts = fed([*views, views[-1], views[3]])
+    assert verdicts[-2:] == [Verdict.REPEATED, Verdict.REPEATED]
+    np.testing.assert_array_equal(twice.belief.covariance, once.belief.covariance)
+
+
+def test_picture_older_than_the_horizon_is_refused_and_harmless():
+    views = pictures(np.random.default_rng(5))
+    history, _ = fed(views[1:], horizon=0.2)
+    again, update = history.add(views[0])
+    assert update.verdict is Verdict.TOO_LATE
+    assert again is history
+    assert len(history.entries) < 0.2 * 70 + 3
+
+
+def test_past_is_asked_from_the_pictures_until_then():
+    views = pictures(np.random.default_rng(6))
+    history, _ = fed(views)
+    early, _ = fed([v for v in views if v.time <= 0.8])
+    for time in (0.8, 0.805):
+        np.testing.assert_array_equal(
+            history.at(time).T_world_target, early.at(time).T_world_target
+        )
