@@ -126,9 +126,15 @@ def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
     merged = dict(values)
     for key, change in changes.items():
         old = merged.get(key)
-        both = isinstance(change, Mapping) and isinstance(old, dict)
-        merged[key] = _merge(old, change) if both and old is not None else change
+        if isinstance(change, Mapping) and isinstance(old, dict) and not _other_kind(old, change):
+            change = _merge(old, change)
+        merged[key] = change
     return merged
+
+
+def _other_kind(old: Mapping[str, Any], change: Mapping[str, Any]) -> bool:
+    """Whether a table is to become one of another kind, whose keys have nothing in common."""
+    return "kind" in change and change["kind"] != old.get("kind")
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
