@@ -1,0 +1,3 @@
+"""What a person sees: the command line, the report."""
+
+__all__: list[str] = []

@@ -1,0 +1,22 @@
+"""`vergence bench`: the benchmarks of a source checkout."""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from vergence.errors import InputError
+
+
+def bench(names: Sequence[str], as_json: bool) -> int:
+    """Run the benchmarks in a process of their own; return its exit code.
+
+    Raises:
+        InputError: if this is not a source checkout.
+    """
+    script = Path(__file__).parents[3] / "benchmarks" / "run.py"
+    if not script.is_file():
+        allowed = "a source checkout of vergence: the benchmarks are not part of the package"
+        raise InputError("vergence bench", "", f"no {script}", allowed)
+    options = ["--json"] if as_json else []
+    return subprocess.run([sys.executable, str(script), *options, *names], check=False).returncode

@@ -1,0 +1,19 @@
+"""The figures of a report, each made from the arrays of a recording."""
+
+from vergence.app.figures.arm import joints_figure, measures_figure, twist_figure
+from vergence.app.figures.image import error_figure, paths_figure
+from vergence.app.figures.motion import motion_figure
+from vergence.app.figures.style import Panels, mark_events, panels, svg
+
+__all__ = [
+    "Panels",
+    "error_figure",
+    "joints_figure",
+    "mark_events",
+    "measures_figure",
+    "motion_figure",
+    "panels",
+    "paths_figure",
+    "svg",
+    "twist_figure",
+]

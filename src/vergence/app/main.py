@@ -1,0 +1,137 @@
+"""The command line.
+
+Commands import what they need when they run, so that help comes at once.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
+from vergence.errors import VergenceError
+
+app = typer.Typer(
+    name="vergence",
+    help="Visual servoing that keeps the target in view and the arm clear of its limits.",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of runs/NAME-TIME.")]
+
+_NEXT = """vergence servoes robot arms by what their cameras see.
+
+  vergence run puma560            a Puma 560 follows a moving board; ends with a report to open
+  vergence run puma560 --no-images --set duration_s=5     the same in a blink, without pictures
+  vergence cells                  the cells that come with vergence
+  vergence reproduce nelson1995 --quick                   a paper's experiments, checked
+  vergence --help                 all commands
+"""
+
+
+def main() -> None:
+    """Run the command line; a mistake of the user is one message and exit code 2."""
+    try:
+        app()
+    except VergenceError as error:
+        warn(f"vergence: {error}")
+        sys.exit(BAD_INPUT)
+
+
+@app.callback(invoke_without_command=True)
+def start(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Visual servoing that keeps the target in view and the arm clear of its limits."""
+    if version:
+        from importlib.metadata import version as version_of
+
+        say(version_of("vergence"))
+        raise typer.Exit(SUCCESS)
+    if context.invoked_subcommand is None:
+        say(_NEXT.rstrip())
+
+
+@app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
+def run(
+    cell: Annotated[str, typer.Argument(help="Name of a built-in cell, a cell file or folder.")],
+    out: Out = None,
+    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
+    images: Annotated[
+        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
+    ] = True,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a work cell: progress, a summary, and a folder with recording and report."""
+    from vergence.app.run import run as command
+
+    raise typer.Exit(command(cell, out, seed, images, settings or (), as_json))
+
+
+@app.command(epilog="Example: vergence report runs/puma560-20250131-120000")
+def report(
+    run: Annotated[Path, typer.Argument(help="A run folder, finished or cut off.")],
+    as_json: Json = False,
+) -> None:
+    """Make the report of a recording again."""
+    from vergence.app.report import write_report
+
+    path = write_report(run)
+    if as_json:
+        emit({"command": "report", "run": path.parent, "report": path})
+    else:
+        say(f"report  {path}")
+
+
+@app.command(epilog="Example: vergence reproduce nelson1995 --quick")
+def reproduce(
+    paper: Annotated[str, typer.Argument(help="Which paper: nelson1995.")],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
+    ] = False,
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Repeat a paper's experiments: figures, and a table of what it says and what we measure."""
+    from vergence.app.reproduce import reproduce as command
+
+    raise typer.Exit(command(paper, quick, out, as_json))
+
+
+@app.command(epilog="Example: vergence bench control")
+def bench(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Which benchmarks; all if none.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the benchmarks, peers beside us."""
+    from vergence.app.bench import bench as command
+
+    raise typer.Exit(command(names or (), as_json))
+
+
+@app.command(epilog="Example: vergence cells")
+def cells(as_json: Json = False) -> None:
+    """List the cells that come with vergence."""
+    from vergence.cell import built_in_cells
+
+    names = built_in_cells()
+    if as_json:
+        emit({"command": "cells", "cells": list(names)})
+        return
+    for name in names:
+        say(name)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""What the commands write: words on stdout, or exactly one JSON object; progress on stderr."""
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+SUCCESS, FAILURE, BAD_INPUT = 0, 1, 2
+
+
+def say(text: str = "") -> None:
+    """Write a line for a person."""
+    print(text)
+
+
+def warn(text: str) -> None:
+    """Write a line that is not part of the answer."""
+    print(text, file=sys.stderr)
+
+
+def emit(answer: Mapping[str, Any]) -> None:
+    """Write the one JSON object of a command; null stands for what is not a finite number."""
+    print(json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False))
+
+
+def new_folder(name: str) -> Path:
+    """Return a folder under runs/ that is named after the run and the time, and not there yet."""
+    first = Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    folder, number = first, 2
+    while folder.exists():
+        folder, number = first.with_name(f"{first.name}-{number}"), number + 1
+    return folder
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,102 @@
+"""Draws what was tracked, wanted and true into a camera's picture.
+
+Pixel centres are at integers, here as everywhere; marks are placed to a sixteenth of a pixel.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.runtime.recording import CameraTrace
+
+# blue, green, red: Okabe and Ito's palette
+FOUND = (115, 158, 0)
+LOST = (0, 94, 213)
+DESIRED = (66, 228, 240)
+TRUE = (233, 180, 86)
+_OUTLINE = (0, 0, 0)
+_SHIFT = 4  # fractional bits of a place
+_RADIUS_PX = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What there is to draw at one picture; unknown points are NaN."""
+
+    tracked_px: FloatArray  # (M, 2)
+    found: BoolArray  # (M,)
+    desired_px: FloatArray  # (M, 2)
+    true_px: FloatArray  # (M, 2)
+
+    @classmethod
+    def at(cls, trace: CameraTrace, time: float) -> Self:
+        """Return the marks of the picture nearest to a time of exposure."""
+        row = int(np.argmin(np.abs(trace.time - time)))
+        return cls(
+            trace.points_px[row], trace.found[row], trace.desired_px[row], trace.true_px[row]
+        )
+
+
+def draw(image: ImageArray, marks: Marks, scale: int = 1) -> NDArray[np.uint8]:
+    """Return the picture in colour, enlarged, with the marks over it.
+
+    Args:
+        image: (height, width) grey.
+        marks: where to draw.
+        scale: every pixel becomes scale × scale, marks keep their size.
+
+    Returns:
+        (scale height, scale width, 3) blue, green, red.
+    """
+    import cv2
+
+    size = (image.shape[1] * scale, image.shape[0] * scale)
+    enlarged = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+    canvas = np.asarray(cv2.cvtColor(enlarged, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    for point in _known(marks.desired_px, scale):
+        _cross(canvas, point, DESIRED, upright=True)
+    for point in _known(marks.true_px, scale):
+        _circle(canvas, point, TRUE, 2.0)
+    for point in _known(marks.tracked_px[marks.found], scale):
+        _circle(canvas, point, FOUND, _RADIUS_PX)
+    for point in _known(marks.tracked_px[~marks.found], scale):
+        _cross(canvas, point, LOST, upright=False)
+    return canvas
+
+
+def _known(points_px: FloatArray, scale: int) -> FloatArray:
+    """Return the points that can be drawn, as places in the enlarged picture."""
+    drawable = np.isfinite(points_px).all(axis=1) & (np.abs(points_px) < 1e4).all(axis=1)
+    return np.asarray((points_px[drawable] + 0.5) * scale - 0.5)
+
+
+def _circle(
+    canvas: NDArray[np.uint8], center: FloatArray, color: tuple[int, ...], r: float
+) -> None:
+    import cv2
+
+    place, radius = _fixed(center), round(r * 2**_SHIFT)
+    for ink, thickness in ((_OUTLINE, 3), (color, 1)):
+        cv2.circle(canvas, place, radius, ink, thickness, cv2.LINE_AA, _SHIFT)
+
+
+def _cross(
+    canvas: NDArray[np.uint8], center: FloatArray, color: tuple[int, ...], upright: bool
+) -> None:
+    import cv2
+
+    arm = np.array([_RADIUS_PX + 1.0, 0.0])
+    turned = arm if upright else np.array([1.0, 1.0]) * _RADIUS_PX / np.sqrt(2)
+    across = np.array([-turned[1], turned[0]])
+    for ink, thickness in ((_OUTLINE, 3), (color, 1)):
+        for half in (turned, across):
+            ends = _fixed(center - half), _fixed(center + half)
+            cv2.line(canvas, *ends, ink, thickness, cv2.LINE_AA, _SHIFT)
+
+
+def _fixed(point: FloatArray) -> tuple[int, int]:
+    u, v = (round(float(value) * 2**_SHIFT) for value in point)
+    return u, v

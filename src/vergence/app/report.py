@@ -1,0 +1,164 @@
+"""The report of a run: one page with numbers, pictures and figures, made from its recording."""
+
+from html import escape
+from pathlib import Path
+
+from vergence.app import markup
+from vergence.app.figures import (
+    Panels,
+    error_figure,
+    joints_figure,
+    mark_events,
+    measures_figure,
+    motion_figure,
+    paths_figure,
+    twist_figure,
+)
+from vergence.app.pictures import film, key_frames
+from vergence.app.table import arm_rows, camera_rows, run_rows
+from vergence.runtime.recording import Recording
+
+REPORT = "report.html"
+
+_MARKS = """<p class="marks">
+<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="5" fill="none" stroke="#009e73"
+stroke-width="2"/></svg>tracked</span>
+<span><svg viewBox="0 0 16 16"><path d="M4 4l8 8M12 4l-8 8" stroke="#d55e00"
+stroke-width="2"/></svg>not found</span>
+<span><svg viewBox="0 0 16 16"><path d="M8 2v12M2 8h12" stroke="#f0e442"
+stroke-width="2"/></svg>desired</span>
+<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="2.5" fill="none" stroke="#56b4e9"
+stroke-width="2"/></svg>true</span>
+</p>"""
+
+
+def write_report(folder: Path) -> Path:
+    """Write the report of a run into its folder and return where it is.
+
+    Raises:
+        InputError: if the folder holds no recording.
+    """
+    recording = Recording.open(folder)
+    path = recording.folder / REPORT
+    path.write_text(make_report(recording), encoding="utf-8")
+    return path
+
+
+def make_report(recording: Recording) -> str:
+    """Return the report as a page that needs nothing but itself."""
+    parts = [
+        _header(recording),
+        _summary(recording),
+        *(_camera(recording, name) for name in recording.cameras),
+        *(_arm(recording, name) for name in recording.arms),
+        _events(recording),
+        _cell(recording),
+        _footer(recording),
+    ]
+    return markup.page(f"{recording.info.cell} · vergence", "\n".join(filter(None, parts)))
+
+
+def _header(recording: Recording) -> str:
+    outcome = recording.outcome
+    kind = outcome.kind.value if outcome else "cut off"
+    reason = (
+        f"after {outcome.time:.2f} s: {outcome.reason}"
+        if outcome
+        else f"the recording ends after {recording.duration:.2f} s without an outcome"
+    )
+    badge = markup.badge(kind, outcome is not None and outcome.succeeded)
+    return (
+        '<header><span class="kicker">vergence run</span>'
+        f"<h1>{escape(recording.info.cell)}</h1><p>{badge}{escape(reason)}</p></header>"
+    )
+
+
+def _summary(recording: Recording) -> str:
+    tables = [markup.table("Run", run_rows(recording))]
+    for name, camera in recording.cameras.items():
+        tables.append(markup.table(f"Camera {name}", camera_rows(camera)))
+    for name, arm in recording.arms.items():
+        tables.append(markup.table(f"Arm {name}", arm_rows(recording.info.arms[name], arm)))
+    return markup.section("Summary", markup.cards(tables))
+
+
+def _camera(recording: Recording, name: str) -> str:
+    trace = recording.cameras[name]
+    size = recording.info.cameras[name]
+    return markup.section(
+        f"Camera {name}",
+        _pictures(recording, name),
+        _figure(recording, error_figure(trace), "How far the features are from their places."),
+        markup.figure(
+            paths_figure(size, trace),
+            f"The features' ways through the picture, {size.width} × {size.height} px.",
+        ),
+        _figure(
+            recording,
+            motion_figure(trace, recording.target),
+            "How target and camera moved through the world since the first picture.",
+        ),
+    )
+
+
+def _pictures(recording: Recording, camera: str) -> str:
+    frames = key_frames(recording, camera)
+    if not frames:
+        return ""
+    stills = "".join(
+        markup.picture(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
+    )
+    return f'{markup.film(film(recording, camera))}{_MARKS}<div class="frames">{stills}</div>'
+
+
+def _arm(recording: Recording, name: str) -> str:
+    arm, trace = recording.info.arms[name], recording.arms[name]
+    return markup.section(
+        f"Arm {name}",
+        _figure(
+            recording,
+            joints_figure(arm, trace),
+            "Joints against their limits at −1 and 1; a joint without limits is left out.",
+        ),
+        _figure(
+            recording,
+            twist_figure(trace),
+            "Camera twist that the law asked for, in the camera's frame: z is the optical axis.",
+        ),
+        _figure(
+            recording,
+            measures_figure(trace),
+            "How far the arm is from singularities and joint limits, [Nelson1995] eqs. (26), (27).",
+        ),
+    )
+
+
+def _figure(recording: Recording, panels: Panels | None, caption: str) -> str:
+    """Return a figure over time, the events marked in it."""
+    if panels is None:
+        return ""
+    mark_events(panels, recording.events)
+    panels.axes[0].set_xlim(0.0, max(recording.duration, 1e-9))
+    return markup.figure(panels, caption)
+
+
+def _events(recording: Recording) -> str:
+    lines = "".join(
+        f"<li>{event.time:.2f} s · <b>{escape(event.name)}</b> · {escape(event.text)}</li>"
+        for event in recording.events
+    )
+    return markup.section("Events", f"<ol>{lines}</ol>" if lines else "")
+
+
+def _cell(recording: Recording) -> str:
+    text = escape(recording.info.text)
+    folded = f"<details><summary>as it was run</summary><pre>{text}</pre></details>"
+    return markup.section("Cell file", folded if text else "")
+
+
+def _footer(recording: Recording) -> str:
+    cut = "" if recording.complete else "The recording was cut off; this is what had been written. "
+    return (
+        f"<footer>{cut}Made by vergence {escape(recording.version)} from recording.mcap, which "
+        "also opens in Foxglove and Rerun.</footer>"
+    )

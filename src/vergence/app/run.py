@@ -1,0 +1,95 @@
+"""`vergence run`: run a cell, record it, report it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.errors import InputError
+from vergence.outcome import Outcome, OutcomeKind
+
+if TYPE_CHECKING:
+    from vergence.cell import Cell
+    from vergence.runtime import Recorder, RunResult
+
+
+def run(
+    cell: str,
+    out: Path | None,
+    seed: int | None,
+    images: bool,
+    settings: Sequence[str],
+    as_json: bool,
+) -> int:
+    """Run a cell in a run folder and say how it went; return the exit code."""
+    from vergence.app.report import write_report
+    from vergence.cell import load_cell
+    from vergence.runtime import Recorder
+
+    loaded = load_cell(cell, overrides(settings), seed)
+    recorder = Recorder(out or new_folder(loaded.name))
+    result = _recorded(loaded, recorder, images)
+    report = write_report(recorder.folder)
+    if as_json:
+        emit(_answer(loaded.name, result, recorder.folder, report))
+    else:
+        _tell(result, recorder.folder, report)
+    return SUCCESS if result.outcome.succeeded else FAILURE
+
+
+def overrides(settings: Sequence[str]) -> dict[str, str]:
+    """Split ``key=value`` settings.
+
+    Raises:
+        InputError: if one has no key or no value.
+    """
+    pairs = {}
+    for setting in settings:
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        if not (key and equals and value):
+            raise InputError("--set", "", setting, "key=value, such as duration_s=5")
+        pairs[key] = value
+    return pairs
+
+
+def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "RunResult":
+    """Run a cell; whatever happens, the recording is closed."""
+    from vergence.app.progress import RunProgress
+    from vergence.runtime import run_cell
+
+    try:
+        with RunProgress(cell.duration_s) as progress:
+            return run_cell(cell, (recorder, progress), images)
+    finally:
+        reason = "the run broke off before it could say why"
+        recorder.close(Outcome(OutcomeKind.STOPPED, reason, recorder.now), {})
+
+
+def _answer(name: str, result: "RunResult", folder: Path, report: Path) -> Mapping[str, object]:
+    outcome = result.outcome
+    return {
+        "command": "run",
+        "cell": name,
+        "outcome": {
+            "kind": outcome.kind.value,
+            "reason": outcome.reason,
+            "time": outcome.time,
+        },
+        "summary": result.summary,
+        "run": folder,
+        "report": report,
+    }
+
+
+def _tell(result: "RunResult", folder: Path, report: Path) -> None:
+    summary = result.summary
+    say(str(result.outcome))
+    words = [
+        (f"final error {summary.get('final_error_px', 0.0):.2f} px", "final_error_px"),
+        (f"largest {summary.get('max_error_px', 0.0):.2f} px", "max_error_px"),
+        (f"drift {summary.get('max_drift_px', 0.0):.2f} px", "max_drift_px"),
+        (f"{summary.get('real_time_factor', 0.0):.1f} × real time", "real_time_factor"),
+    ]
+    say("  " + " · ".join(text for text, key in words if key in summary))
+    say(f"  report     {report}")
+    say(f"  recording  {folder / 'recording.mcap'}  (opens in Foxglove and Rerun)")

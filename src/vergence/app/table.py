@@ -1,0 +1,110 @@
+"""The numbers of a run that stand at the top of its report."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.app.figures.arm import normalized
+from vergence.arrays import FloatArray
+from vergence.runtime.recording import ArmInfo, ArmTrace, CameraTrace, Recording
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a table."""
+
+    name: str
+    value: str
+    unit: str = ""
+    note: str = ""
+
+
+def run_rows(recording: Recording) -> list[Row]:
+    """Return what concerns the whole run, with what the loop itself had to say."""
+    rows = [Row("run time", f"{recording.duration:.2f}", "s")]
+    if recording.info.seed is not None:
+        rows.append(Row("seed", str(recording.info.seed)))
+    return rows + [
+        _summary_row(name, value)
+        for name, value in recording.summary.items()
+        if name not in _DERIVED and value is not None
+    ]
+
+
+def camera_rows(trace: CameraTrace) -> list[Row]:
+    """Return how well a camera's points were followed."""
+    rows = [Row("pictures", str(len(trace.time)))]
+    if trace.found.size:
+        rows.append(Row("points found", f"{100 * trace.found.mean():.1f}", "%"))
+    error, drift = _worst(trace.error_px), _worst(trace.drift_px)
+    if len(error):
+        rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last picture"))
+        rows.append(Row("largest error", f"{error.max():.2f}", "px"))
+    if len(drift):
+        rows.append(Row("largest drift", f"{drift.max():.2f}", "px", "tracked against true"))
+    if len(trace.time):
+        late = 1e3 * float(np.median(trace.received - trace.time))
+        rows.append(Row("age of a picture", f"{late:.0f}", "ms", "median, when the loop had it"))
+    return rows
+
+
+def arm_rows(info: ArmInfo, trace: ArmTrace) -> list[Row]:
+    """Return how close an arm came to what it must not do."""
+    return [*_measure_rows(trace), *_limit_rows(info, trace)]
+
+
+def _measure_rows(trace: ArmTrace) -> Iterator[Row]:
+    measure = trace.manipulability[np.isfinite(trace.manipulability)]
+    if len(measure) and measure[0] > 0:
+        ratio = measure.min() / measure[0]
+        yield Row("least manipulability", f"{ratio:.2f}", "", "w′ as a share of the start's")
+    penalty = trace.penalty[np.isfinite(trace.penalty)]
+    if len(penalty):
+        yield Row("least penalty", f"{penalty.min():.2f}", "", "1 far from joint limits, 0 at one")
+
+
+def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
+    position = np.abs(normalized(info, trace.position))
+    rate = np.abs(trace.velocity) / np.where(np.isfinite(info.rate_max), info.rate_max, np.nan)
+    for name, shares in (("nearest a joint limit", position), ("fastest joint", rate)):
+        if np.isfinite(shares).any():
+            row, joint = np.unravel_index(np.nanargmax(shares), shares.shape)
+            where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f} s"
+            yield Row(name, f"{100 * shares[row, joint]:.0f}", "%", where)
+
+
+def _worst(distances: FloatArray) -> FloatArray:
+    """Return the largest distance in each picture that has one."""
+    known = np.isfinite(distances).any(axis=1)
+    return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
+
+
+_DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
+    "duration_s",
+    "final_error_px",
+    "max_error_px",
+    "max_drift_px",
+    "min_manipulability_ratio",
+    "min_penalty",
+}
+
+_UNITS = {
+    "_m_s": "m/s",
+    "_rad_s": "rad/s",
+    "_px": "px",
+    "_ms": "ms",
+    "_us": "µs",
+    "_hz": "Hz",
+    "_deg": "°",
+    "_s": "s",
+    "_m": "m",
+}
+
+
+def _summary_row(name: str, value: float | str) -> Row:
+    """Read the unit off a name's end, as our names have it."""
+    ending = next((end for end in _UNITS if name.endswith(end)), "")
+    words = name.removesuffix(ending).replace("_", " ")
+    shown = value if isinstance(value, str) else f"{value:.4g}"
+    return Row(words, shown, _UNITS.get(ending, ""))
