@@ -33,7 +33,7 @@ class SimulatedDriver:
         self._features = np.array(features if features else np.empty((0, 3)), dtype=np.float64)
         self._tick = 0
         self._exposed = dict.fromkeys(cell.cameras, 0)
-        self._queue: deque[tuple[float, Frame]] = deque()
+        self._queue: deque[tuple[int, Frame]] = deque()  # tick of arrival, frame
         self._renderers = {}
         if images:
             self._renderers = {
@@ -105,9 +105,9 @@ class SimulatedDriver:
     def read(self) -> Sample:
         """Return joints now and the pictures that have arrived since the last call."""
         arrived = []
-        waiting: deque[tuple[float, Frame]] = deque()
+        waiting: deque[tuple[int, Frame]] = deque()
         for arrival, frame in self._queue:
-            if arrival <= self.time + 1e-9:
+            if arrival <= self._tick:
                 arrived.append(frame)
             else:
                 waiting.append((arrival, frame))
@@ -137,17 +137,19 @@ class SimulatedDriver:
     def _expose(self) -> None:
         fresh = False
         for name, table in self.cell.cameras.items():
-            due = int(np.floor(self._exposed[name] * self.inner_rate_hz / table.rate_hz))
+            due = self._tick_of(self._exposed[name], table.rate_hz)
             if self._tick < due:
                 continue
             if not fresh:
                 self.world.update()
                 fresh = True
-            arrival = (due + table.latency_frames * self.inner_rate_hz / table.rate_hz) / (
-                self.inner_rate_hz
-            )
+            arrival = self._tick_of(self._exposed[name] + table.latency_frames, table.rate_hz)
             self._exposed[name] += 1
             self._queue.append((arrival, self._frame(name)))
+
+    def _tick_of(self, picture: int, rate_hz: float) -> int:
+        """Return the inner tick of a picture, ⌊k · inner/rate⌋, as the loop schedules its own."""
+        return int(picture * self.inner_rate_hz / rate_hz + 1e-9)
 
     def _frame(self, camera: str) -> Frame:
         image = self._renderers[camera].take(self.world.data) if self._renderers else None
