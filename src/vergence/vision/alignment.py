@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.pyramid import Patch, load_window
@@ -17,7 +18,7 @@ PATCH_PX = 24  # side of the patch that is aligned
 AREA_PX = 64  # side of the part of the image that it is looked for in
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
-CONVERGED_PX = 0.004
+CONVERGED_PX = 0.03  # a step; what is left after it is a tenth
 NOISE_GREY = 4.0  # grey levels; scales the prior on the affine matrix, nothing else
 FORM_DEVIATION = 0.1  # how far the affine matrix strays from what is expected
 
@@ -25,11 +26,9 @@ FORM_DEVIATION = 0.1  # how far the affine matrix strays from what is expected
 class AlignmentTemplate(NamedTuple):
     """A patch of a picture and all that an alignment to it needs."""
 
-    values: Patch  # (n,) grey levels, less their mean; n = 24 × 24
-    jacobian: Patch  # (8, n) by x, y, a11, a12, a21, a22, gain, bias
+    jacobian: Patch  # (8, n) by x, y, a11, a12, a21, a22, gain, bias; n = 24 × 24
     inverse: FloatArray  # (8, 8) inverse of JᵀJ + prior
-    offset: FloatArray  # (2,) feature point less patch centre, px
-    moments: FloatArray  # (2,) mean, and sum of squares of values
+    facts: FloatArray  # (4,) feature point less patch centre x and y, px; mean; sum of squares
 
 
 class Alignment(NamedTuple):
@@ -43,15 +42,28 @@ class Alignment(NamedTuple):
     steps: int
 
 
-def empty_template() -> AlignmentTemplate:
-    """Allocate a template."""
-    n = PATCH_PX * PATCH_PX
-    return AlignmentTemplate(
-        np.zeros(n, np.float32),
-        np.zeros((UNKNOWNS, n), np.float32),
-        np.zeros((UNKNOWNS, UNKNOWNS)),
-        np.zeros(2),
-        np.zeros(2),
+class Resampling(NamedTuple):
+    """Memory that an alignment writes to."""
+
+    area: Patch  # (64, 64) the part of the image that is resampled
+    sample: Patch  # (n,) the resampled patch, less the template's mean
+    weight_x: Patch  # (24,)
+    weight_y: Patch  # (24,)
+    corner: NDArray[np.int32]  # (24,) flat index of the upper left of four pixels
+
+
+RESAMPLING_SIZE = AREA_PX * AREA_PX + PATCH_PX * PATCH_PX + 2 * PATCH_PX
+
+
+@njit(cache=True)
+def make_resampling(memory: Patch, index: NDArray[np.int32]) -> Resampling:
+    """Lay the parts out in flat memory of RESAMPLING_SIZE."""
+    return Resampling(
+        memory[:4096].reshape(64, 64),
+        memory[4096:4672],
+        memory[4672:4696],
+        memory[4696:4720],
+        index,
     )
 
 
@@ -63,22 +75,21 @@ def fill_template(
     side = PATCH_PX
     window = np.empty((side + 2, side + 2), np.float32)
     load_window(image, anchor_x, anchor_y, window)
-    out.offset[0], out.offset[1] = x - (anchor_x - 0.5), y - (anchor_y - 0.5)
+    offset_x, offset_y = x - (anchor_x - 0.5), y - (anchor_y - 0.5)
     mean = np.mean(window[1:-1, 1:-1])
     half, J = np.float32(0.5), out.jacobian
     for i in range(side):
-        v = np.float32(i - (side / 2 - 0.5) - out.offset[1])
+        v = np.float32(i - (side / 2 - 0.5) - offset_y)
         for j in range(side):
-            u, k = np.float32(j - (side / 2 - 0.5) - out.offset[0]), i * side + j
+            u, k = np.float32(j - (side / 2 - 0.5) - offset_x), i * side + j
             value = window[i + 1, j + 1] - mean
             by_x = half * (window[i + 1, j + 2] - window[i + 1, j])
             by_y = half * (window[i + 2, j + 1] - window[i, j + 1])
-            out.values[k] = value
             J[0, k], J[1, k] = by_x, by_y
             J[2, k], J[3, k], J[4, k], J[5, k] = by_x * u, by_x * v, by_y * u, by_y * v
             J[6, k], J[7, k] = value, 1.0
-    out.moments[0] = mean
-    out.moments[1] = np.sum(out.values.astype(np.float64) ** 2)
+    squares = np.sum(J[6].astype(np.float64) ** 2)
+    out.facts[0], out.facts[1], out.facts[2], out.facts[3] = offset_x, offset_y, mean, squares
     normal = J.astype(np.float64) @ J.astype(np.float64).T
     prior = (NOISE_GREY / FORM_DEVIATION) ** 2
     for k in range(2, 6):
@@ -90,25 +101,36 @@ def fill_template(
 
 @njit(cache=True, fastmath=True)
 def resample(
-    area: Patch, x: float, y: float, A: FloatArray, offset: FloatArray, mean: float, out: Patch
+    x: float, y: float, A: FloatArray, template: AlignmentTemplate, work: Resampling
 ) -> None:
-    """Sample an area bilinearly at (x, y) + A u for every template pixel u; less a mean."""
-    side, last = PATCH_PX, area.shape[0] - 1.001
-    first = -(side / 2 - 0.5)
+    """Sample the area bilinearly at (x, y) + A u for every template pixel u, less the mean.
+
+    The positions of a row are computed first, as vector code, then its pixels are gathered; the
+    unsigned indices spare numba the thought of negative ones. What lies outside is taken from the
+    nearest pixel inside.
+    """
+    first, last = -(PATCH_PX / 2 - 0.5), np.float32(AREA_PX - 1.001)
+    flat = work.area.reshape(AREA_PX * AREA_PX)
+    index, weight_x, weight_y = work.corner, work.weight_x, work.weight_y
+    mean, one, line = np.float32(template.facts[2]), np.uint64(1), np.uint64(AREA_PX)
+    zero, pitch, side = np.float32(0.0), np.int32(AREA_PX), np.uint64(PATCH_PX)
+    step_x, step_y = np.float32(A[0, 0]), np.float32(A[1, 0])
+    u = first - template.facts[0]
     for i in range(side):
-        v = first + i - offset[1]
-        start_x = x + A[0, 1] * v + A[0, 0] * (first - offset[0])
-        start_y = y + A[1, 1] * v + A[1, 0] * (first - offset[0])
+        v = first + np.float64(i) - template.facts[1]
+        start_x = np.float32(x + A[0, 0] * u + A[0, 1] * v)
+        start_y = np.float32(y + A[1, 0] * u + A[1, 1] * v)
         for j in range(side):
-            px = min(max(start_x + A[0, 0] * j, 0.0), last)
-            py = min(max(start_y + A[1, 0] * j, 0.0), last)
-            column, row = np.uint64(px), np.uint64(py)
-            one = np.uint64(1)
-            fx, fy = np.float32(px - column), np.float32(py - row)
-            top = area[row, column] + fx * (area[row, column + one] - area[row, column])
-            below = area[row + one, column]
-            below += fx * (area[row + one, column + one] - below)
-            out[i * side + j] = top + fy * (below - top) - np.float32(mean)
+            px = min(max(start_x + step_x * np.float32(np.int32(j)), zero), last)
+            py = min(max(start_y + step_y * np.float32(np.int32(j)), zero), last)
+            column, row = np.int32(px), np.int32(py)
+            weight_x[j], weight_y[j] = px - np.float32(column), py - np.float32(row)
+            index[j] = row * pitch + column
+        for j in range(side):
+            k = np.uint64(index[j])
+            top = flat[k] + weight_x[j] * (flat[k + one] - flat[k])
+            below = flat[k + line] + weight_x[j] * (flat[k + line + one] - flat[k + line])
+            work.sample[i * side + j] = top + weight_y[j] * (below - top) - mean
 
 
 @njit(cache=True, fastmath=True)
@@ -122,30 +144,29 @@ def product(a: Patch, b: Patch) -> np.float32:
 
 @njit(cache=True)
 def align(
-    area: Patch, x: float, y: float, A: FloatArray, template: AlignmentTemplate, sample: Patch
+    x: float, y: float, A: FloatArray, template: AlignmentTemplate, work: Resampling
 ) -> Alignment:
-    """Align an area of the image to a template; A is changed in place, its start is the prior.
+    """Align the area of the image to a template; A is changed in place, its start is the prior.
 
     Each step solves (JᵀJ + Λ) q = JᵀI + Λ g e, where q = (g δ, g - 0, b), Λ is the weight of the
     prior and e is how far A has come from its start, and puts the inverse of the step δ before
     the warp.
 
     Args:
-        area: part of the image, (64, 64).
         x: where the feature is expected in the area, px.
         y: likewise.
         A: affine matrix from template to image, (2, 2).
         template: what to align to.
-        sample: memory for the resampled patch, (n,).
+        work: the area, and memory.
     """
     prior = (NOISE_GREY / FORM_DEVIATION) ** 2
     strayed, right, q = np.zeros(4), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
     gain, steps = 1.0, 0
     for step in range(STEPS):
         steps = step + 1
-        resample(area, x, y, A, template.offset, template.moments[0], sample)
+        resample(x, y, A, template, work)
         for k in range(UNKNOWNS):
-            right[k] = product(template.jacobian[k], sample)
+            right[k] = product(template.jacobian[k], work.sample)
         for k in range(4):
             right[2 + k] += prior * gain * strayed[k]
         for k in range(UNKNOWNS):
@@ -177,21 +198,20 @@ def align(
         y -= move_y
         if move_x * move_x + move_y * move_y < CONVERGED_PX * CONVERGED_PX:
             break
-    correlation, residual = agreement(area, x, y, A, template, sample)
+    else:
+        resample(x, y, A, template, work)
+    correlation, residual = agreement(template, work)
     return Alignment(x, y, gain, correlation, residual, steps)
 
 
 @njit(cache=True)
-def agreement(
-    area: Patch, x: float, y: float, A: FloatArray, template: AlignmentTemplate, sample: Patch
-) -> tuple[float, float]:
-    """Correlation and root mean square residual (gain and bias taken out) of a warp."""
-    resample(area, x, y, A, template.offset, template.moments[0], sample)
-    n = sample.size
+def agreement(template: AlignmentTemplate, work: Resampling) -> tuple[float, float]:
+    """Correlation, and root mean square residual less gain and bias, of the last resampling."""
+    sample, n = work.sample, work.sample.size
     mean = product(template.jacobian[7], sample) / n
     own = max(product(sample, sample) - n * mean * mean, 1e-6)
     # the template's values have no mean
-    joint, other = product(template.values, sample), max(template.moments[1], 1e-6)
+    joint, other = product(template.jacobian[6], sample), max(template.facts[3], 1e-6)
     correlation = joint / np.sqrt(own * other)
     residual = np.sqrt(max(own - joint * joint / other, 0.0) / (n - UNKNOWNS))
     return float(correlation), float(residual)

@@ -4,12 +4,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, ImageArray, frozen
-from vergence.vision.alignment import AREA_PX, PATCH_PX
 from vergence.vision.image import grey_image
-from vergence.vision.ssd import make_workspace
 from vergence.vision.tracker_state import (
+    COLUMNS,
     CONTRAST,
+    CORRELATION,
+    COVARIANCE,
     DEFORMED,
+    DETAIL,
     DISAGREES,
     FIT_PX,
     FOUND,
@@ -19,12 +21,14 @@ from vergence.vision.tracker_state import (
     LOST_STRETCH,
     NO_MATCH,
     NO_TEMPLATE,
-    empty_output,
+    PLACE,
+    RESIDUAL,
+    VERDICT,
     empty_state,
     start_points,
     track_points,
 )
-from vergence.vision.tracks import Tracks
+from vergence.vision.tracks import Tracks, nothing_found
 
 _REASONS = {
     FOUND: "",
@@ -69,10 +73,7 @@ class SsdTracker:
         start = frozen(points_px, (None, 2), "points_px")
         count = len(start)
         self._state = empty_state(count)
-        self._state.points[:] = start
-        self._work = make_workspace()
-        self._area = np.zeros((AREA_PX, AREA_PX), np.float32)
-        self._sample = np.zeros(PATCH_PX * PATCH_PX, np.float32)
+        self._state.places[:, :2] = start
         grey, reason = grey_image(image)
         self._no_template = f"no template: first {reason}" if reason else _REASONS[NO_TEMPLATE]
         if grey is not None and np.isfinite(start).all():
@@ -81,7 +82,7 @@ class SsdTracker:
     @property
     def points_px(self) -> FloatArray:
         """Where the points were last found, (M, 2)."""
-        return self._state.points.copy()
+        return self._state.places[:, :2].copy()
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Find the points in a new image.
@@ -98,30 +99,28 @@ class SsdTracker:
         Raises:
             ShapeError: if predicted_px is not (M, 2).
         """
-        state = self._state
-        out = empty_output(len(state.points))
-        out.points[:] = state.points
+        places = self._state.places
+        out = np.empty((len(places), COLUMNS))
+        out[:, :2] = places[:, :2]
         if predicted_px is not None:
-            predicted = frozen(predicted_px, state.points.shape, "predicted_px")
+            predicted = frozen(predicted_px, (len(places), 2), "predicted_px")
             usable = np.isfinite(predicted).all(axis=1)
-            out.points[usable] = predicted[usable]
+            out[usable, :2] = predicted[usable]
         grey, reason = grey_image(image)
         if grey is None:
-            out.covariance[:] = np.eye(2) * 1e4
-            reasons = (reason,) * len(state.points)
+            return nothing_found(out[:, :2], reason)
+        if track_points(grey, self._state, out):
+            reasons: tuple[str, ...] = ("",) * len(out)
         else:
-            track_points(grey, state, self._work, self._area, self._sample, out)
-            reasons = tuple(
-                self._reason(int(verdict), detail)
-                for verdict, detail in zip(out.verdicts, out.detail, strict=True)
-            )
+            verdicts = zip(out[:, VERDICT].tolist(), out[:, DETAIL].tolist(), strict=True)
+            reasons = tuple(self._reason(int(verdict), detail) for verdict, detail in verdicts)
         return Tracks(
-            out.points,
-            out.covariance,
-            out.verdicts == FOUND,
+            out[:, PLACE],
+            out[:, COVARIANCE].reshape(-1, 2, 2),
+            out[:, VERDICT] == FOUND,
             reasons,
-            out.residuals,
-            out.correlations,
+            out[:, RESIDUAL],
+            out[:, CORRELATION],
         )
 
     def _reason(self, verdict: int, detail: float) -> str:

@@ -11,19 +11,30 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.vision.alignment import (
     AREA_PX,
     PATCH_PX,
+    RESAMPLING_SIZE,
     UNKNOWNS,
     Alignment,
     AlignmentTemplate,
     align,
     fill_template,
+    make_resampling,
 )
 from vergence.vision.pyramid import Patch, anchor_of, load_window
-from vergence.vision.ssd import RANGE_PX, SsdTemplate, SsdWorkspace, make_template, search
+from vergence.vision.ssd import (
+    RANGE_PX,
+    TEMPLATE_SIZE,
+    WORKSPACE_SIZE,
+    make_template,
+    make_workspace,
+    search,
+    template_in,
+)
 
 KEYS = 16  # key templates kept for each point
 REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or shrunk by this
@@ -39,68 +50,68 @@ FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE = range(7)
 
 
 class TrackerState(NamedTuple):
-    """All that the tracker knows about M points with up to K key templates each."""
+    """All that the tracker knows about M points with up to K key templates each.
 
-    points: FloatArray  # (M, 2) px, where last found
-    affine: FloatArray  # (M, 2, 2) from the first image to the last
-    search_offset: FloatArray  # (M, 2) px, point less centre of the search template
-    coarse: Patch  # (M, 8, 8)
-    middle: Patch  # (M, 8, 8)
-    full: Patch  # (M, 16, 16)
-    key_values: Patch  # (M, K, n)
-    key_jacobian: Patch  # (M, K, 8, n)
-    key_inverse: FloatArray  # (M, K, 8, 8)
-    key_offset: FloatArray  # (M, K, 2) px, point less centre of the key template
-    key_moments: FloatArray  # (M, K, 2)
-    key_affine: FloatArray  # (M, K, 2, 2) from the first image to the key template's
-    key_covariance: FloatArray  # (M, K, 2, 2) px² of the point in the key template
-    key_count: IntArray  # (M,) 0: there is no template
-    key_active: IntArray  # (M,)
+    Few arrays, since each costs a call from Python 0.2 µs; the functions below say what is where.
+    """
+
+    places: FloatArray  # (M, 8) px where last found; affine 2 × 2 from first image to last; search
+    # offset: point less centre of the search template, px
+    search: Patch  # (M, 384) search template
+    jacobian: Patch  # (M, K, 8, n) of the key templates
+    inverse: FloatArray  # (M, K, 8, 8) of the key templates
+    facts: FloatArray  # (M, K, 12) of the key templates: 4 of the alignment; affine 2 × 2 from the
+    # first image to the template's; covariance 2 × 2 of the point's place in it, px²
+    keys: IntArray  # (M, 2) how many key templates there are, and which one is in use
+    memory: Patch  # what the kernels write to
+    corner: NDArray[np.int32]  # likewise
 
 
-class TrackerOutput(NamedTuple):
-    """What the kernel answers for M points."""
-
-    points: FloatArray  # (M, 2) px
-    covariance: FloatArray  # (M, 2, 2) px²
-    residuals: FloatArray  # (M,) grey levels
-    correlations: FloatArray  # (M,)
-    detail: FloatArray  # (M,) the number that belongs to the verdict
-    verdicts: IntArray  # (M,) FOUND, LEFT, …
+# Columns of what the kernel answers for each point.
+PLACE, COVARIANCE = slice(0, 2), slice(2, 6)  # px, px²
+RESIDUAL, CORRELATION, DETAIL, VERDICT = 6, 7, 8, 9  # detail: the number behind the verdict
+COLUMNS = 10
 
 
 def empty_state(count: int) -> TrackerState:
     """Allocate the memory for a number of points."""
     n, f4 = PATCH_PX * PATCH_PX, np.float32
+    places = np.zeros((count, 8))
+    places[:, 2:6] = np.eye(2).ravel()
     return TrackerState(
-        np.zeros((count, 2)),
-        np.tile(np.eye(2), (count, 1, 1)),
-        np.zeros((count, 2)),
-        np.zeros((count, 8, 8), f4),
-        np.zeros((count, 8, 8), f4),
-        np.zeros((count, 16, 16), f4),
-        np.zeros((count, KEYS, n), f4),
+        places,
+        np.zeros((count, TEMPLATE_SIZE), f4),
         np.zeros((count, KEYS, UNKNOWNS, n), f4),
         np.zeros((count, KEYS, UNKNOWNS, UNKNOWNS)),
-        np.zeros((count, KEYS, 2)),
-        np.zeros((count, KEYS, 2)),
-        np.zeros((count, KEYS, 2, 2)),
-        np.zeros((count, KEYS, 2, 2)),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
+        np.zeros((count, KEYS, 12)),
+        np.zeros((count, 2), np.int64),
+        np.zeros(WORKSPACE_SIZE + RESAMPLING_SIZE, f4),
+        np.zeros(PATCH_PX, np.int32),
     )
 
 
-def empty_output(count: int) -> TrackerOutput:
-    """Allocate an answer for a number of points."""
-    return TrackerOutput(
-        np.zeros((count, 2)),
-        np.zeros((count, 2, 2)),
-        np.full(count, np.nan),
-        np.full(count, np.nan),
-        np.zeros(count),
-        np.full(count, NO_TEMPLATE),
-    )
+@njit(cache=True)
+def affine_of(state: TrackerState, k: int) -> FloatArray:
+    """Affine matrix of point k from the first image to the last, (2, 2)."""
+    return state.places[k, 2:6].reshape(2, 2)
+
+
+@njit(cache=True)
+def key_affine_of(state: TrackerState, k: int, key: int) -> FloatArray:
+    """Affine matrix of point k from the first image to that of a key template, (2, 2)."""
+    return state.facts[k, key, 4:8].reshape(2, 2)
+
+
+@njit(cache=True)
+def key_covariance_of(state: TrackerState, k: int, key: int) -> FloatArray:
+    """Covariance of the place of point k in a key template, (2, 2) px²."""
+    return state.facts[k, key, 8:12].reshape(2, 2)
+
+
+@njit(cache=True)
+def key_template_of(state: TrackerState, k: int, key: int) -> AlignmentTemplate:
+    """Key template of point k."""
+    return AlignmentTemplate(state.jacobian[k, key], state.inverse[k, key], state.facts[k, key, :4])
 
 
 @njit(cache=True)
@@ -140,51 +151,32 @@ def stretch(A: FloatArray) -> float:
 
 
 @njit(cache=True)
-def key_template(state: TrackerState, k: int, key: int) -> AlignmentTemplate:
-    """Key template of point k."""
-    return AlignmentTemplate(
-        state.key_values[k, key],
-        state.key_jacobian[k, key],
-        state.key_inverse[k, key],
-        state.key_offset[k, key],
-        state.key_moments[k, key],
-    )
-
-
-@njit(cache=True)
-def search_template(state: TrackerState, k: int) -> SsdTemplate:
-    """Search template of point k."""
-    return SsdTemplate(state.coarse[k], state.middle[k], state.full[k])
-
-
-@njit(cache=True)
 def add_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArray) -> None:
     """Take a new key template of point k where it is; a full memory loses its newest."""
-    key = min(state.key_count[k], KEYS - 1)
-    x, y = state.points[k, 0], state.points[k, 1]
-    fill_template(image, anchor_of(x), anchor_of(y), x, y, key_template(state, k, key))
-    state.key_affine[k, key] = state.affine[k]
-    state.key_covariance[k, key] = covariance
-    state.key_active[k] = key
-    state.key_count[k] = key + 1
+    key = min(state.keys[k, 0], KEYS - 1)
+    x, y = state.places[k, 0], state.places[k, 1]
+    fill_template(image, anchor_of(x), anchor_of(y), x, y, key_template_of(state, k, key))
+    key_affine_of(state, k, key)[:] = affine_of(state, k)
+    key_covariance_of(state, k, key)[:] = covariance
+    state.keys[k, 0], state.keys[k, 1] = key + 1, key
 
 
 @njit(cache=True)
 def renew_search(image: ImageArray, state: TrackerState, k: int) -> None:
     """Take the window at point k as what to search for next."""
-    x, y = state.points[k, 0], state.points[k, 1]
+    x, y = state.places[k, 0], state.places[k, 1]
     anchor_x, anchor_y = anchor_of(x), anchor_of(y)
-    make_template(image, anchor_x, anchor_y, search_template(state, k))
-    state.search_offset[k, 0] = x - (anchor_x - 0.5)
-    state.search_offset[k, 1] = y - (anchor_y - 0.5)
+    window = state.memory[:1024].reshape(32, 32)
+    make_template(image, anchor_x, anchor_y, window, template_in(state.search[k]))
+    state.places[k, 6], state.places[k, 7] = x - (anchor_x - 0.5), y - (anchor_y - 0.5)
 
 
 @njit(cache=True)
 def start_points(image: ImageArray, state: TrackerState) -> None:
     """Take the first templates of all points whose window fits into the image."""
     height, width = image.shape
-    for k in range(len(state.points)):
-        if fits(state.points[k, 0], state.points[k, 1], width, height):
+    for k in range(len(state.places)):
+        if fits(state.places[k, 0], state.places[k, 1], width, height):
             add_key(image, state, k, np.zeros((2, 2)))
             renew_search(image, state, k)
 
@@ -195,15 +187,16 @@ def choose_key(image: ImageArray, state: TrackerState, k: int, covariance: Float
 
     Going back undoes whatever drift the newer ones have brought.
     """
-    best, nearest = state.key_active[k], np.inf
-    for key in range(state.key_count[k]):
-        change = stretch(product2(state.affine[k], inverse2(state.key_affine[k, key])))
-        if key == state.key_active[k] and change <= REFRESH_STRETCH:
-            return
+    active, nearest, best = state.keys[k, 1], np.inf, state.keys[k, 1]
+    affine = affine_of(state, k)
+    if stretch(product2(affine, inverse2(key_affine_of(state, k, active)))) <= REFRESH_STRETCH:
+        return
+    for key in range(state.keys[k, 0]):
+        change = stretch(product2(affine, inverse2(key_affine_of(state, k, key))))
         if change < nearest:
             best, nearest = key, change
     if nearest <= REFRESH_STRETCH:
-        state.key_active[k] = best
+        state.keys[k, 1] = best
     else:
         add_key(image, state, k, covariance)
 
@@ -223,49 +216,49 @@ def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
 
 
 @njit(cache=True)
-def track_point(
-    image: ImageArray,
-    k: int,
-    state: TrackerState,
-    work: SsdWorkspace,
-    area: Patch,
-    sample: Patch,
-    out: TrackerOutput,
-) -> int:
-    """Find point k, expected at out.points, in an image; returns the verdict."""
+def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
+    """Find point k, expected at out[PLACE], in an image; returns the verdict."""
     height, width = image.shape
-    expected_x, expected_y = out.points[k, 0], out.points[k, 1]
-    if not (
-        -RANGE_PX <= expected_x < width + RANGE_PX and -RANGE_PX <= expected_y < height + RANGE_PX
-    ):
+    if not (-RANGE_PX <= out[0] < width + RANGE_PX and -RANGE_PX <= out[1] < height + RANGE_PX):
         return LEFT
-    offset, key = state.search_offset[k], state.key_active[k]
-    anchor_x, anchor_y = anchor_of(expected_x - offset[0]), anchor_of(expected_y - offset[1])
-    dx, dy, _ = search(image, anchor_x, anchor_y, search_template(state, k), work)
-    x, y = anchor_x - 0.5 + offset[0] + dx, anchor_y - 0.5 + offset[1] + dy
+    x, y = find_window(image, out[0], out[1], k, state)
+    work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
     corner_x, corner_y = anchor_of(x) - AREA_PX // 2, anchor_of(y) - AREA_PX // 2
-    load_window(image, anchor_of(x), anchor_of(y), area)
-    A = product2(state.affine[k], inverse2(state.key_affine[k, key]))
+    load_window(image, anchor_of(x), anchor_of(y), work.area)
+    key = state.keys[k, 1]
+    key_affine, affine = key_affine_of(state, k, key), affine_of(state, k)
+    A = product2(affine, inverse2(key_affine))
     before = A.copy()
-    found = align(area, x - corner_x, y - corner_y, A, key_template(state, k, key), sample)
-    out.residuals[k], out.correlations[k] = found.residual, found.correlation
+    found = align(x - corner_x, y - corner_y, A, key_template_of(state, k, key), work)
     point_x, point_y = found.x + corner_x, found.y + corner_y
     shift = np.hypot(point_x - x, point_y - y)
     verdict, detail = judge(found, shift, stretch(product2(A, inverse2(before))))
-    out.detail[k] = detail
+    out[RESIDUAL], out[CORRELATION], out[DETAIL] = found.residual, found.correlation, detail
     if not fits(point_x, point_y, width, height):
         return LEFT
     if verdict != FOUND:
         return verdict
-    out.points[k, 0], out.points[k, 1] = point_x, point_y
-    state.points[k] = out.points[k]
-    state.affine[k] = product2(A, state.key_affine[k, key])
+    out[0], out[1] = point_x, point_y
+    state.places[k, 0], state.places[k, 1] = point_x, point_y
+    affine[:] = product2(A, key_affine)
     covariance = place_covariance(state, k, key, A, found)
-    out.covariance[k] = covariance
+    out[COVARIANCE] = covariance.reshape(4)
     renew_search(image, state, k)
     if found.correlation >= REFRESH_CORRELATION:
         choose_key(image, state, k, covariance)
     return FOUND
+
+
+@njit(cache=True)
+def find_window(
+    image: ImageArray, x: float, y: float, k: int, state: TrackerState
+) -> tuple[float, float]:
+    """Where the pyramid search finds point k that is expected at (x, y)."""
+    offset_x, offset_y = state.places[k, 6], state.places[k, 7]
+    anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
+    work = make_workspace(state.memory[:WORKSPACE_SIZE])
+    dx, dy, _ = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    return anchor_x - 0.5 + offset_x + dx, anchor_y - 0.5 + offset_y + dy
 
 
 @njit(cache=True)
@@ -276,11 +269,11 @@ def place_covariance(
 
     σ² A (JᵀJ)⁻¹ Aᵀ / g² + A C_key Aᵀ, with σ from the residual.
     """
-    inner = state.key_covariance[k, key].copy()
+    inner = key_covariance_of(state, k, key).copy()
     scale = (found.residual / found.gain) ** 2
     for i in range(2):
         for j in range(2):
-            inner[i, j] += scale * state.key_inverse[k, key, i, j]
+            inner[i, j] += scale * state.inverse[k, key, i, j]
     out = product2(product2(A, inner), A.T)
     out[0, 0] += FLOOR_PX**2
     out[1, 1] += FLOOR_PX**2
@@ -288,19 +281,16 @@ def place_covariance(
 
 
 @njit(cache=True)
-def track_points(
-    image: ImageArray,
-    state: TrackerState,
-    work: SsdWorkspace,
-    area: Patch,
-    sample: Patch,
-    out: TrackerOutput,
-) -> None:
-    """Find all points, each expected at out.points."""
-    for k in range(len(state.points)):
-        if state.key_count[k] == 0:
-            out.verdicts[k] = NO_TEMPLATE
-        else:
-            out.verdicts[k] = track_point(image, k, state, work, area, sample, out)
-        if out.verdicts[k] != FOUND:
-            out.covariance[k] = np.eye(2) * (RANGE_PX * RANGE_PX / 3.0)
+def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) -> bool:
+    """Find all points, each expected at answers[k, PLACE]; whether all were found."""
+    complete = True
+    for k in range(len(answers)):
+        out = answers[k]
+        out[RESIDUAL], out[CORRELATION], out[DETAIL] = np.nan, np.nan, np.nan
+        verdict = track_point(image, k, state, out) if state.keys[k, 0] > 0 else NO_TEMPLATE
+        out[VERDICT] = verdict
+        if verdict != FOUND:
+            complete = False
+            out[2], out[5] = RANGE_PX * RANGE_PX / 3.0, RANGE_PX * RANGE_PX / 3.0
+            out[3], out[4] = 0.0, 0.0
+    return complete

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 
 
@@ -18,6 +20,25 @@ class Tracks(NamedTuple):
     def __bool__(self) -> bool:
         """Whether every point was found."""
         return bool(self.found.all())
+
+
+def nothing_found(points_px: FloatArray, reason: str, deviation_px: float = 100.0) -> Tracks:
+    """Answer that no point was found, all for one reason.
+
+    Args:
+        points_px: where they were expected, (M, 2).
+        reason: why not.
+        deviation_px: standard deviation to state for each.
+    """
+    count = len(points_px)
+    return Tracks(
+        points_px,
+        np.tile(np.eye(2) * deviation_px**2, (count, 1, 1)),
+        np.zeros(count, np.bool_),
+        (reason,) * count,
+        np.full(count, np.nan),
+        np.full(count, np.nan),
+    )
 
 
 class PointTracker(Protocol):
