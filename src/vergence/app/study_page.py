@@ -1,44 +1,42 @@
 """The page of a study: the table of its checks, and its figures."""
 
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 from vergence.app import markup
-from vergence.app.check import Check, html_table
+from vergence.app.check import html_table
+from vergence.app.report import REPORT
+from vergence.studies import Figure, StudyResult
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
 
 
-def write_study_page(
-    out: Path, title: str, checks: Sequence[Check], figures: Sequence[tuple[Path, str]]
-) -> Path:
+def write_study_page(out: Path, result: StudyResult, remark: str = "") -> Path:
     """Write a page that needs nothing but itself into a folder; return where it is.
 
     Args:
         out: the study's folder.
-        title: paper and what it is about.
-        checks: paper's value, measured value, and whether it holds.
-        figures: picture files with their captions.
+        result: what the study found.
+        remark: a word on how it was run.
     """
     parts = [
-        _header(title, checks),
-        markup.section("Checks", html_table(checks)),
-        markup.section("Figures", *(_figure(path, caption) for path, caption in figures)),
+        _header(result, remark),
+        markup.section("Checks", html_table(result.checks)),
+        markup.section("Figures", *map(_figure, result.figures)),
     ]
-    path = out / "report.html"
-    path.write_text(markup.page(title, "\n".join(filter(None, parts))), encoding="utf-8")
+    path = out / REPORT
+    path.write_text(markup.page(result.title, "\n".join(parts)), encoding="utf-8")
     return path
 
 
-def _header(title: str, checks: Sequence[Check]) -> str:
-    judged = [check.holds for check in checks if check.holds is not None]
-    badge = markup.badge(f"{sum(judged)} of {len(judged)} checks hold", all(judged))
+def _header(result: StudyResult, remark: str) -> str:
+    held = sum(check.holds for check in result.checks)
+    badge = markup.badge(f"{held} of {len(result.checks)} checks hold", result.holds)
     return (
         '<header><span class="kicker">vergence reproduce</span>'
-        f"<h1>{escape(title)}</h1><p>{badge}</p></header>"
+        f"<h1>{escape(result.title)}</h1><p>{badge}{escape(remark)}</p></header>"
     )
 
 
-def _figure(path: Path, caption: str) -> str:
-    return markup.picture(path.read_bytes(), _KINDS[path.suffix], caption)
+def _figure(figure: Figure) -> str:
+    return markup.picture(figure.path.read_bytes(), _KINDS[figure.path.suffix], figure.caption)
