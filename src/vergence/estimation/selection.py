@@ -1,0 +1,169 @@
+"""Choosing few features over all cameras: by the information they bring, by default."""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.errors import InputError
+from vergence.estimation.measurement import POSE, point_rows
+
+
+class Candidates(NamedTuple):
+    """What a selection may choose from: features in the pictures of this tick."""
+
+    visible: BoolArray  # (C, M)
+    points_px: FloatArray  # (C, M, 2) predicted places
+    points: FloatArray  # (M, 3) features in the target's frame, m
+    T_world_target: FloatArray  # (C, 4, 4) predicted for each camera's exposure
+    T_camera_world: FloatArray  # (C, 4, 4) at the exposures
+    noise: FloatArray  # (C, 2) expected standard deviation, normalized coordinates
+    diagonal_px: FloatArray  # (C,) of the pictures
+    pose_covariance: FloatArray  # (6, 6) of (δp, δθ), predicted
+    held: BoolArray  # (C, M) chosen last time
+
+
+class Selection(Protocol):
+    """A way to choose features."""
+
+    def choose(self, candidates: Candidates, budget: int) -> BoolArray:
+        """Return which features to measure, (C, M), at most `budget` and only visible ones."""
+        ...
+
+
+@njit(cache=True)
+def candidate_rows(
+    T_world_target: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    noise: FloatArray,
+    visible: BoolArray,
+) -> tuple[FloatArray, IntArray]:
+    """Return the whitened rows (N, 2, 6) of the visible features and their flat numbers (N,)."""
+    count = 0
+    for c in range(visible.shape[0]):
+        for m in range(visible.shape[1]):
+            count += visible[c, m]
+    rows = np.empty((count, 2, POSE))
+    numbers = np.empty(count, dtype=np.int64)
+    pair = np.empty((2, POSE + 1))
+    count = 0
+    for c in range(visible.shape[0]):
+        for m in range(visible.shape[1]):
+            if visible[c, m]:
+                point_rows(T_world_target[c], T_camera_world[c], points[m], pair)
+                for i in range(2):
+                    for j in range(POSE):
+                        rows[count, i, j] = pair[i, j] / noise[c, i]
+                numbers[count] = c * visible.shape[1] + m
+                count += 1
+    return rows, numbers
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def information_factor(H: FloatArray, P: FloatArray) -> float:
+    """Return det(I + H P Hᵀ) of two whitened rows (2, 6): twice the exponent of the gain, nats."""
+    s00, s01, s11 = 1.0, 0.0, 1.0
+    for j in range(POSE):
+        a, b = 0.0, 0.0
+        for i in range(POSE):
+            a += H[0, i] * P[i, j]
+            b += H[1, i] * P[i, j]
+        s00 += a * H[0, j]
+        s01 += a * H[1, j]
+        s11 += b * H[1, j]
+    factor: float = s00 * s11 - s01 * s01
+    return factor
+
+
+@njit(cache=True)
+def absorb(H: FloatArray, P: FloatArray) -> None:
+    """Overwrite P by P - P Hᵀ (I + H P Hᵀ)⁻¹ H P, one row of H (2, 6) after the other."""
+    for n in range(len(H)):
+        PH = np.zeros(POSE)
+        for i in range(POSE):
+            for j in range(POSE):
+                PH[i] += P[i, j] * H[n, j]
+        s = 1.0
+        for i in range(POSE):
+            s += H[n, i] * PH[i]
+        for i in range(POSE):
+            for j in range(POSE):
+                P[i, j] -= PH[i] * PH[j] / s
+
+
+@njit(cache=True)
+def greedy_information(
+    rows: FloatArray, weights: FloatArray, pose_covariance: FloatArray, budget: int
+) -> IntArray:
+    """Choose rows one by one, each with the largest w det(I + H P Hᵀ) on top of those before.
+
+    The logarithm of the determinant is submodular: what a feature brings only falls as others are
+    chosen. So the value of an earlier round is an upper bound, and only features whose bound beats
+    the best of this round are looked at again. The choice is that of the plain greedy algorithm.
+
+    Args:
+        rows: whitened candidates, (N, 2, 6).
+        weights: w >= 1 of each candidate, (N,).
+        pose_covariance: P before, (6, 6).
+        budget: how many to choose.
+
+    Returns:
+        The numbers of the chosen candidates, in order of choice.
+    """
+    P = pose_covariance.copy()
+    count = min(budget, len(rows))
+    bounds = np.full(len(rows), np.inf)
+    chosen = np.empty(count, dtype=np.int64)
+    likely = 0
+    for k in range(count):
+        best, best_value = likely, weights[likely] * information_factor(rows[likely], P)
+        bounds[likely] = best_value
+        for n in range(len(rows)):
+            if bounds[n] > best_value or (bounds[n] == best_value and n < best):
+                value = weights[n] * information_factor(rows[n], P)
+                bounds[n] = value
+                if value > best_value or (value == best_value and n < best):
+                    best, best_value = n, value
+        chosen[k] = best
+        bounds[best] = -np.inf
+        absorb(rows[best], P)
+        likely = 0
+        for n in range(len(rows)):
+            if bounds[n] > bounds[likely]:
+                likely = n
+    return chosen
+
+
+@dataclass(frozen=True, slots=True)
+class InformationSelection:
+    """Greedy choice by the information gained about the pose, ½ log det(I + H P Hᵀ).
+
+    It knows what the filter is still unsure of and which camera would tell, so it holds with four
+    features where the indexes of image geometry do not. A feature chosen last time counts `hold`
+    times as much: it stays until another is clearly better, so that the set does not flicker.
+    """
+
+    hold: float = 1.2
+
+    def __post_init__(self) -> None:
+        if not self.hold >= 1.0:
+            raise InputError("InformationSelection", "hold", self.hold, "1 or more")
+
+    def choose(self, candidates: Candidates, budget: int) -> BoolArray:
+        """Return which features to measure, (C, M), at most `budget` and only visible ones."""
+        chosen = np.zeros(candidates.visible.shape, dtype=np.bool_)
+        rows, numbers = candidate_rows(
+            candidates.T_world_target,
+            candidates.T_camera_world,
+            candidates.points,
+            candidates.noise,
+            candidates.visible,
+        )
+        if len(rows) and budget > 0:
+            weights = np.where(candidates.held.reshape(-1)[numbers], self.hold, 1.0)
+            best = greedy_information(rows, weights, candidates.pose_covariance, budget)
+            chosen.reshape(-1)[numbers[best]] = True
+        return chosen

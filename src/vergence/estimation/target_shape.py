@@ -1,0 +1,103 @@
+"""The target as perception knows it: its features, and the surface that can hide them."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vergence.arrays import FloatArray, IntArray, frozen
+from vergence.errors import InputError
+
+TOUCHING = 1e-4  # of the target's size: a feature this near a face lies on it
+
+
+@dataclass(frozen=True, slots=True)
+class TargetShape:
+    """Features of a rigid target with the faces around them, in the target's frame.
+
+    Without a surface (`from_points`) every feature is taken to be seen from all sides.
+    """
+
+    points: FloatArray  # (M, 3) features, m
+    normals: FloatArray  # (M, K, 3) unit normals of the faces around each, filled up with zeros
+    face_counts: IntArray  # (M,) how many there are; 0: seen from all sides
+    triangles: FloatArray  # (F, 3, 3) corners of the surface's triangles, m
+    size: float  # m, diagonal of the box around it all
+
+    @classmethod
+    def from_points(cls, points: ArrayLike) -> Self:
+        """Make a target of bare points, (M, 3), m.
+
+        Raises:
+            InputError: if there is no point.
+        """
+        return cls.from_mesh(points, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+
+    @classmethod
+    def from_mesh(cls, points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Self:
+        """Make a target of features on the surface of a mesh, convex or not.
+
+        Args:
+            points: features, (M, 3), m.
+            vertices: of the mesh, (V, 3), m.
+            faces: three vertices a triangle, counter-clockwise seen from outside, (F, 3).
+
+        Raises:
+            InputError: if there is no point, or a face names a vertex that is not there.
+        """
+        features = frozen(points, (None, 3), "points")
+        if not len(features):
+            raise InputError("TargetShape", "points", "none", "at least one feature")
+        corners = frozen(vertices, (None, 3), "vertices")
+        index = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+        if index.size and not (index.min() >= 0 and index.max() < len(corners)):
+            raise InputError("TargetShape", "faces", "a vertex that is not there", "0 … V - 1")
+        triangles = corners[index]
+        everything = np.vstack((features, triangles.reshape(-1, 3)))
+        size = float(np.linalg.norm(np.ptp(everything, axis=0)))
+        around = [_normals_at(point, triangles, TOUCHING * size) for point in features]
+        counts = np.array([len(normals) for normals in around])
+        normals = np.zeros((len(features), max(1, counts.max()), 3))
+        for m, found in enumerate(around):
+            for k, normal in enumerate(found):
+                normals[m, k] = normal
+        return cls(features, frozen(normals), counts, frozen(triangles), size)
+
+    @classmethod
+    def box(cls, edges: ArrayLike) -> Self:
+        """Make a box around the origin with its eight corners as features.
+
+        Args:
+            edges: lengths along x, y and z, (3,), m.
+        """
+        half = 0.5 * frozen(edges, (3,), "edges")
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        faces = [tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))]
+        return cls.from_mesh(signs * half, signs * half, faces)
+
+
+def _normals_at(point: FloatArray, triangles: FloatArray, tolerance: float) -> list[FloatArray]:
+    """Return the distinct unit normals of the triangles that a point lies on."""
+    normals: list[FloatArray] = []
+    for triangle in triangles:
+        cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+        area = np.linalg.norm(cross)
+        if area == 0.0 or not _touches(point, triangle, cross / area, tolerance):
+            continue
+        normal = cross / area
+        if all(normal @ other < 1.0 - 1e-9 for other in normals):
+            normals.append(normal)
+    return normals
+
+
+def _touches(point: FloatArray, triangle: FloatArray, normal: FloatArray, tolerance: float) -> bool:
+    """Tell whether a point lies on a triangle, or no farther than the tolerance beside it."""
+    if abs(normal @ (point - triangle[0])) > tolerance:
+        return False
+    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+        inward = np.cross(normal, b - a)
+        if inward @ (point - a) < -tolerance * np.linalg.norm(inward):
+            return False
+    return True

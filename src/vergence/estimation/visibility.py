@@ -1,0 +1,206 @@
+"""Which features each camera will see, before its picture is looked at.
+
+Predicted from the poses of target and cameras alone: field of view, faces turned away, the target
+in front of itself, and anything else in the way through a function that is handed in. This is what
+[Lippiello2005] takes from its reference [9].
+"""
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.estimation.rig import in_picture, lens_pixel
+from vergence.estimation.target_shape import TargetShape
+from vergence.geometry import se3_inverse, transform_points
+
+SightArray: TypeAlias = NDArray[np.uint8]  # a `Sight` each
+# blocked(origin (3,), points (N, 3)) -> (N,): whether something stands between, world frame, m.
+Blocked: TypeAlias = Callable[[FloatArray, FloatArray], BoolArray]
+
+
+class Sight(IntEnum):
+    """Why a feature is or is not seen."""
+
+    VISIBLE = 0
+    BEHIND = 1  # behind the camera
+    OUTSIDE = 2  # outside the picture, or too near its border
+    TURNED_AWAY = 3  # none of the faces around it faces the camera
+    HIDDEN = 4  # behind another part of the target
+    BLOCKED = 5  # behind something else
+
+
+class Visibility(NamedTuple):
+    """What every camera is expected to see of every feature."""
+
+    sight: SightArray  # (C, M)
+    points_px: FloatArray  # (C, M, 2) predicted places, px
+    depth: FloatArray  # (C, M) along the optical axis, m
+
+    @property
+    def visible(self) -> BoolArray:
+        """The features that are seen, (C, M)."""
+        seen: BoolArray = self.sight == Sight.VISIBLE
+        return seen
+
+
+@njit(cache=True)
+def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_of: float) -> bool:
+    """Tell whether a triangle (3, 3) cuts the segment from origin to point before its end.
+
+    Solves origin + t (point - origin) = a + β (b - a) + γ (c - a) for t < 1 - short_of
+    (Möller and Trumbore).
+    """
+    dx, dy, dz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    a, b, c = triangle[0], triangle[1], triangle[2]
+    ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    fx, fy, fz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    px, py, pz = dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
+    determinant = ex * px + ey * py + ez * pz
+    if determinant == 0.0:
+        return False
+    inverse = 1.0 / determinant
+    sx, sy, sz = origin[0] - a[0], origin[1] - a[1], origin[2] - a[2]
+    beta = (sx * px + sy * py + sz * pz) * inverse
+    if beta < 0.0 or beta > 1.0:
+        return False
+    qx, qy, qz = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+    gamma = (dx * qx + dy * qy + dz * qz) * inverse
+    if gamma < 0.0 or beta + gamma > 1.0:
+        return False
+    t = (fx * qx + fy * qy + fz * qz) * inverse
+    hit: bool = 0.0 < t < 1.0 - short_of
+    return hit
+
+
+@njit(cache=True)
+def faces_camera(
+    origin: FloatArray, point: FloatArray, normals: FloatArray, count: int, least_cosine: float
+) -> bool:
+    """Tell whether one of the faces around a feature faces the camera, or it has none."""
+    if count == 0:
+        return True
+    x, y, z = origin[0] - point[0], origin[1] - point[1], origin[2] - point[2]
+    least = least_cosine * np.sqrt(x * x + y * y + z * z)
+    for k in range(count):
+        if normals[k, 0] * x + normals[k, 1] * y + normals[k, 2] * z > least:
+            return True
+    return False
+
+
+@njit(cache=True)
+def see(
+    T_camera_target: FloatArray,
+    lenses: FloatArray,
+    points: FloatArray,
+    normals: FloatArray,
+    face_counts: IntArray,
+    triangles: FloatArray,
+    touching: float,
+    margin_px: float,
+    least_cosine: float,
+) -> tuple[SightArray, FloatArray, FloatArray]:
+    """Return sight (C, M), places (C, M, 2) and depth (C, M) without what else is in the way.
+
+    Args:
+        T_camera_target: predicted pose of the target in each camera, (C, 4, 4).
+        lenses: packed cameras, (C, 11).
+        points: features in the target's frame, (M, 3), m.
+        normals: of the faces around each feature, (M, K, 3).
+        face_counts: how many faces there are around each, (M,).
+        triangles: the target's surface, (F, 3, 3), m.
+        touching: a surface this near a feature does not hide it, m.
+        margin_px: how far from the border of the picture a feature must be.
+        least_cosine: of the angle between a face's normal and the line of sight.
+    """
+    cameras, features = len(T_camera_target), len(points)
+    sight = np.empty((cameras, features), dtype=np.uint8)
+    places = np.empty((cameras, features, 2))
+    depth = np.empty((cameras, features))
+    for c in range(cameras):
+        eye = se3_inverse(T_camera_target[c])[:3, 3].copy()
+        seen = transform_points(T_camera_target[c], points)
+        for m in range(features):
+            z = seen[m, 2]
+            depth[c, m] = z
+            if not z > 0.0:
+                places[c, m] = np.nan
+                sight[c, m] = 1
+                continue
+            u, v, one_to_one = lens_pixel(lenses[c], seen[m, 0] / z, seen[m, 1] / z)
+            places[c, m, 0], places[c, m, 1] = u, v
+            if not (one_to_one and in_picture(lenses[c], u, v, margin_px)):
+                sight[c, m] = 2
+            elif not faces_camera(eye, points[m], normals[m], face_counts[m], least_cosine):
+                sight[c, m] = 3
+            elif _hidden(eye, points[m], triangles, touching):
+                sight[c, m] = 4
+            else:
+                sight[c, m] = 0
+    return sight, places, depth
+
+
+@njit(cache=True)
+def _hidden(eye: FloatArray, point: FloatArray, triangles: FloatArray, touching: float) -> bool:
+    distance = 0.0
+    for i in range(3):
+        distance += (eye[i] - point[i]) ** 2
+    short_of = touching / np.sqrt(distance)
+    for n in range(len(triangles)):  # noqa: SIM110 (a kernel knows no generators)
+        if ray_hits(eye, point, triangles[n], short_of):
+            return True
+    return False
+
+
+def predict_visibility(
+    shape: TargetShape,
+    T_camera_target: FloatArray,
+    lenses: FloatArray,
+    *,
+    margin_px: float = 8.0,
+    least_cosine: float = 0.1,
+) -> Visibility:
+    """Predict what cameras will see of a target that nothing else hides.
+
+    Args:
+        shape: the target.
+        T_camera_target: its predicted pose in each camera at that camera's exposure, (C, 4, 4).
+        lenses: of these cameras, (C, 11).
+        margin_px: how far from the border a feature must be.
+        least_cosine: a face counts as facing the camera if the cosine between its normal and the
+            line of sight is above this; flatter faces show no usable corner.
+    """
+    return Visibility(
+        *see(
+            T_camera_target,
+            lenses,
+            shape.points,
+            shape.normals,
+            shape.face_counts,
+            shape.triangles,
+            1e-3 * shape.size,
+            margin_px,
+            least_cosine,
+        )
+    )
+
+
+def add_obstacles(
+    sight: SightArray, blocked: Blocked, eye: FloatArray, points_world: FloatArray
+) -> None:
+    """Mark the features of one camera, (M,), that something else hides; asks only for visible ones.
+
+    Args:
+        sight: of that camera, (M,); changed.
+        blocked: tells what stands between the eye and points.
+        eye: position of the camera, (3,), m.
+        points_world: the features, (M, 3), m.
+    """
+    visible = np.flatnonzero(sight == Sight.VISIBLE)
+    if len(visible):
+        hidden = np.asarray(blocked(eye, points_world[visible]), dtype=np.bool_)
+        sight[visible[hidden]] = Sight.BLOCKED
