@@ -30,7 +30,7 @@ def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in HEADINGS)
     rows = "\n".join(_html_row(check) for check in checks)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>"
+    return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>'
 
 
 def _html_row(check: Check) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say, warn
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 
@@ -60,9 +60,20 @@ def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "RunResult":
     try:
         with RunProgress(cell.duration_s) as progress:
             return run_cell(cell, (recorder, progress), images)
+    except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
+        _tell_interrupted(recorder)
+        raise SystemExit(FAILURE) from None
     finally:
         reason = "the run broke off before it could say why"
         recorder.close(Outcome(OutcomeKind.STOPPED, reason, recorder.now), {})
+
+
+def _tell_interrupted(recorder: "Recorder") -> None:
+    if recorder.running:
+        recorder.close(Outcome(OutcomeKind.STOPPED, "stopped by the user", recorder.now), {})
+        warn(f"interrupted: what was recorded is kept, see `vergence report {recorder.folder}`")
+    else:
+        warn("interrupted before the run began: nothing was recorded")
 
 
 def _answer(name: str, result: "RunResult", folder: Path, report: Path) -> Mapping[str, object]:

@@ -1,0 +1,183 @@
+"""The command line answers in words or JSON, with the exit code that fits."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import made_up_run
+import pytest
+
+from vergence.app.main import main
+from vergence.app.output import new_folder
+from vergence.outcome import OutcomeKind
+from vergence.runtime.recording import Recording
+from vergence.studies import Check, Figure, StudyResult
+
+COMMANDS = ["run", "report", "reproduce", "bench", "cells"]
+QUICK_RUN = ["run", "puma560", "--no-images", "--set", "duration_s=0.5"]
+
+Command = Callable[..., int]
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run the command line in an empty folder; return its exit code."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(*arguments: str) -> int:
+        monkeypatch.setattr(sys, "argv", ["vergence", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        code = end.value.code
+        return code if isinstance(code, int) else 0
+
+    return run
+
+
+def test_vergence_alone_says_what_to_do_next(command: Command, capsys: object) -> None:
+    assert command() == 0
+    assert "vergence run puma560" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_every_command_has_an_example(
+    command: Command, capsys: object, name: str
+) -> None:
+    assert command(name, "--help") == 0
+    assert f"Example: vergence {name}" in capsys.readouterr().out
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = "import sys, vergence.app.main; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    heavy = {"numpy", "numba", "cv2", "mujoco", "matplotlib", "scipy", "pydantic", "foxglove"}
+    assert not heavy & set(done.stdout.split())
+
+
+def test_a_run_leaves_recording_report_and_summary(command: Command, tmp_path: Path) -> None:
+    assert command(*QUICK_RUN, "--out", "here") == 0
+    files = {path.name for path in (tmp_path / "here").iterdir()}
+    assert files == {"cell.toml", "recording.mcap", "report.html", "summary.json"}
+    assert Recording.open("here").outcome.kind is OutcomeKind.COMPLETED
+
+
+def test_json_is_one_object_and_nothing_else(command: Command, capsys: object) -> None:
+    assert command(*QUICK_RUN, "--json", "--seed", "4") == 0
+    written = capsys.readouterr()
+    answer = json.loads(written.out, parse_constant=pytest.fail)
+    assert set(answer) == {"command", "cell", "outcome", "summary", "run", "report"}
+    assert (answer["command"], answer["cell"]) == ("run", "puma560")
+    assert set(answer["outcome"]) == {"kind", "reason", "time"}
+    assert Path(answer["report"]).is_file()
+    assert Path(answer["run"]).parent == Path("runs")
+    assert Recording.open(answer["run"]).info.seed == 4
+    assert written.err == ""
+
+
+def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> None:
+    fast = "target.motion.velocity_m_s=[6.0, 0.0, 0.0]"
+    assert command("run", "puma560", "--no-images", "--set", "duration_s=8", "--set", fast) == 1
+    assert "report" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "puma56"], "did you mean puma560?"),
+        (["run", "puma560", "--set", "durations_s=3"], "did you mean duration_s?"),
+        (["run", "puma560", "--set", "duration_s"], "key=value"),
+        (["report", "nowhere"], "recording.mcap"),
+        (["reproduce", "nelson1996"], "did you mean nelson1995?"),
+        (["rnu"], "Did you mean 'run'?"),
+    ],
+)
+def test_a_mistake_is_one_message_and_exit_code_two(
+    command: Command, capsys: object, arguments: list[str], words: str
+) -> None:
+    assert command(*arguments) == 2
+    written = capsys.readouterr()
+    assert words in written.err
+    assert "Traceback" not in written.err
+    assert written.out == ""
+
+
+def test_an_interrupted_run_leaves_a_recording_and_says_where(
+    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import vergence.runtime as runtime
+
+    def interrupted(cell: object, listeners: object, images: bool) -> None:
+        for listener in listeners:
+            listener.begin(made_up_run.INFO)
+        for record in made_up_run.ticks(1.0, images=False):
+            for listener in listeners:
+                listener.tick(record)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runtime, "run_cell", interrupted)
+    assert command("run", "puma560", "--out", "cut") == 1
+    assert "vergence report cut" in capsys.readouterr().err
+    recording = Recording.open("cut")
+    assert recording.outcome.kind is OutcomeKind.STOPPED
+    assert recording.duration == pytest.approx(29 / 30)
+
+
+def test_a_report_is_made_again(command: Command, capsys: object, run_folder: Path) -> None:
+    assert command("report", str(run_folder), "--json") == 0
+    assert json.loads(capsys.readouterr().out)["report"] == str(run_folder / "report.html")
+
+
+def test_built_in_cells_are_listed(command: Command, capsys: object) -> None:
+    assert command("cells", "--json") == 0
+    assert "puma560" in json.loads(capsys.readouterr().out)["cells"]
+
+
+@pytest.fixture(params=[True, False])
+def holds(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """A study in the place of the paper's whose one check holds or not."""
+
+    def reproduce(out: Path, quick: bool, progress: Callable[[str, float], None]) -> StudyResult:
+        progress("half", 0.5)
+        path = out / "drift.svg"
+        path.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+        check = Check("drift_px", "at most 1", 0.25, "px", request.param, "over <all> of it")
+        return StudyResult("A paper", (check,), (Figure(path, "How it drifts."),))
+
+    study = ModuleType("nelson1995")
+    study.reproduce = reproduce
+    monkeypatch.setitem(sys.modules, "vergence.studies.nelson1995", study)
+    return request.param
+
+
+def test_a_studys_checks_decide_the_exit_code(
+    command: Command, capsys: object, holds: bool
+) -> None:
+    assert command("reproduce", "nelson1995", "--json", "--quick", "--out", "study") == 1 - holds
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["command"], answer["paper"], answer["quick"]) == (
+        "reproduce",
+        "nelson1995",
+        True,
+    )
+    [check] = answer["checks"]
+    assert list(check) == ["name", "paper", "measured", "unit", "holds", "note"]
+    assert check["holds"] is holds
+    page = Path(answer["report"]).read_text(encoding="utf-8")
+    assert "How it drifts." in page
+    assert "over &lt;all&gt; of it" in page
+    assert "quick" in page
+
+
+def test_run_folders_never_collide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    folders = []
+    for _ in range(3):
+        folders.append(new_folder("cell"))
+        folders[-1].mkdir(parents=True)
+    assert len(set(folders)) == 3

@@ -1,0 +1,99 @@
+"""A report says how the run went, and needs nothing but itself."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import made_up_run
+import numpy as np
+import pytest
+
+from vergence.app.report import make_report, write_report
+from vergence.app.table import arm_rows, camera_rows, run_rows
+from vergence.errors import InputError
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.runtime.recording import Recording
+
+
+@pytest.fixture(scope="module")
+def page(recording: Recording) -> str:
+    return make_report(recording)
+
+
+def test_the_page_holds_all_it_shows(page: str) -> None:
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert sources
+    assert all(source.startswith("data:") for source in sources)
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_the_page_tells_the_outcome_and_every_part(page: str) -> None:
+    for word in ("made-up", "completed", "the target was followed to the end", "Summary"):
+        assert word in page
+    for heading in ("Camera wrist", "Arm puma", "Events", "Cell file"):
+        assert f"<h2>{heading}</h2>" in page
+    assert "the residual is too large" in page
+    assert "data:video/webm" in page
+    assert page.count("data:image/jpeg") == 4
+    assert page.count("data:image/svg+xml") == 6
+
+
+def test_every_picture_says_what_it_shows(page: str) -> None:
+    assert all(re.findall(r'alt="([^"]*)"', page))
+    assert page.count("<img") == page.count("<figcaption>")
+
+
+def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:
+    trace, arm = recording.cameras["wrist"], recording.arms["puma"]
+    camera = {row.name: row.value for row in camera_rows(trace)}
+    measures = {row.name: row for row in arm_rows(recording.info.arms["puma"], arm)}
+    assert camera["final error"] == f"{np.nanmax(trace.error_px[-1]):.2f}"
+    assert camera["largest error"] == f"{np.nanmax(trace.error_px):.2f}"
+    assert camera["largest drift"] == f"{np.nanmax(trace.drift_px):.2f}"
+    assert camera["points found"] == f"{100 * trace.found.mean():.1f}"
+    ratio = arm.manipulability.min() / arm.manipulability[0]
+    assert measures["least manipulability"].value == f"{ratio:.2f}"
+    assert measures["least penalty"].value == f"{arm.penalty.min():.2f}"
+    fastest = np.abs(arm.velocity).max()
+    assert measures["fastest joint"].value == f"{100 * fastest:.0f}"
+    assert "joint3" in measures["fastest joint"].note
+
+
+def test_units_are_read_off_names(recording: Recording) -> None:
+    named = replace(recording, summary={"reaction_ms": 12.345, "far_m": 2.0, "law": "optimal"})
+    rows = {row.name: (row.value, row.unit) for row in run_rows(named)}
+    assert rows["reaction"] == ("12.35", "ms")
+    assert rows["far"] == ("2", "m")
+    assert rows["law"] == ("optimal", "")
+
+
+def test_names_cannot_break_the_page(recording: Recording) -> None:
+    sly = "<script>alert(1)</script>"
+    outcome = Outcome(OutcomeKind.STOPPED, sly, 1.0)
+    info = replace(recording.info, cell=sly, text=sly)
+    assert sly not in make_report(replace(recording, info=info, outcome=outcome))
+
+
+def test_a_run_that_was_cut_off_has_a_report(run_folder: Path, tmp_path: Path) -> None:
+    whole = (run_folder / "recording.mcap").read_bytes()
+    (tmp_path / "recording.mcap").write_bytes(whole[: len(whole) // 2])
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    assert "cut off" in page
+    assert "Arm puma" in page
+
+
+def test_a_run_that_never_ticked_has_a_report(tmp_path: Path) -> None:
+    made_up_run.record(tmp_path, duration=0.0)
+    assert "made-up" in write_report(tmp_path).read_text(encoding="utf-8")
+
+
+def test_a_report_can_be_made_where_the_run_was_moved(run_folder: Path, tmp_path: Path) -> None:
+    moved = shutil.copytree(run_folder, tmp_path / "elsewhere")
+    assert write_report(moved) == moved / "report.html"
+
+
+def test_no_report_without_a_recording(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"recording\.mcap"):
+        write_report(tmp_path)
