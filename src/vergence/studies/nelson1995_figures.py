@@ -138,7 +138,7 @@ def _translation(trials: "Mapping[tuple[str, int], Trial]", sign: int) -> Any:
             axes.annotate(
                 trial.outcome.kind.value,
                 (time[-1], trial.camera_m[-1]),
-                xytext=(6, 0),
+                xytext=(4, -11 * sign),
                 textcoords="offset points",
                 va="center",
                 fontsize=8,
