@@ -1,0 +1,123 @@
+"""Where the features are now, and how fast the target moves them: latency and motion undone."""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.features import ImagePoints
+from vergence.geometry import se3_compose, se3_inverse
+from vergence.robot import Arm, JointState, forward_kinematics
+
+
+class FeatureState(NamedTuple):
+    """The features as they should look at this instant."""
+
+    points: FloatArray  # (M, 2) normalized coordinates, now
+    flow: FloatArray  # (M, 2) their motion by the target's own, 1/s
+
+
+class ImageMotion:
+    """Carries measured features from their exposure to now, through the camera's known motion.
+
+    A feature seen at exposure is lifted to its depth, moved with the camera's motion since, which
+    the joints tell, and projected again; what consecutive pictures then leave unexplained is the
+    target's own motion, smoothed to a flow and extrapolated. So a law acts on the present although
+    pictures are late, and can feed the target's motion forward.
+
+    Args:
+        arm: up to the camera.
+        camera: its intrinsics.
+        smoothing_s: time constant of the flow; 0 takes every difference at face value, and
+            infinity believes in a motionless target.
+        memory_s: how far back the joints are remembered; more than the latency.
+    """
+
+    def __init__(
+        self, arm: Arm, camera: Camera, smoothing_s: float = 0.1, memory_s: float = 2.0
+    ) -> None:
+        self._arm, self._camera = arm, camera
+        self._smoothing_s, self._memory_s = smoothing_s, memory_s
+        self._history: deque[tuple[float, FloatArray]] = deque()
+        self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, q, points
+        self._flow: FloatArray | None = None
+
+    def update(self, view: ImagePoints, depth: FloatArray, joints: JointState) -> FeatureState:
+        """Take in a view and return the features now.
+
+        Args:
+            view: the newest measurement.
+            depth: of the features, (M,), m.
+            joints: now.
+        """
+        self._remember(joints)
+        q_exposed = self._joints_at(view.time)
+        points = self._camera.normalize(view.points_px)
+        flow = self._update_flow(view, points, depth, q_exposed)
+        moved = _seen_from(self._arm, points, depth, q_exposed, joints.position)
+        return FeatureState(moved + flow * (joints.time - view.time), flow)
+
+    def _update_flow(
+        self, view: ImagePoints, points: FloatArray, depth: FloatArray, q: FloatArray
+    ) -> FloatArray:
+        if self._flow is None:
+            self._flow = np.zeros_like(points)
+        if self._last is not None and view.time > self._last[0]:
+            time, q_last, points_last = self._last
+            elapsed = view.time - time
+            still = _seen_from(self._arm, points_last, depth, q_last, q)
+            share = elapsed / (elapsed + self._smoothing_s)
+            change = share * ((points - still) / elapsed - self._flow)
+            known = view.found & np.isfinite(change).all(axis=1)
+            self._flow = self._flow + np.where(known[:, None], change, 0.0)
+        self._last = (view.time, q, points)
+        return self._flow
+
+    def _remember(self, joints: JointState) -> None:
+        self._history.append((joints.time, joints.position))
+        while self._history[0][0] < joints.time - self._memory_s:
+            self._history.popleft()
+
+    def _joints_at(self, time: float) -> FloatArray:
+        """Return joint positions at a past instant, (n,), between the remembered ones."""
+        later = self._history[-1]
+        for earlier in reversed(self._history):
+            if earlier[0] <= time:
+                span = later[0] - earlier[0]
+                share = (time - earlier[0]) / span if span > 0 else 0.0
+                return earlier[1] + min(share, 1.0) * (later[1] - earlier[1])
+            later = earlier
+        return later[1]
+
+
+def _seen_from(
+    arm: Arm, points: FloatArray, depth: FloatArray, q_from: FloatArray, q_to: FloatArray
+) -> FloatArray:
+    T_to_from = se3_compose(
+        se3_inverse(forward_kinematics(arm.chain, q_to)), forward_kinematics(arm.chain, q_from)
+    )
+    seen: FloatArray = reproject(T_to_from, points, depth)
+    return seen
+
+
+@njit(cache=True)
+def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return motionless points as another camera pose sees them, (M, 2).
+
+    Args:
+        T_to_from: pose of the first camera in the second, (4, 4).
+        points: normalized coordinates in the first, (M, 2).
+        depth: in the first, (M,), m.
+    """
+    seen = np.empty_like(points)
+    for j in range(len(points)):
+        x, y, z = points[j, 0] * depth[j], points[j, 1] * depth[j], depth[j]
+        behind = T_to_from[2, 0] * x + T_to_from[2, 1] * y + T_to_from[2, 2] * z + T_to_from[2, 3]
+        for a in range(2):
+            seen[j, a] = (
+                T_to_from[a, 0] * x + T_to_from[a, 1] * y + T_to_from[a, 2] * z + T_to_from[a, 3]
+            ) / max(behind, 1e-9)
+    return seen
