@@ -8,14 +8,16 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from vergence.cell.schema import (
+    TABLES,
     ArmTable,
     CameraTable,
     Law,
+    PerceptionTable,
     Positive,
     SceneTable,
     Table,
     TargetTable,
-    TaskTable,
+    Task,
 )
 from vergence.errors import InputError, nearest
 
@@ -33,7 +35,8 @@ class Cell(Table):
     arms: dict[str, ArmTable] = Field(min_length=1)
     cameras: dict[str, CameraTable] = Field(min_length=1)
     target: TargetTable
-    task: TaskTable
+    task: Task
+    perception: PerceptionTable = PerceptionTable()
     law: Law
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
@@ -151,28 +154,36 @@ def _explain(error: ValidationError, source: str, values: Any) -> InputError:
     """Turn pydantic's first complaint into ours: file, key, given, allowed."""
     first = error.errors()[0]
     parts = [str(part) for part in first["loc"]]
-    key = ".".join(parts)
+    key = ".".join(_in_file(parts, values))
     if first["type"] == "extra_forbidden":
-        known = _known_keys(parts[:-1])
-        return InputError(source, key, "a key that is not known", nearest(parts[-1], known))
+        return InputError(
+            source, key, "a key that is not known", nearest(parts[-1], _known_keys(parts[:-1]))
+        )
     if first["type"] == "missing":
         return InputError(source, key, "nothing", "a value; this key is required")
+    if first["type"] == "union_tag_invalid":
+        given, tags = first["ctx"]["tag"], first["ctx"]["expected_tags"].replace("'", "")
+        return InputError(source, f"{key}.kind", given, nearest(given, tags.split(", ")))
     message = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return InputError(source, key, first["input"], message)
 
 
+def _in_file(parts: list[str], values: Any) -> list[str]:
+    """Leave out of a place what is no key of the file: the names pydantic has for its kinds."""
+    kept = []
+    for i, part in enumerate(parts):
+        known = isinstance(values, Mapping) and part in values
+        if known or i == len(parts) - 1 or not isinstance(values, Mapping):
+            kept.append(part)
+        if known:
+            values = values[part]
+    return kept
+
+
 def _known_keys(parts: list[str]) -> list[str]:
-    tables: dict[str, type[Table]] = {
-        "scene": SceneTable,
-        "arms": ArmTable,
-        "cameras": CameraTable,
-        "target": TargetTable,
-        "task": TaskTable,
-    }
-    if not parts:
-        return list(Cell.model_fields)
-    table = tables.get(parts[0])
-    return list(table.model_fields) if table else []
+    """Return the keys of the table that a place lies in, its kind being the last name that fits."""
+    tables = [TABLES[part] for part in parts if part in TABLES]
+    return list((tables[-1] if tables else Cell).model_fields)
 
 
 def _check_names(cell: Cell) -> None:
@@ -185,6 +196,10 @@ def _check_names(cell: Cell) -> None:
     for name, camera in cell.cameras.items():
         if camera.arm is not None:
             check(f"cameras.{name}.arm", camera.arm, cell.arms)
+    for name in cell.perception.cameras or ():
+        check("perception.cameras", name, cell.cameras)
+    if cell.target.carried_by is not None:
+        check("target.carried_by", cell.target.carried_by, cell.arms)
     if cell.cameras[cell.task.camera].arm != cell.task.arm:
         raise InputError(
             str(cell.path),

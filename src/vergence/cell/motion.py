@@ -70,7 +70,7 @@ def _offset(
         case RandomMotion():
             return _random(motion, seed)
         case _:
-            return lambda t: (none, none)
+            return lambda _: (none, none)
 
 
 def _on_circle(motion: CircleMotion, time: float) -> FloatArray:

@@ -14,13 +14,13 @@ from vergence.errors import RenderingError
 _NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the picture
 
 
-def choose_renderer() -> None:
+def choose_renderer(needed: bool = True) -> None:
     """Choose how MuJoCo draws without a screen: EGL, else OSMesa, unless MUJOCO_GL says.
 
-    It has to run before MuJoCo is imported.
+    It has to run before MuJoCo is imported, so also where pictures may be wanted only later.
 
     Raises:
-        RenderingError: if neither library is there.
+        RenderingError: if neither library is there and a renderer is needed.
     """
     if "MUJOCO_GL" in os.environ or sys.platform != "linux" or "mujoco" in sys.modules:
         return
@@ -28,6 +28,8 @@ def choose_renderer() -> None:
         if find_library(library):
             os.environ["MUJOCO_GL"] = name
             return
+    if not needed:
+        return
     raise RenderingError(
         "no offscreen renderer: install libegl1 and libgl1-mesa-dri, or libosmesa6 "
         "(Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)"

@@ -1,9 +1,9 @@
 """The tables of a cell file, typed."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 Vector3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
@@ -30,6 +30,45 @@ class SceneTable(Table):
     light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of every lamp
 
 
+class Waypoints(Table):
+    """Way-points of a motion of its own, with rest at each and minimum jerk between them."""
+
+    times_s: tuple[Annotated[float, Field(ge=0)], ...] = Field(min_length=2)  # first 0, increasing
+    speed: Positive = 1.0  # the times are divided by it
+
+    @model_validator(mode="after")
+    def _one_each(self) -> "Waypoints":
+        if self.times_s[0] != 0 or any(
+            b <= a for a, b in zip(self.times_s, self.times_s[1:], strict=False)
+        ):
+            raise ValueError("times_s that begin with 0 and increase")
+        for name, value in self:
+            if isinstance(value, tuple) and len(value) != len(self.times_s):
+                raise ValueError(f"as many {name} as times_s")
+        return self
+
+
+class JointMotion(Waypoints):
+    """The arm moves its joints through way-points, relative to its start."""
+
+    kind: Literal["joints"]
+    offsets_deg: tuple[tuple[float, ...], ...]  # metres for sliding joints
+
+
+class PoseMotion(Waypoints):
+    """The arm moves its last body, or the target it carries, relative to where that starts.
+
+    A way-point is the pose in the frame that the body or target had at the start.
+    """
+
+    kind: Literal["poses"]
+    positions_m: tuple[Vector3, ...]
+    rotations_rpy_deg: tuple[Vector3, ...]
+
+
+ArmMotion = Annotated[JointMotion | PoseMotion, Field(discriminator="kind")]
+
+
 class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
@@ -39,6 +78,7 @@ class ArmTable(Placement):
     rate_max_deg_s: Positive | tuple[Positive, ...] = 180.0  # m/s·(180/π) for sliding joints
     acceleration_max_deg_s2: Positive | tuple[Positive, ...] = 720.0
     servo_bandwidth_hz: Positive = 12.0  # of the joint servos that stand for the robot's own
+    motion: ArmMotion | None = None  # what it does by itself; without one the loop holds it
 
 
 class CameraTable(Placement):
@@ -112,15 +152,22 @@ Motion = Annotated[
 
 
 class TargetTable(Placement):
-    """The object; its placement is where its motion starts."""
+    """The object; its placement is where its motion starts, or its pose in what carries it."""
 
     model: Path
+    carried_by: str | None = None  # an arm, whose last body it is fixed to
     motion: Motion = StillMotion()
     features: tuple[Vector3, ...] | None = None  # m, in the target; picked in the image if absent
 
+    @model_validator(mode="after")
+    def _moved_once(self) -> "TargetTable":
+        if self.carried_by is not None and self.motion.kind != "still":
+            raise ValueError("either carried_by or a motion of its own")
+        return self
 
-class TaskTable(Table):
-    """What the arm shall do."""
+
+class TrackTable(Table):
+    """Keep features where they are wanted in one camera's image."""
 
     kind: Literal["track"] = "track"
     arm: str
@@ -128,6 +175,41 @@ class TaskTable(Table):
     feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
     desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = "initial"
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
+
+
+class FollowTable(Table):
+    """Keep a camera, and so the hand that carries it, at a wanted pose relative to the target."""
+
+    kind: Literal["follow"]
+    arm: str
+    camera: str  # carried by the arm
+    desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
+    image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
+
+
+def _task_kind(value: Any) -> str:
+    kind = value.get("kind", "track") if isinstance(value, dict) else value.kind
+    return str(kind)
+
+
+Task = Annotated[
+    Annotated[TrackTable, Tag("track")] | Annotated[FollowTable, Tag("follow")],
+    Discriminator(_task_kind),
+]
+
+
+class PerceptionTable(Table):
+    """How the target's pose is estimated, where the task needs it."""
+
+    cameras: tuple[str, ...] | None = None  # those that are looked through; all if absent
+    filter: Literal["pose", "rpy"] = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper
+    selection: Literal["information", "indexes"] = "information"
+    budget: Annotated[int, Field(ge=3)] = 16  # features measured a tick, over all cameras
+    noise_px: Positive = 0.5  # expected of a measured point; drawn where there are no images
+    outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches, without images
+    occlusion: bool = True  # whether arms and fixtures in the way are predicted
+    start_error_m: Annotated[float, Field(ge=0)] = 0.01  # how well the first pose is known
+    start_error_deg: Annotated[float, Field(ge=0)] = 2.0
 
 
 class OptimalTrackingTable(Table):
@@ -146,4 +228,37 @@ class OptimalTrackingTable(Table):
     singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
 
 
-Law = Annotated[OptimalTrackingTable, Field()]
+class PositionBasedTable(Table):
+    """The target's pose and a wanted relative pose make the hand's trajectory."""
+
+    kind: Literal["position_based"]
+    filter_hz: Positive = 3.0  # natural frequency of the second-order interpolating filter
+    damping: Positive = 1.0  # of that filter
+    feed_forward: bool = True  # the target's velocity goes through to the hand
+    prediction: bool = True  # the target's pose is predicted from the exposure to now
+    closed_loop_hz: Positive = 5.0  # how fast the joints make up for what they are behind
+    null_space: Annotated[float, Field(ge=0)] = 0.5  # 1/s, pull of spare joints to mid-range
+    singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping sets in at this singular value
+
+
+Law = Annotated[OptimalTrackingTable | PositionBasedTable, Field(discriminator="kind")]
+
+# What stands at a place in the file, or is the kind of what stands there.
+TABLES: dict[str, type[Table]] = {
+    "scene": SceneTable,
+    "arms": ArmTable,
+    "joints": JointMotion,
+    "poses": PoseMotion,
+    "cameras": CameraTable,
+    "target": TargetTable,
+    "still": StillMotion,
+    "line": LineMotion,
+    "circle": CircleMotion,
+    "step": StepMotion,
+    "random": RandomMotion,
+    "track": TrackTable,
+    "follow": FollowTable,
+    "perception": PerceptionTable,
+    "optimal_tracking": OptimalTrackingTable,
+    "position_based": PositionBasedTable,
+}

@@ -7,6 +7,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera, Frame, FrameTruth
+from vergence.cell.arm_motion import JointTrajectory, arm_trajectory
 from vergence.cell.cell import Cell
 from vergence.cell.motion import target_pose
 from vergence.cell.renderer import CameraRenderer, choose_renderer
@@ -22,8 +23,7 @@ class SimulatedDriver:
     """
 
     def __init__(self, cell: Cell, images: bool = True) -> None:
-        if images:
-            choose_renderer()
+        choose_renderer(needed=images)
         from vergence.cell.world import World
 
         self.cell = cell
@@ -46,6 +46,7 @@ class SimulatedDriver:
                 )
                 for number, (name, table) in enumerate(cell.cameras.items())
             }
+        self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self.world.move_target(self._pose(0.0))
         self.world.update()
         self._expose()
@@ -75,6 +76,13 @@ class SimulatedDriver:
         """The features in the target's frame, (M, 3), m."""
         return self._features
 
+    def look_for(self, features: FloatArray) -> None:
+        """Make points (M, 3) in the target's frame its features; the pictures start afresh."""
+        self._features = np.array(features, dtype=np.float64)
+        self._queue.clear()
+        self._exposed = dict.fromkeys(self._exposed, 0)
+        self._expose()
+
     def first_frame(self, camera: str) -> Frame:
         """Return what a camera sees at the start, without its latency."""
         return self._frame(camera)
@@ -86,7 +94,7 @@ class SimulatedDriver:
         target gives NaN.
         """
         T_world_camera = self.world.camera_pose(camera)
-        T_target_world = se3_inverse(self._pose(self.time))
+        T_target_world = se3_inverse(self.world.target_pose())
         points = np.full((len(points_px), 3), np.nan)
         for j, (x, y) in enumerate(self.cameras[camera].normalize(points_px)):
             ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
@@ -95,11 +103,7 @@ class SimulatedDriver:
             if self.world.belongs_to_target(body):
                 met = T_world_camera[:3, 3] + distance * ray
                 points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
-        self._features = points
-        self._queue.clear()
-        for name in self._exposed:
-            self._exposed[name] = 0
-        self._expose()
+        self.look_for(points)
         return points
 
     def read(self) -> Sample:
@@ -121,9 +125,15 @@ class SimulatedDriver:
         return Sample(self.time, joints, tuple(sorted(arrived, key=lambda frame: frame.time)))
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-        """Advance the world by one inner period."""
+        """Advance the world by one inner period.
+
+        Arms with a motion of their own follow that, whatever their set-points.
+        """
         for name, setpoint in setpoints.items():
-            self.world.command(name, setpoint.position, setpoint.velocity)
+            if name not in self._trajectories:
+                self.world.command(name, setpoint.position, setpoint.velocity)
+        for name, trajectory in self._trajectories.items():
+            self.world.command(name, *trajectory.at(self._tick))
         self._tick += 1
         self.world.move_target(self._pose(self.time))
         self.world.step()
@@ -133,6 +143,11 @@ class SimulatedDriver:
         """Free the graphics contexts."""
         for renderer in self._renderers.values():
             renderer.close()
+
+    def _own_motion(self, name: str) -> JointTrajectory:
+        carries = self.cell.target.carried_by == name
+        arm = self.world.arm_to_target() if carries else self.world.arm_to_body(name)
+        return arm_trajectory(self.cell, name, arm, self.world.joint_position(name))
 
     def _expose(self) -> None:
         fresh = False
@@ -157,7 +172,7 @@ class SimulatedDriver:
         return Frame(camera, self.time, image, joints, self._truth(camera))
 
     def _truth(self, camera: str) -> FrameTruth:
-        T_world_target = self._pose(self.time)
+        T_world_target = self.world.target_pose()
         T_world_camera = self.world.camera_pose(camera)
         T_camera_target = se3_inverse(T_world_camera) @ T_world_target
         points = transform_points(T_camera_target, self._features)
@@ -168,4 +183,8 @@ class SimulatedDriver:
         points_px[in_front] = intrinsics.project(points[in_front])
         visible = in_front.copy()
         visible[in_front] = intrinsics.contains(points_px[in_front])
+        in_sight = np.flatnonzero(visible)
+        if len(in_sight):
+            points_world = transform_points(T_world_target, self._features[in_sight])
+            visible[in_sight] = self.world.sees(camera, points_world)
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)

@@ -1,23 +1,20 @@
 """The cell as a MuJoCo model: arms with servos, cameras with lenses, the target on rails."""
 
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
-from vergence.camera import Camera
+from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
+from vergence.cell.build import FROM_MUJOCO_CAMERA, assemble, intrinsics, start_position
 from vergence.cell.cell import Cell
 from vergence.cell.motion import placement_pose
-from vergence.cell.schema import ArmTable, CameraTable, Placement
-from vergence.errors import InputError, nearest
+from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion
 from vergence.robot import Arm
 
-_FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
-_ROOM = Path(__file__).with_name("scene.xml")
 _SERVO_DAMPING = 1.0  # critical
+_SKIN_M = 0.003  # how deep under a surface a feature may lie and still be seen
 
 
 class World:
@@ -32,19 +29,23 @@ class World:
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
-        spec = _assemble(cell)
+        spec = assemble(cell)
         try:
             self.model: Any = spec.compile()
         except ValueError as error:
-            raise InputError(str(cell.path), "", str(error), "models that MuJoCo compiles") from None
+            raise InputError(
+                str(cell.path), "", str(error), "models that MuJoCo compiles"
+            ) from None
         self.data: Any = mujoco.MjData(self.model)
-        self.cameras = {name: _intrinsics(table) for name, table in cell.cameras.items()}
+        self.cameras = {name: intrinsics(table) for name, table in cell.cameras.items()}
         self.arms = {name: self._arm(name) for name in cell.arms}
         self._joints = {name: self._joint_ids(name) for name in cell.arms}
         self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
         self._qvel = {n: self.model.jnt_dofadr[ids] for n, ids in self._joints.items()}
         self._actuators = {name: self._actuator_ids(name) for name in cell.arms}
-        self._target = int(self.model.body("target").mocapid[0])
+        self._target = int(self.model.body("target").id)
+        self._rail = int(self.model.body("target").mocapid[0])  # -1 if an arm carries it
+        self._target_bodies = _descendants(self.model, self._target)
         self._camera_ids = {name: self.model.camera(name).id for name in cell.cameras}
         self._place_at_start()
         self._lag = {name: self._tune_servos(name) for name in cell.arms}
@@ -62,11 +63,16 @@ class World:
         """Return an arm's joint velocities (n,), rad/s or m/s."""
         return frozen(self.data.qvel[self._qvel[arm]])
 
+    def joint_addresses(self, arm: str) -> IntArray:
+        """Return where an arm's joints stand in MuJoCo's qpos, (n,)."""
+        addresses: IntArray = self._qpos[arm]
+        return addresses
+
     def camera_pose(self, camera: str) -> FloatArray:
         """Return T_world_camera (4, 4) in OpenCV's convention."""
         number = self._camera_ids[camera]
         T = np.eye(4)
-        T[:3, :3] = self.data.cam_xmat[number].reshape(3, 3) @ _FROM_MUJOCO_CAMERA
+        T[:3, :3] = self.data.cam_xmat[number].reshape(3, 3) @ FROM_MUJOCO_CAMERA
         T[:3, 3] = self.data.cam_xpos[number]
         return T
 
@@ -74,13 +80,28 @@ class World:
         """Return the arm that carries a camera, with the camera as its tip."""
         name = self.cell.cameras[camera].arm
         if name is None:
-            raise InputError("cell", f"cameras.{camera}", "a fixed camera", "one that an arm carries")
+            raise InputError(
+                "cell", f"cameras.{camera}", "a fixed camera", "one that an arm carries"
+            )
         return self._arm(name, camera)
 
+    def target_pose(self) -> FloatArray:
+        """Return T_world_target (4, 4), as of the last `update`."""
+        return self._body_pose(self._target)
+
+    def last_body_pose(self, arm: str) -> FloatArray:
+        """Return T_world_body (4, 4) of an arm's last body, as of the last `update`."""
+        return self._body_pose(self.model.body(f"{arm}/{self.cell.arms[arm].body}").id)
+
     def move_target(self, T_world_target: FloatArray) -> None:
-        """Put the target somewhere; it takes effect with the next step or `update`."""
-        self.data.mocap_pos[self._target] = T_world_target[:3, 3]
-        self.data.mocap_quat[self._target] = matrix_to_quaternion(
+        """Put the target somewhere; it takes effect with the next step or `update`.
+
+        A target that an arm carries stays in its hand.
+        """
+        if self._rail < 0:
+            return
+        self.data.mocap_pos[self._rail] = T_world_target[:3, 3]
+        self.data.mocap_quat[self._rail] = matrix_to_quaternion(
             np.ascontiguousarray(T_world_target[:3, :3])
         )
 
@@ -105,14 +126,39 @@ class World:
         )
         return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
 
+    def sees(self, camera: str, points: FloatArray) -> BoolArray:
+        """Tell which points (N, 3) in the world no surface hides from a camera, (N,)."""
+        eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
+        return ~hidden(self.model, self.data, eye, points)
+
+    def _body_pose(self, body: int) -> FloatArray:
+        T = np.eye(4)
+        T[:3, :3] = self.data.xmat[body].reshape(3, 3)
+        T[:3, 3] = self.data.xpos[body]
+        return T
+
     def belongs_to_target(self, body: int) -> bool:
         """Whether a body is the target or a part of it."""
-        return bool(body > 0 and self.model.body_rootid[body] == self.model.body("target").id)
+        return body in self._target_bodies
+
+    def arm_to_body(self, name: str, body: str | None = None) -> Arm:
+        """Return an arm with one of its bodies as its tip, its last one if none is named."""
+        table = self.cell.arms[name]
+        return self._arm_to(name, f"{name}/{body or table.body}", "body")
+
+    def arm_to_target(self) -> Arm:
+        """Return the arm that carries the target, with the target as its tip."""
+        assert self.cell.target.carried_by is not None
+        return self._arm_to(self.cell.target.carried_by, "target", "body")
 
     def _arm(self, name: str, camera: str | None = None) -> Arm:
-        table = self.cell.arms[name]
         carried = [c for c, t in self.cell.cameras.items() if t.arm == name]
-        tip, kind = (camera or carried[0], "camera") if carried else (f"{name}/{table.body}", "body")
+        if not carried:
+            return self.arm_to_body(name)
+        return self._arm_to(name, camera or carried[0], "camera")
+
+    def _arm_to(self, name: str, tip: str, kind: str) -> Arm:
+        table = self.cell.arms[name]
         arm = Arm.from_mujoco(
             self.model,
             tip,
@@ -121,9 +167,7 @@ class World:
             kind,
         )
         names = tuple(joint.removeprefix(f"{name}/") for joint in arm.names)
-        return Arm(
-            names, arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max
-        )
+        return Arm(names, arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)
 
     def _joint_ids(self, arm: str) -> Any:
         return np.array([self.model.joint(f"{arm}/{j}").id for j in self.arms[arm].names])
@@ -132,7 +176,7 @@ class World:
         return np.array([self.model.actuator(f"{arm}/{j}").id for j in self.arms[arm].names])
 
     def _place_at_start(self) -> None:
-        for name, table in self.cell.arms.items():
+        for name in self.cell.arms:
             start = start_position(self.cell, name, self.arms[name])
             self.data.qpos[self._qpos[name]] = start
             self.data.ctrl[self._actuators[name]] = start
@@ -154,132 +198,28 @@ class World:
         return ratio
 
 
-def start_position(cell: Cell, name: str, arm: Arm) -> FloatArray:
-    """Return an arm's joint positions at the start (n,), rad or m.
+def hidden(
+    model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None
+) -> BoolArray:
+    """Tell which points (N, 3) a surface hides from an eye, (N,).
 
-    Raises:
-        InputError: if their number is wrong or one is outside its limits.
+    A point counts as seen up to a few millimetres inside a surface, so that corners do.
     """
-    given, key = cell.arms[name].start_deg, f"arms.{name}.start_deg"
-    if len(given) != arm.joint_count:
-        raise InputError(
-            str(cell.path), key, f"{len(given)} values", f"{arm.joint_count}: {', '.join(arm.names)}"
-        )
-    unit = np.where(arm.chain.sliding, 1.0, np.pi / 180)
-    start = np.array(given) * unit
-    for i, joint in enumerate(arm.names):
-        if not arm.q_min[i] <= start[i] <= arm.q_max[i]:
-            low, high = arm.q_min[i] / unit[i], arm.q_max[i] / unit[i]
-            raise InputError(
-                str(cell.path), f"{key}[{i}]", given[i], f"{joint} between {low:.6g} and {high:.6g}"
-            )
-    return frozen(start)
+    rays = points - eye
+    distance = np.linalg.norm(rays, axis=1)
+    directions = np.ascontiguousarray(rays / distance[:, None]).ravel()
+    met, geoms = np.empty(len(rays)), np.empty(len(rays), dtype=np.int32)
+    reach = float(distance.max(initial=0.0)) + 1.0
+    mujoco.mj_multiRay(
+        model, data, eye, directions, groups, True, -1, geoms, met, None, len(rays), reach
+    )
+    result: BoolArray = (geoms >= 0) & (met < distance - _SKIN_M)
+    return result
 
 
-def _assemble(cell: Cell) -> Any:
-    spec = mujoco.MjSpec()
-    spec.option.timestep = 1.0 / cell.inner_rate_hz
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.visual.quality.offsamples = 0
-    spec.visual.map.znear = 0.01
-    spec.stat.extent = 1.0
-    spec.visual.headlight.active = 0
-    width = max(table.resolution[0] for table in cell.cameras.values())
-    height = max(table.resolution[1] for table in cell.cameras.values())
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-    room = cell.resolve(cell.scene.model) if cell.scene.model else _ROOM
-    spec.attach(_read(cell, "scene.model", room), frame=spec.worldbody.add_frame(), prefix="scene/")
-    for light in spec.lights:
-        light.diffuse = light.diffuse * cell.scene.light
-        light.ambient = light.ambient * cell.scene.light
-    for name, arm in cell.arms.items():
-        _add_arm(spec, cell, name, arm)
-    for name, camera in cell.cameras.items():
-        _add_camera(spec, cell, name, camera)
-    rail = spec.worldbody.add_body(name="target", mocap=True)
-    target = _read(cell, "target.model", cell.resolve(cell.target.model))
-    spec.attach(target, frame=rail.add_frame(), prefix="target/")
-    return spec
-
-
-def _read(cell: Cell, key: str, path: Path) -> Any:
-    if not path.is_file():
-        raise InputError(str(cell.path), key, path, "an MJCF or URDF file that exists")
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise InputError(str(cell.path), key, f"{path}: {error}", "a model MuJoCo reads") from None
-
-
-def _place(element: Any, placement: Placement, camera: bool = False) -> None:
-    T = placement_pose(placement)
-    element.pos = T[:3, 3]
-    R = T[:3, :3] @ _FROM_MUJOCO_CAMERA if camera else T[:3, :3]
-    element.quat = matrix_to_quaternion(np.ascontiguousarray(R))
-
-
-def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
-    """Attach an arm and give every joint towards its last body a position servo.
-
-    The arm's weight is compensated, as a robot's own controller does.
-    """
-    model = _read(cell, f"arms.{name}.model", cell.resolve(table.model))
-    for key in list(model.keys):
-        model.delete(key)
-    bodies = {body.name: body for body in model.bodies}
-    if table.body not in bodies:
-        allowed = nearest(table.body, (b for b in bodies if b and b != "world"))
-        raise InputError(str(cell.path), f"arms.{name}.body", table.body, allowed)
-    joints, body = [], bodies[table.body]
-    while body is not None and body.name != "world":
-        joints[:0] = [joint.name for joint in body.joints]
-        body = body.parent
-    for actuator in list(model.actuators):
-        if actuator.target in joints:
-            model.delete(actuator)
-    for body in model.bodies:
-        body.gravcomp = 1.0
-    frame = spec.worldbody.add_frame()
-    _place(frame, table)
-    spec.attach(model, frame=frame, prefix=f"{name}/")
-    for joint in joints:
-        servo = spec.add_actuator(
-            name=f"{name}/{joint}",
-            target=f"{name}/{joint}",
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        )
-        servo.set_to_position(kp=1.0, kv=1.0)
-
-
-def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
-    camera = _intrinsics(table)
-    body = spec.worldbody
-    if table.arm is not None:
-        wanted = table.body or cell.arms[table.arm].body
-        body = spec.body(f"{table.arm}/{wanted}")
-        if body is None:
-            known = (b.name.removeprefix(f"{table.arm}/") for b in spec.bodies)
-            raise InputError(
-                str(cell.path), f"cameras.{name}.body", wanted, nearest(wanted, known)
-            )
-    element = body.add_camera(name=name)
-    _place(element, table, camera=True)
-    element.resolution = [camera.width, camera.height]
-    # MuJoCo wants a sensor of some size: one metre a pixel keeps its numbers equal to ours.
-    element.sensor_size = [camera.width, camera.height]
-    element.focal_pixel = [camera.fx, camera.fy]
-    element.principal_pixel = [
-        camera.cx - (camera.width - 1) / 2,
-        camera.cy - (camera.height - 1) / 2,
-    ]
-
-
-def _intrinsics(table: CameraTable) -> Camera:
-    width, height = table.resolution
-    if table.focal_px is not None:
-        fx, fy = table.focal_px
-    else:
-        assert table.focal_mm is not None and table.pixel_um is not None
-        fx, fy = (table.focal_mm * 1e3 / size for size in table.pixel_um)
-    cx, cy = table.principal_px or ((width - 1) / 2, (height - 1) / 2)
-    return Camera(width, height, fx, fy, cx, cy)
+def _descendants(model: Any, root: int) -> frozenset[int]:
+    found = {root}
+    for body in range(root + 1, model.nbody):  # parents come before their children
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return frozenset(found)

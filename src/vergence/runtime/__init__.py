@@ -1,9 +1,10 @@
 """Runtime: the loop, what it asks of a driver, and the recording of a run."""
 
+from vergence.runtime.assembly import Parts, assemble_parts, build_law
 from vergence.runtime.driver import Driver
 from vergence.runtime.loop import Loop, Patience
 from vergence.runtime.recording import Listener, Recorder, Recording, TickRecord
-from vergence.runtime.session import RunResult, build_law, run_cell
+from vergence.runtime.session import RunResult, run_cell
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.summary import Summary
 
@@ -11,6 +12,7 @@ __all__ = [
     "Driver",
     "Listener",
     "Loop",
+    "Parts",
     "Patience",
     "Perception",
     "Planner",
@@ -19,6 +21,7 @@ __all__ = [
     "RunResult",
     "Summary",
     "TickRecord",
+    "assemble_parts",
     "build_law",
     "run_cell",
 ]

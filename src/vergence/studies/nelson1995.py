@@ -9,6 +9,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell, load_cell
+from vergence.cell.schema import OptimalTrackingTable
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime import run_cell
 from vergence.studies import nelson1995_figures as figures
@@ -70,7 +71,9 @@ def reproduce(out: Path, quick: bool, progress: Progress = lambda what, share: N
     trials = {}
     for i, (strategy, law) in enumerate(STRATEGIES.items()):
         for j, sign in enumerate((1, -1)):
-            progress(f"{strategy.replace('_', ' ')}, {'+x' if sign > 0 else '-x'}", (2 * i + j) / 20)
+            progress(
+                f"{strategy.replace('_', ' ')}, {'+x' if sign > 0 else '-x'}", (2 * i + j) / 20
+            )
             trials[strategy, sign] = run(moving(cell.replace(law=law), sign), quick)
     checks = [
         *_two_axis(trials),
@@ -181,7 +184,9 @@ def _avoidance(trials: Trials, quick: bool) -> list[Check]:
             "",
             within(ratio, 0.25),
         ),
-        Check("avoidance.min_penalty", "never near zero: at least 0.2", penalty, "", penalty >= 0.2),
+        Check(
+            "avoidance.min_penalty", "never near zero: at least 0.2", penalty, "", penalty >= 0.2
+        ),
         Check(
             "avoidance.final_error_px",
             "goes to zero when the object stops: at most 0.5",
@@ -208,9 +213,12 @@ def _stability(cell: Cell, quick: bool, progress: Progress) -> Check:
         target={"motion": {"kind": "step", "offset_m": [0.014, 0.0, 0.0], "time_s": 0.5}},
     )
 
+    law = cell.law
+    assert isinstance(law, OptimalTrackingTable)
+
     def stable(factor: float) -> bool:
         progress(f"stability at {factor:.2f} Q", 0.45)
-        trial = run(base.replace(law={"Q": cell.law.Q * factor}), quick)
+        trial = run(base.replace(law={"Q": law.Q * factor}), quick)
         if not trial.outcome.succeeded:
             return False
         time, error = trial.trace["time"], trial.trace["error_px"]
@@ -267,5 +275,3 @@ def _speed(cell: Cell, quick: bool, progress: Progress) -> Check:
 def _kept(trial: Trial, error_px: float | None = WINDOW_PX) -> bool:
     close = error_px is None or trial.summary["max_error_px"] <= error_px
     return trial.outcome.succeeded and close
-
-

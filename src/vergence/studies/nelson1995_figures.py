@@ -8,6 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
+from vergence.cell.schema import OptimalTrackingTable
 from vergence.drawing import COLORS, curve, figure, legend, save
 from vergence.robot import Arm, joint_limit_penalty, manipulability
 from vergence.studies.check import Figure
@@ -23,14 +24,13 @@ _LABELS = {
 }
 
 
-def draw(
-    out: Path, cell: Cell, trials: "Mapping[tuple[str, int], Trial]"
-) -> tuple[Figure, ...]:
+def draw(out: Path, cell: Cell, trials: "Mapping[tuple[str, int], Trial]") -> tuple[Figure, ...]:
     """Write every figure into a folder; return them in the paper's order."""
     out.mkdir(parents=True, exist_ok=True)
     driver = SimulatedDriver(cell, images=False)
     arm = driver.world.arm_to_camera(cell.task.camera)
     start = driver.read().joints[cell.task.arm].position
+    assert isinstance(cell.law, OptimalTrackingTable)
     two = [trials["two_axis", sign] for sign in (-1, 1)]
     avoiding = [trials["avoidance", sign] for sign in (-1, 1)]
     drawn = {
@@ -54,9 +54,7 @@ def draw(
             "Figure 12: manipulability, four axes with avoidance.",
         ),
         "figure_13": (
-            _against(
-                avoiding, "estimated_m", "penalty", "estimated object translation x (m)", "P"
-            ),
+            _against(avoiding, "estimated_m", "penalty", "estimated object translation x (m)", "P"),
             "Figure 13: penalty, four axes with avoidance.",
         ),
         "figure_14": (

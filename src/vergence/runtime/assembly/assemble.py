@@ -1,0 +1,19 @@
+"""From a cell to the parts of its loop."""
+
+from vergence.cell import Cell, SimulatedDriver
+from vergence.cell.schema import TrackTable
+from vergence.runtime.assembly.parts import Parts
+from vergence.runtime.assembly.track import track_parts
+
+
+def assemble_parts(cell: Cell, driver: SimulatedDriver, images: bool) -> Parts:
+    """Choose perception, planner and law by the kind of the task and the kind of the law.
+
+    Raises:
+        InputError: if the cell cannot be run as it is written.
+    """
+    match cell.task:
+        case TrackTable():
+            return track_parts(cell, cell.task, driver, images)
+        case _:
+            raise AssertionError(cell.task.kind)

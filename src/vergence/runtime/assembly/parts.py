@@ -1,0 +1,14 @@
+"""What the loop is put together from."""
+
+from typing import NamedTuple
+
+from vergence.control import Law
+from vergence.runtime.stages import Perception, Planner
+
+
+class Parts(NamedTuple):
+    """The stages of one run."""
+
+    perception: Perception
+    planner: Planner
+    law: Law

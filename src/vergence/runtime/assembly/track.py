@@ -1,0 +1,103 @@
+"""The task `track`: features kept where they are wanted in one camera's image."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.cell import Cell, SimulatedDriver
+from vergence.cell.schema import TrackTable
+from vergence.errors import InputError
+from vergence.estimation.exact_points import ExactPoints
+from vergence.estimation.tracked_points import TrackedPoints
+from vergence.planning import FixedReference, Reference
+from vergence.runtime.assembly.laws import build_law
+from vergence.runtime.assembly.parts import Parts
+from vergence.runtime.stages import Perception
+
+
+def track_parts(cell: Cell, task: TrackTable, driver: SimulatedDriver, images: bool) -> Parts:
+    """Put together what tracks features in the image."""
+    points_px, perception = _look(cell, task, driver, images)
+    desired = _desired_points(cell, task, driver, points_px)
+    planner = FixedReference(Reference(0.0, desired))
+    return Parts(perception, planner, build_law(cell, driver))
+
+
+def _look(
+    cell: Cell, task: TrackTable, driver: SimulatedDriver, images: bool
+) -> tuple[FloatArray, Perception]:
+    """Find the features in the first picture; return where they are and what follows them."""
+    name = task.camera
+    frame = driver.first_frame(name)
+    if cell.target.features is None:
+        points_px = _pick(cell, task, driver)
+        driver.anchor(name, points_px)
+        frame = driver.first_frame(name)
+    assert frame.truth is not None
+    if not frame.truth.visible.all():
+        hidden = ", ".join(str(j) for j in np.flatnonzero(~frame.truth.visible))
+        raise InputError(
+            str(cell.path),
+            "target",
+            f"at the start camera {name} does not see feature {hidden} of it",
+            "a start from which the camera sees every feature",
+        )
+    points_px = frame.truth.points_px
+    if not images:
+        noise = np.random.default_rng([cell.seed, 3])
+        return points_px, ExactPoints(name, rng=noise)
+    from vergence.vision import SsdTracker
+
+    assert frame.image is not None
+    return points_px, TrackedPoints(name, SsdTracker(frame.image, points_px))
+
+
+def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
+    """Choose features on the target by themselves: in the picture, or its middle without one."""
+    name, count = task.camera, task.feature_count
+    image = driver.first_frame(name).image
+    camera = driver.cameras[name]
+    if image is None:
+        return _grid(camera.width, camera.height, count)
+    from vergence.vision import pick_features
+
+    picked = pick_features(image, 4 * count)
+    on_target = ~np.isnan(driver.anchor(name, picked)).any(axis=1)
+    points: FloatArray = picked[on_target]
+    if len(points) < count:
+        raise InputError(
+            str(cell.path),
+            "task.feature_count",
+            count,
+            f"at most {len(points)}: no more good features of the target are in the first picture",
+        )
+    return points[:count]
+
+
+def _grid(width: int, height: int, count: int) -> FloatArray:
+    """Return points spread over the middle of the picture; one alone in its centre."""
+    side = int(np.ceil(np.sqrt(count)))
+    share = (np.arange(side) + 0.5) / side
+    u, v = np.meshgrid(width * (0.25 + 0.5 * share) - 0.5, height * (0.25 + 0.5 * share) - 0.5)
+    return np.column_stack((u.ravel(), v.ravel()))[:count]
+
+
+def _desired_points(
+    cell: Cell, task: TrackTable, driver: SimulatedDriver, points_px: FloatArray
+) -> FloatArray:
+    """Return s* (M, 2), as the task wants it."""
+    wanted = task.desired
+    if wanted == "initial":
+        return points_px
+    camera = driver.cameras[task.camera]
+    if wanted == "centred":
+        centred: FloatArray = points_px - points_px.mean(axis=0) + (camera.cx, camera.cy)
+        return centred
+    desired = np.array(wanted, dtype=np.float64)
+    if desired.shape != points_px.shape:
+        raise InputError(
+            str(cell.path), "task.desired", f"{len(desired)} points", f"{len(points_px)} points"
+        )
+    if not camera.contains(desired).all():
+        allowed = f"points inside {camera.width} x {camera.height}"
+        raise InputError(str(cell.path), "task.desired", wanted, allowed)
+    return desired
