@@ -17,7 +17,7 @@ from vergence.app.figures import (
     twist_figure,
 )
 from vergence.app.figures.arm import normalized
-from vergence.runtime.recording import ArmInfo, Recording
+from vergence.runtime.recording import ArmInfo, Event, Recording
 
 FIGURES = ["error", "paths", "joints", "twist", "measures", "motion"]
 
@@ -92,6 +92,13 @@ def test_events_are_marked_in_every_panel(recording: Recording) -> None:
     after = [len(axes.lines) for axes in made.axes]
     assert after == [count + len(recording.events) for count in before]
     assert [text.get_text() for text in made.axes[0].texts] == ["1", "2"]
+
+
+def test_events_at_one_time_share_a_number(recording: Recording) -> None:
+    made = figure("twist", recording)
+    events = [Event(time, "lost", "") for time in (1.0, 1.01, 1.02, 4.0)]
+    mark_events(made, events)
+    assert [text.get_text() for text in made.axes[0].texts] == ["1–3", "4"]
 
 
 def test_nothing_known_gives_no_figure(recording: Recording) -> None:

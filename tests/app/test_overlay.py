@@ -27,7 +27,9 @@ def drawn_centre(image: NDArray[np.uint8], canvas: NDArray[np.uint8], scale: int
 @pytest.mark.parametrize("scale", [1, 2, 3])
 @pytest.mark.parametrize("point", [(50.0, 40.0), (50.5, 40.25), (31.8, 22.3)])
 @pytest.mark.parametrize("kind", ["tracked", "lost", "desired", "true"])
-def test_a_mark_is_centred_on_its_point(scale: int, point: tuple[float, float], kind: str) -> None:
+def test_a_mark_is_centred_on_its_point_to_a_quarter_of_a_pixel(
+    scale: int, point: tuple[float, float], kind: str
+) -> None:
     at = np.array([point])
     what = {
         "tracked": marks(at),
@@ -36,7 +38,7 @@ def test_a_mark_is_centred_on_its_point(scale: int, point: tuple[float, float], 
         "true": marks(true_px=at),
     }[kind]
     centre = drawn_centre(GREY, draw(GREY, what, scale), scale)
-    np.testing.assert_allclose(centre, point, atol=0.12)
+    np.testing.assert_allclose(centre, point, atol=0.25)
 
 
 def test_unknown_points_are_not_drawn() -> None:

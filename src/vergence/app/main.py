@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
+from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
 
 app = typer.Typer(
@@ -31,6 +32,16 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
   vergence reproduce nelson1995 --quick                   a paper's experiments, checked
   vergence --help                 all commands
 """
+
+
+def _cell_names() -> list[str]:
+    """Return the built-in cells' names, for completion: from their folders, which is quick."""
+    cells = Path(__file__).parents[1] / "cells"
+    return sorted(folder.name for folder in cells.iterdir() if (folder / "cell.toml").is_file())
+
+
+def _papers() -> list[str]:
+    return list(PAPERS)
 
 
 def main() -> None:
@@ -59,12 +70,20 @@ def start(
 
 @app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
 def run(
-    cell: Annotated[str, typer.Argument(help="Name of a built-in cell, a cell file or folder.")],
+    cell: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a built-in cell, a cell file or folder.", autocompletion=_cell_names
+        ),
+    ],
     out: Out = None,
     seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
     images: Annotated[
         bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
     ] = True,
+    image_every: Annotated[
+        int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
+    ] = 2,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
@@ -74,7 +93,7 @@ def run(
     """Run a work cell: progress, a summary, and a folder with recording and report."""
     from vergence.app.run import run as command
 
-    raise typer.Exit(command(cell, out, seed, images, settings or (), as_json))
+    raise typer.Exit(command(cell, out, seed, images, image_every, settings or (), as_json))
 
 
 @app.command(epilog="Example: vergence report runs/puma560-20250131-120000")
@@ -94,7 +113,9 @@ def report(
 
 @app.command(epilog="Example: vergence reproduce nelson1995 --quick")
 def reproduce(
-    paper: Annotated[str, typer.Argument(help="Which paper: nelson1995.")],
+    paper: Annotated[
+        str, typer.Argument(help=f"Which paper: {', '.join(PAPERS)}.", autocompletion=_papers)
+    ],
     quick: Annotated[
         bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
     ] = False,

@@ -1,6 +1,7 @@
 """Draws what was tracked, wanted and true into a camera's picture.
 
-Pixel centres are at integers, here as everywhere; marks are placed to a sixteenth of a pixel.
+Pixel centres are at integers, here as everywhere; marks are placed to better than a
+quarter of a pixel, which is what OpenCV's lines allow.
 """
 
 from dataclasses import dataclass
@@ -12,14 +13,15 @@ from numpy.typing import NDArray
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.runtime.recording import CameraTrace
 
-# blue, green, red: Okabe and Ito's palette
-FOUND = (115, 158, 0)
-LOST = (0, 94, 213)
+# Blue, green, red: Okabe and Ito's hues, brightened to stand out from grey textures.
+FOUND = (150, 230, 20)
+LOST = (10, 110, 255)
 DESIRED = (66, 228, 240)
-TRUE = (233, 180, 86)
-_OUTLINE = (0, 0, 0)
+TRUE = (255, 200, 100)
+_OUTLINE = (20, 20, 20)
 _SHIFT = 4  # fractional bits of a place
-_RADIUS_PX = 6.0
+_RADIUS_PX = 8.0
+_THICK, _THIN = 4, 2  # px, of outline and ink
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,7 @@ def draw(image: ImageArray, marks: Marks, scale: int = 1) -> NDArray[np.uint8]:
     for point in _known(marks.desired_px, scale):
         _cross(canvas, point, DESIRED, upright=True)
     for point in _known(marks.true_px, scale):
-        _circle(canvas, point, TRUE, 2.0)
+        _circle(canvas, point, TRUE, 2.5)
     for point in _known(marks.tracked_px[marks.found], scale):
         _circle(canvas, point, FOUND, _RADIUS_PX)
     for point in _known(marks.tracked_px[~marks.found], scale):
@@ -79,7 +81,7 @@ def _circle(
     import cv2
 
     place, radius = _fixed(center), round(r * 2**_SHIFT)
-    for ink, thickness in ((_OUTLINE, 3), (color, 1)):
+    for ink, thickness in ((_OUTLINE, _THICK), (color, _THIN)):
         cv2.circle(canvas, place, radius, ink, thickness, cv2.LINE_AA, _SHIFT)
 
 
@@ -91,7 +93,7 @@ def _cross(
     arm = np.array([_RADIUS_PX + 1.0, 0.0])
     turned = arm if upright else np.array([1.0, 1.0]) * _RADIUS_PX / np.sqrt(2)
     across = np.array([-turned[1], turned[0]])
-    for ink, thickness in ((_OUTLINE, 3), (color, 1)):
+    for ink, thickness in ((_OUTLINE, _THICK), (color, _THIN)):
         for half in (turned, across):
             ends = _fixed(center - half), _fixed(center + half)
             cv2.line(canvas, *ends, ink, thickness, cv2.LINE_AA, _SHIFT)

@@ -13,6 +13,7 @@ from vergence.runtime.recording import RunInfo, TickRecord
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
+    from rich.status import Status
 
 _PERIOD = 0.1  # s between two looks at the terminal
 
@@ -31,6 +32,13 @@ def bar(words: str) -> "Progress":
         transient=True,
         disable=not sys.stderr.isatty(),
     )
+
+
+def working(words: str) -> "Status":
+    """Return a spinner on stderr that shows nothing unless stderr is a terminal."""
+    from rich.console import Console
+
+    return Console(stderr=True, quiet=not sys.stderr.isatty()).status(words)
 
 
 class RunProgress:

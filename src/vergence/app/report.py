@@ -21,13 +21,13 @@ from vergence.runtime.recording import Recording
 REPORT = "report.html"
 
 _MARKS = """<p class="marks">
-<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="5" fill="none" stroke="#009e73"
+<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="5" fill="none" stroke="#14e696"
 stroke-width="2"/></svg>tracked</span>
-<span><svg viewBox="0 0 16 16"><path d="M4 4l8 8M12 4l-8 8" stroke="#d55e00"
+<span><svg viewBox="0 0 16 16"><path d="M4 4l8 8M12 4l-8 8" stroke="#ff6e0a"
 stroke-width="2"/></svg>not found</span>
 <span><svg viewBox="0 0 16 16"><path d="M8 2v12M2 8h12" stroke="#f0e442"
 stroke-width="2"/></svg>desired</span>
-<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="2.5" fill="none" stroke="#56b4e9"
+<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="2.5" fill="none" stroke="#64c8ff"
 stroke-width="2"/></svg>true</span>
 </p>"""
 
@@ -137,8 +137,8 @@ def _figure(recording: Recording, panels: Panels | None, caption: str) -> str:
     """Return a figure over time, the events marked in it."""
     if panels is None:
         return ""
-    mark_events(panels, recording.events)
     panels.axes[0].set_xlim(0.0, max(recording.duration, 1e-9))
+    mark_events(panels, recording.events)
     return markup.figure(panels, caption)
 
 

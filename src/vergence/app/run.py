@@ -18,18 +18,21 @@ def run(
     out: Path | None,
     seed: int | None,
     images: bool,
+    image_every: int,
     settings: Sequence[str],
     as_json: bool,
 ) -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
+    from vergence.app.progress import working
     from vergence.app.report import write_report
     from vergence.cell import load_cell
     from vergence.runtime import Recorder
 
     loaded = load_cell(cell, overrides(settings), seed)
-    recorder = Recorder(out or new_folder(loaded.name))
+    recorder = Recorder(out or new_folder(loaded.name), image_every)
     result = _recorded(loaded, recorder, images)
-    report = write_report(recorder.folder)
+    with working("writing the report"):
+        report = write_report(recorder.folder)
     if as_json:
         emit(_answer(loaded.name, result, recorder.folder, report))
     else:

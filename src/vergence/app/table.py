@@ -61,7 +61,7 @@ def _measure_rows(trace: ArmTrace) -> Iterator[Row]:
         yield Row("least manipulability", f"{ratio:.2f}", "", "w′ as a share of the start's")
     penalty = trace.penalty[np.isfinite(trace.penalty)]
     if len(penalty):
-        yield Row("least penalty", f"{penalty.min():.2f}", "", "1 far from joint limits, 0 at one")
+        yield Row("least penalty", f"{penalty.min():.2f}", "", "P: 1 far from limits, 0 at one")
 
 
 def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:

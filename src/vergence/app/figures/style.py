@@ -73,12 +73,13 @@ def legend(axes: "Axes") -> None:
 
 def mark_events(on: Panels, events: Sequence[Event]) -> None:
     """Draw a numbered line at every event, in the order of the report's list of events."""
-    for number, event in enumerate(events, start=1):
+    start, end = on.axes[0].get_xlim()
+    for numbers, time in _close_together([event.time for event in events], 0.02 * (end - start)):
         for axes in on.axes:
-            axes.axvline(event.time, color="#444", linewidth=0.9, linestyle=(0, (5, 3)), zorder=2.1)
+            axes.axvline(time, color="#444", linewidth=0.9, linestyle=(0, (5, 3)), zorder=2.1)
         on.axes[0].annotate(
-            str(number),
-            (event.time, 1.0),
+            f"{numbers[0]}–{numbers[-1]}" if len(numbers) > 1 else str(numbers[0]),
+            (time, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 2),
             textcoords="offset points",
@@ -86,6 +87,17 @@ def mark_events(on: Panels, events: Sequence[Event]) -> None:
             fontsize=7.5,
             color="#555",
         )
+
+
+def _close_together(times: Sequence[float], gap: float) -> list[tuple[list[int], float]]:
+    """Return the numbers of events that would be drawn over each other, and their first time."""
+    groups: list[tuple[list[int], float]] = []
+    for number, time in enumerate(times, start=1):
+        if groups and time - groups[-1][1] < gap:
+            groups[-1][0].append(number)
+        else:
+            groups.append(([number], time))
+    return groups
 
 
 def svg(figure: "Figure") -> bytes:
