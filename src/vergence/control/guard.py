@@ -17,7 +17,7 @@ class GuardedStep(NamedTuple):
     at_limit: BoolArray  # (n,) held back from a position limit it was driven against
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def guarded_step(
     position: FloatArray,
     velocity: FloatArray,
@@ -57,7 +57,7 @@ def guarded_step(
     return GuardedStep(new_position, new_velocity, at_limit)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stoppable_speed(room: float, a: float, dt: float) -> float:
     """Return the largest speed that braking with a stops within the room, in steps of dt."""
     if np.isinf(room):

@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import FloatArray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def resolve_twist(
     J_inverse: FloatArray, v_camera: FloatArray, rate_max: FloatArray
 ) -> tuple[FloatArray, float]:
@@ -22,8 +22,21 @@ def resolve_twist(
     Returns:
         The rates (n,) and the scale in (0, 1] they were slowed by.
     """
-    rates = J_inverse @ v_camera
+    rates = np.zeros(len(J_inverse))
+    for i in range(len(J_inverse)):
+        for j in range(len(v_camera)):
+            rates[i] += J_inverse[i, j] * v_camera[j]
+    return rates, slow_down(rates, rate_max)
+
+
+@njit(cache=True, error_model="numpy")
+def slow_down(rates: FloatArray, rate_max: FloatArray) -> float:
+    """Slow rates (n,), in place, as a whole until none exceeds its limit; return the scale."""
     scale = 1.0
     for i in range(len(rates)):
-        scale = min(scale, rate_max[i] / max(abs(rates[i]), 1e-300))
-    return rates * scale, scale
+        if abs(rates[i]) * scale > rate_max[i]:
+            scale = rate_max[i] / abs(rates[i])
+    if scale < 1.0:
+        for i in range(len(rates)):
+            rates[i] *= scale
+    return scale

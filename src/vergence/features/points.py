@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import FloatArray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArray:
     """Return the interaction matrix L of image points, (2M, 6): ṡ = L v_camera.
 
@@ -22,10 +22,10 @@ def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArr
     L = np.empty((2 * len(points), 6))
     for j in range(len(points)):
         x, y, inverse_depth = points[j, 0], points[j, 1], 1.0 / depth[j]
-        row = L[2 * j]
-        row[0], row[1], row[2] = -inverse_depth, 0.0, x * inverse_depth
-        row[3], row[4], row[5] = x * y, -(1.0 + x * x), y
-        row = L[2 * j + 1]
-        row[0], row[1], row[2] = 0.0, -inverse_depth, y * inverse_depth
-        row[3], row[4], row[5] = 1.0 + y * y, -x * y, -x
+        r = 2 * j
+        L[r, 0], L[r, 1], L[r, 2] = -inverse_depth, 0.0, x * inverse_depth
+        L[r, 3], L[r, 4], L[r, 5] = x * y, -(1.0 + x * x), y
+        r += 1
+        L[r, 0], L[r, 1], L[r, 2] = 0.0, -inverse_depth, y * inverse_depth
+        L[r, 3], L[r, 4], L[r, 5] = 1.0 + y * y, -x * y, -x
     return L

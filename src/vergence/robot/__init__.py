@@ -7,7 +7,6 @@ from vergence.robot.chain import (
     chain_state,
     forward_kinematics,
     jacobian,
-    to_tip_axes,
     world_jacobian,
 )
 from vergence.robot.manipulability import (
@@ -38,7 +37,6 @@ __all__ = [
     "manipulability",
     "per_joint_limit_penalty",
     "relative_manipulability",
-    "to_tip_axes",
     "transmissibility_measure",
     "world_jacobian",
     "yoshikawa_measure",

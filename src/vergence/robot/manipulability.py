@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.robot.chain import Chain, chain_state, to_tip_axes, world_jacobian
+from vergence.robot.chain import Chain, jacobian
+from vergence.robot.positive_definite import invert_spd, outer_square, times_six
 
 
 class Manipulability(NamedTuple):
@@ -50,7 +51,7 @@ def relative_manipulability(J: FloatArray, a: FloatArray, d: FloatArray) -> floa
     return float(max(np.linalg.det(J @ J.T), 0.0) ** (1 / m) / size ** (1 / n))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def joint_limit_penalty(
     q: FloatArray, q_min: FloatArray, q_max: FloatArray, k: float
 ) -> tuple[float, FloatArray]:
@@ -61,25 +62,26 @@ def joint_limit_penalty(
     without limits counts as one in the middle of its range, pᵢ = 1/4.
     """
     n = len(q)
-    factor, slope = np.empty(n), np.zeros(n)
     gradient = np.zeros(n)
+    product = 1.0
     for i in range(n):
         span = q_max[i] - q_min[i]
-        if np.isinf(span):
-            factor[i] = 0.25
+        if span == np.inf:
+            product *= 0.25
             continue
-        factor[i] = (q[i] - q_min[i]) * (q_max[i] - q[i]) / (span * span)
-        slope[i] = (q_max[i] + q_min[i] - 2.0 * q[i]) / (span * span)
-        if factor[i] <= 0.0:
+        below, above = q[i] - q_min[i], q_max[i] - q[i]
+        if below <= 0.0 or above <= 0.0:
+            gradient[:] = 0.0
             return 0.0, gradient
-    product = np.prod(factor)
+        gradient[i] = (above - below) / (below * above)  # (log pᵢ)'
+        product *= below * above / (span * span)
     rest = np.exp(-k * product)
     for i in range(n):
-        gradient[i] = rest * k * product * slope[i] / factor[i]
+        gradient[i] *= rest * k * product
     return 1.0 - rest, gradient
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def per_joint_limit_penalty(
     q: FloatArray, q_min: FloatArray, q_max: FloatArray, k: float
 ) -> tuple[float, FloatArray]:
@@ -107,51 +109,55 @@ def per_joint_limit_penalty(
     return P, gradient
 
 
-@njit(cache=True)
-def invert_spd(A: FloatArray) -> tuple[FloatArray, float]:
-    """Return the inverse and the determinant of a small symmetric positive definite matrix.
+class Posture(NamedTuple):
+    """An arm at one configuration: what the laws and measures build on."""
 
-    Cholesky, A = G Gᵀ; a pivot at rounding level is lifted to it, so the result is always finite.
+    J: FloatArray  # (6, n) of the tip, in its own frame: v_tip = J q̇
+    inverse: FloatArray  # (6, 6) (J Jᵀ)⁻¹
+    damped: FloatArray  # (6, 6) (J Jᵀ + λ² I)⁻¹; the inverse itself away from singularities
+    det_JJt: float  # det(J Jᵀ)
+    sigma: float  # smallest singular value of J, bounded from below: 1/√tr((J Jᵀ)⁻¹)
+
+
+@njit(cache=True, error_model="numpy")
+def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
+    """Return the arm's Jacobian at q (n,), with what its inverse and determinant need.
+
+    Where σ < damping, λ² = (damping - σ)²: the inverse stays bounded through a singularity.
     """
-    n = len(A)
-    G = np.zeros((n, n))
-    floor = 1e-15 * (np.trace(A) + 1e-300)
-    determinant = 1.0
-    for i in range(n):
-        for j in range(i + 1):
-            total = A[i, j]
-            for k in range(j):
-                total -= G[i, k] * G[j, k]
-            if i == j:
-                determinant *= max(total, 0.0)
-                G[i, i] = np.sqrt(max(total, floor))
-            else:
-                G[i, j] = total / G[j, j]
-    H = np.zeros((n, n))  # G⁻¹
-    for j in range(n):
-        H[j, j] = 1.0 / G[j, j]
-        for i in range(j + 1, n):
-            total = 0.0
-            for k in range(j, i):
-                total -= G[i, k] * H[k, j]
-            H[i, j] = total / G[i, i]
-    inverse = np.empty((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(i, n):
-                total += H[k, i] * H[k, j]
-            inverse[i, j] = inverse[j, i] = total
-    return inverse, determinant
+    J = jacobian(chain, q)
+    A = outer_square(J)
+    inverse, det_JJt = invert_spd(A)
+    trace = 0.0
+    for i in range(6):
+        trace += inverse[i, i]
+    sigma = 1.0 / np.sqrt(trace)
+    damped = inverse
+    if sigma < damping:
+        for i in range(6):
+            A[i, i] += (damping - sigma) ** 2
+        damped = invert_spd(A)[0]
+    return Posture(J, inverse, damped, det_JJt, sigma)
 
 
-@njit(cache=True)
-def determinant_gradient(
-    J: FloatArray, X: FloatArray, determinant: float
-) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def pseudo_inverse_transposed(inverse: FloatArray, J: FloatArray) -> FloatArray:
+    """Return X = (J Jᵀ)⁻¹ J (6, n), the transpose of J⁺."""
+    X = np.empty(J.shape)
+    for i in range(J.shape[1]):
+        for r in range(6):
+            total = 0.0
+            for c in range(6):
+                total += inverse[r, c] * J[c, i]
+            X[r, i] = total
+    return X
+
+
+@njit(cache=True, error_model="numpy")
+def determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) -> FloatArray:
     """Return ∂det(J Jᵀ)/∂q (n,), exactly, in O(n).
 
-    J (6, n) along world axes, X = (J Jᵀ)⁻¹ J. With Jᵥᵢ, J_ωᵢ the halves of column i,
+    J (6, n) along any axes, X = (J Jᵀ)⁻¹ J. With Jᵥᵢ, J_ωᵢ the halves of column i,
     ∂Jᵢ/∂qⱼ is (J_ωⱼ × Jᵥᵢ, J_ωⱼ × J_ωᵢ) for j < i and (J_ωᵢ × Jᵥⱼ, 0) for j ≥ i, so
     ∂det/∂qⱼ = 2 det [J_ωⱼ · Σ_{i>j} (Jᵥᵢ × Xᵥᵢ + J_ωᵢ × X_ωᵢ) + Jᵥⱼ · Σ_{i≤j} (Xᵥᵢ × J_ωᵢ)].
     """
@@ -174,20 +180,50 @@ def determinant_gradient(
     return gradient
 
 
-@njit(cache=True)
-def damped_inverse(
-    A: FloatArray, A_inverse: FloatArray, sigma: float, threshold: float
-) -> FloatArray:
-    """Return (A + λ² I)⁻¹ with λ² = threshold² (1 - σ/threshold)², or A⁻¹ where σ is above it."""
-    if sigma >= threshold:
-        return A_inverse
-    damped = A.copy()
-    for i in range(len(A)):
-        damped[i, i] += (threshold - sigma) ** 2
-    return invert_spd(damped)[0]
+@njit(cache=True, error_model="numpy")
+def limit_penalty(
+    q: FloatArray, q_min: FloatArray, q_max: FloatArray, k: float, per_joint: bool
+) -> tuple[float, FloatArray]:
+    """Return P(q) and its gradient (n,): (27), or its form joint by joint."""
+    if per_joint:
+        return per_joint_limit_penalty(q, q_min, q_max, k)
+    return joint_limit_penalty(q, q_min, q_max, k)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def measure_gradient(arm: Posture, P: float, gradient_P: FloatArray) -> FloatArray:
+    """Return ∂w'/∂q (n,) of w' = P det(J Jᵀ), exactly."""
+    X = pseudo_inverse_transposed(arm.inverse, arm.J)
+    gradient = determinant_gradient(arm.J, X, arm.det_JJt)
+    for i in range(len(gradient)):
+        gradient[i] = P * gradient[i] + gradient_P[i] * arm.det_JJt
+    return gradient
+
+
+@njit(cache=True, error_model="numpy")
+def camera_gradient(arm: Posture, gradient_q: FloatArray) -> FloatArray:
+    """Return ∂w'/∂x (6,) along the tip's own axes: (J⁺)ᵀ ∂w'/∂q = (J Jᵀ)⁻¹ J ∂w'/∂q."""
+    moved = np.zeros(6)
+    for i in range(len(gradient_q)):
+        for r in range(6):
+            moved[r] += arm.J[r, i] * gradient_q[i]
+    return times_six(arm.damped, moved)
+
+
+@njit(cache=True, error_model="numpy")
+def joint_rates(arm: Posture, v_tip: FloatArray) -> FloatArray:
+    """Return q̇ = J⁺ v_tip (n,), damped near singularities; v_tip (6,) in the tip's own frame."""
+    y = times_six(arm.damped, v_tip)
+    rates = np.empty(arm.J.shape[1])
+    for i in range(len(rates)):
+        total = 0.0
+        for r in range(6):
+            total += arm.J[r, i] * y[r]
+        rates[i] = total
+    return rates
+
+
+@njit(cache=True, error_model="numpy")
 def manipulability(
     chain: Chain,
     q: FloatArray,
@@ -208,26 +244,38 @@ def manipulability(
         per_joint: penalise each joint for itself instead of the product of (27).
         damping: smallest singular value of J below which its inverse is damped.
     """
-    state = chain_state(chain, q)
-    J = world_jacobian(chain, state)
-    A = J @ J.T
-    A_inverse, det_JJt = invert_spd(A)
-    sigma = 1.0 / np.sqrt(np.trace(A_inverse))
-    if per_joint:
-        P, gradient_P = per_joint_limit_penalty(q, q_min, q_max, k)
-    else:
-        P, gradient_P = joint_limit_penalty(q, q_min, q_max, k)
-    gradient_det = determinant_gradient(J, A_inverse @ J, det_JJt)
-    gradient_q = gradient_P * det_JJt + P * gradient_det
-    X = to_tip_axes(state.R, damped_inverse(A, A_inverse, sigma, damping) @ J)
-    gradient_camera = X @ gradient_q
+    arm = posture(chain, q, damping)
+    P, gradient_P = limit_penalty(q, q_min, q_max, k, per_joint)
+    gradient_q = measure_gradient(arm, P, gradient_P)
     return Manipulability(
-        P * det_JJt,
+        P * arm.det_JJt,
         P,
-        det_JJt,
+        arm.det_JJt,
         gradient_q,
-        gradient_camera,
-        to_tip_axes(state.R, J),
-        X.T.copy(),
-        sigma,
+        camera_gradient(arm, gradient_q),
+        arm.J,
+        pseudo_inverse_transposed(arm.damped, arm.J).T.copy(),
+        arm.sigma,
     )
+
+
+def numeric_camera_gradient(
+    chain: Chain,
+    q: FloatArray,
+    q_min: FloatArray,
+    q_max: FloatArray,
+    k: float,
+    per_joint: bool = False,
+    step: float = 1e-3,
+) -> FloatArray:
+    """Return ∂w'/∂x (6,) along the tip's own axes by differences, [Nelson1995] eq. (31) with T = 1.
+
+    It moves the arm by δ = 0.001 m (and rad) along each axis in turn: [w'(q + J⁻¹ δ) - w'(q)]/|δ|.
+    This is the check of the exact gradient in `manipulability`; nothing else uses it.
+    """
+    here = manipulability(chain, q, q_min, q_max, k, per_joint, 0.0)
+    moved = [
+        manipulability(chain, q + step * column, q_min, q_max, k, per_joint, 0.0).value
+        for column in here.J_inverse.T
+    ]
+    return (np.array(moved) - here.value) / step
