@@ -135,6 +135,15 @@ def test_every_second_picture_is_kept_at_its_exposure(
         assert image.shape == frame.image.shape
 
 
+def test_some_pictures_can_be_read_alone(tmp_path: Path, records: list[TickRecord]) -> None:
+    recording = whole(tmp_path, records)
+    times = recording.image_times("wrist")
+    some = [time for time, _ in recording.images("wrist", only={0, 3, 99})]
+    np.testing.assert_array_equal(some, times[[0, 3]])
+    np.testing.assert_array_equal([time for time, _ in recording.images("wrist")], times)
+    assert len(recording.image_times("wall")) == 0
+
+
 def test_a_smooth_picture_survives_compression(tmp_path: Path, records: list[TickRecord]) -> None:
     smooth = np.add.outer(np.arange(48), np.arange(64)).astype(np.uint8)
     sample = Sample(0.0, {}, (Frame("wall", 0.0, smooth, {}),))

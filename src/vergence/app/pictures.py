@@ -3,10 +3,12 @@
 import logging
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,9 @@ from numpy.typing import NDArray
 from vergence.app.overlay import Marks, draw
 from vergence.arrays import ImageArray
 from vergence.runtime.recording import Recording
+
+if TYPE_CHECKING:
+    from cv2 import VideoWriter
 
 _LOG = logging.getLogger(__name__)
 _LARGEST_FILM = 240  # frames; encoding takes about 13 ms each at 640 × 480
@@ -31,32 +36,50 @@ class KeyFrame:
 
 def film(recording: Recording, camera: str) -> bytes | None:
     """Return the camera's pictures as a WebM film in real time; None where that is impossible."""
-    kept = list(recording.images(camera))
-    if len(kept) < 2:
+    times = recording.image_times(camera)
+    shown = range(0, len(times), max(1, -(-len(times) // _LARGEST_FILM)))
+    if len(shown) < 2:
         return None
-    some = kept[:: -(-len(kept) // _LARGEST_FILM)]
-    rate = (len(some) - 1) / (some[-1][0] - some[0][0])
+    rate = (len(shown) - 1) / float(times[shown[-1]] - times[0])
     trace = recording.cameras[camera]
-    return encode([draw(image, Marks.at(trace, time)) for time, image in some], rate)
+    images = recording.images(camera, only=shown)
+    return encode((draw(image, Marks.at(trace, time)) for time, image in images), rate)
 
 
-def encode(frames: Sequence[NDArray[np.uint8]], rate_hz: float) -> bytes | None:
-    """Return colour frames as a VP8 film; None if this OpenCV cannot write one."""
-    import cv2
-
-    height, width = (side - side % 2 for side in frames[0].shape[:2])  # VP8 wants them even
+def encode(frames: Iterable[NDArray[np.uint8]], rate_hz: float) -> bytes | None:
+    """Return colour frames of one size as a VP8 film; None if this OpenCV cannot write one."""
+    rest = iter(frames)
+    first = next(rest)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.webm"
-        code = cv2.VideoWriter.fourcc(*"VP80")
-        with _silent_stderr():  # OpenCV says there that it takes WebM's own tag for VP8
-            writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, (width, height))
+        height, width = (side - side % 2 for side in first.shape[:2])  # VP8 wants them even
+        writer = _writer(path, rate_hz, (width, height))
         if not writer.isOpened():
             _LOG.info("this OpenCV writes no VP8: the report shows key frames only")
             return None
-        for frame in frames:
+        for frame in chain([first], rest):
             writer.write(np.ascontiguousarray(frame[:height, :width]))
         writer.release()
         return path.read_bytes()
+
+
+def key_frames(recording: Recording, camera: str) -> list[KeyFrame]:
+    """Return the pictures at the start, at the end, and evenly between."""
+    count = len(recording.image_times(camera))
+    chosen = {round(number) for number in np.linspace(0, count - 1, _KEY_FRAMES)}
+    trace = recording.cameras[camera]
+    return [
+        KeyFrame(time, _jpeg(image, Marks.at(trace, time)))
+        for time, image in recording.images(camera, only=chosen)
+    ]
+
+
+def _writer(path: Path, rate_hz: float, size: tuple[int, int]) -> "VideoWriter":
+    import cv2
+
+    code = cv2.VideoWriter.fourcc(*"VP80")
+    with _silent_stderr():  # OpenCV says there that it takes WebM's own tag for VP8
+        return cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size)
 
 
 @contextmanager
@@ -70,17 +93,6 @@ def _silent_stderr() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
-
-
-def key_frames(recording: Recording, camera: str) -> list[KeyFrame]:
-    """Return the pictures at the start, at the end, and evenly between."""
-    kept = list(recording.images(camera))
-    chosen = sorted({round(k) for k in np.linspace(0, len(kept) - 1, _KEY_FRAMES)}) if kept else []
-    trace = recording.cameras[camera]
-    return [
-        KeyFrame(time, _jpeg(image, Marks.at(trace, time)))
-        for time, image in (kept[index] for index in chosen)
-    ]
 
 
 def _jpeg(image: ImageArray, marks: Marks) -> bytes:

@@ -1,14 +1,14 @@
 """Reads a run back from its folder."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
-from vergence.arrays import ImageArray
+from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime.recording import wire
@@ -90,15 +90,30 @@ class Recording:
         cameras = (trace.received for trace in self.cameras.values())
         return max((float(time[-1]) for time in (*arms, *cameras) if len(time)), default=0.0)
 
-    def images(self, camera: str) -> Iterator[tuple[float, ImageArray]]:
-        """Yield the kept pictures of a camera with their time of exposure, in order."""
+    def image_times(self, camera: str) -> FloatArray:
+        """Return when the kept pictures of a camera were exposed, (P,) s."""
+        return np.array([wire.time_of(parts, 1) for parts in self._pictures(camera)])
+
+    def images(
+        self, camera: str, only: Container[int] | None = None
+    ) -> Iterator[tuple[float, ImageArray]]:
+        """Yield the kept pictures of a camera with their time of exposure, in order.
+
+        Args:
+            camera: its name.
+            only: which of them, counted from 0; all if None. The others are not decoded.
+        """
         import cv2
 
-        for message in messages_on(self.folder / RECORDING, f"/camera/{camera}{_PICTURES}"):
-            parts = wire.fields(message)
-            jpeg = np.frombuffer(wire.bytes_of(parts, 2), np.uint8)
-            image = cv2.imdecode(jpeg, cv2.IMREAD_GRAYSCALE)
-            yield wire.time_of(parts, 1), np.asarray(image, dtype=np.uint8)
+        for number, parts in enumerate(self._pictures(camera)):
+            if only is None or number in only:
+                jpeg = np.frombuffer(wire.bytes_of(parts, 2), np.uint8)
+                image = cv2.imdecode(jpeg, cv2.IMREAD_GRAYSCALE)
+                yield wire.time_of(parts, 1), np.asarray(image, dtype=np.uint8)
+
+    def _pictures(self, camera: str) -> Iterator[wire.Fields]:
+        topic = f"/camera/{camera}{_PICTURES}"
+        return map(wire.fields, messages_on(self.folder / RECORDING, topic))
 
 
 def _recording_path(folder: Path) -> Path:
