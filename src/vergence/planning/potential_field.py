@@ -1,0 +1,128 @@
+"""The planner of the paper, in front of its kernels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.geometry import se3, so3_exp, so3_log
+from vergence.planning.failure import Obstacle, PlanFailure
+from vergence.planning.field import ARRIVED, STUCK, Field, FieldPath, descend
+from vergence.planning.path import Path
+from vergence.planning.problem import PlanningProblem
+from vergence.planning.visibility import image_bounds
+
+
+@dataclass(frozen=True, slots=True)
+class PotentialFieldPlanner:
+    """Image and joint trajectories down a potential field; [Mezouar2001] sections 2 and 3.
+
+    The camera goes straight where nothing repels it. The walk is greedy: it can end in a local
+    minimum where a path exists, and says so; `OptimisedPlanner` finds more.
+    """
+
+    step: float = 0.02  # ε, of Υ
+    steps_max: int = 1500
+    gain_image: float = 0.02  # γ
+    gain_joint: float = 0.5  # χ
+    image_zone_px: float = 100.0  # width of the zone along the image's border
+    joint_zone: float = 0.2  # width of the zone at a joint limit, of half the range
+
+    def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
+        """Return a path that keeps every constraint, or what stood in the way.
+
+        Both senses of rotation are tried, the shorter turn first.
+        """
+        failures = []
+        for long_way in (False, True):
+            path, end = self._walk(problem, long_way)
+            failure = self._judge(problem, path, end)
+            if failure is None:
+                return path
+            failures.append(failure)
+        return failures[0]
+
+    def walk(self, problem: PlanningProblem, long_way: bool = False) -> Path:
+        """Return the path as it comes, whatever it breaks; to show what the potentials are for."""
+        return self._walk(problem, long_way)[0]
+
+    def _walk(self, problem: PlanningProblem, long_way: bool) -> tuple[Path, int]:
+        field, upsilon = _pose_free_field(problem, long_way)
+        chain, q = problem.arm.chain, problem.q_start.copy()
+        straight = descend(field, chain, upsilon, q, self.step, self.steps_max)
+        if self.gain_image <= 0.0 and self.gain_joint <= 0.0:
+            return _as_path(problem, field, straight), straight.end
+        field = self._with_zones(problem, field, straight.q[-1])
+        walked = descend(field, chain, upsilon, q, self.step, self.steps_max)
+        return _as_path(problem, field, walked), walked.end
+
+    def _with_zones(self, problem: PlanningProblem, field: Field, q_goal: FloatArray) -> Field:
+        """Switch the potentials on, their zones no wider than the goal's own clearance."""
+        low, high = field.m_star.min(axis=0), field.m_star.max(axis=0)
+        x_min, x_max, y_min, y_max = field.bounds
+        clearance = np.array([low[0] - x_min, x_max - high[0], low[1] - y_min, y_max - high[1]])
+        zone = self.image_zone_px / problem.camera.focal_px[[0, 0, 1, 1]]
+        free = 1.0 - np.abs(problem.arm.normalized(q_goal))
+        return field._replace(
+            image_zone=np.clip(zone, 1e-4, np.maximum(clearance, 1e-4)),
+            joint_zone=np.clip(self.joint_zone, 1e-3, np.maximum(free, 1e-3)),
+            gain_image=self.gain_image,
+            gain_joint=self.gain_joint,
+        )
+
+    def _judge(self, problem: PlanningProblem, path: Path, end: int) -> PlanFailure | None:
+        if end != ARRIVED:
+            what = "came to rest" if end == STUCK else f"did not arrive in {self.steps_max} steps"
+            return PlanFailure(
+                Obstacle.LOCAL_MINIMUM, f"the walk down the potential field {what} before the goal"
+            )
+        if path.joint_margin < 0.0:
+            joint = int(np.abs(path.joints_normalized).max(axis=0).argmax())
+            return PlanFailure(
+                Obstacle.JOINT_LIMIT, f"{problem.arm.names[joint]} passes its limit on the way"
+            )
+        if not path.in_view().all():
+            return PlanFailure(Obstacle.VISIBILITY, "points leave the image on the way")
+        return None
+
+
+def _pose_free_field(problem: PlanningProblem, long_way: bool) -> tuple[Field, FloatArray]:
+    """Return the field without repulsion, and Υ at the start.
+
+    The reference plane is the one parallel to the goal image at the points' mean depth: n* is the
+    optical axis, δ = (Z* - d*)/Z*.
+    """
+    points, T = problem.points_goal, problem.T_goal_start
+    distance = float(points[:, 2].mean())
+    turn = so3_log(T[:3, :3])
+    angle = float(np.linalg.norm(turn))
+    if long_way:
+        turn = turn * (1.0 - 2.0 * np.pi / max(angle, 1e-9))
+    n = problem.arm.joint_count
+    field = Field(
+        m_star=np.ascontiguousarray(points[:, :2] / points[:, 2:]),
+        normal=np.array([0.0, 0.0, 1.0]),
+        delta=(points[:, 2] - distance) / points[:, 2],
+        distance=distance,
+        T_world_star=problem.T_world_goal.copy(),
+        bounds=image_bounds(problem.camera, problem.margin_px),
+        image_zone=np.ones(4),
+        q_min=problem.arm.q_min.copy(),
+        q_max=problem.arm.q_max.copy(),
+        joint_zone=np.ones(n),
+        gain_image=0.0,
+        gain_joint=0.0,
+    )
+    return field, np.concatenate((T[:3, 3] / distance, turn))
+
+
+def _as_path(problem: PlanningProblem, field: Field, walked: FieldPath) -> Path:
+    poses = np.array(
+        [
+            field.T_world_star @ se3(so3_exp(upsilon[3:]), field.distance * upsilon[:3])
+            for upsilon in walked.upsilon
+        ]
+    )
+    pixels = np.array([problem.camera.to_pixels(m) for m in walked.m])
+    depths = field.distance * walked.rho
+    return Path.of(problem, walked.q, poses, pixels, depths, "potential field")

@@ -1,0 +1,109 @@
+"""What a planner is asked."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from vergence.arrays import FloatArray, frozen
+from vergence.camera import Camera
+from vergence.errors import InputError
+from vergence.geometry import se3_inverse, transform_points
+from vergence.planning.visibility import View, clearance_at, make_view
+from vergence.robot import Arm
+from vergence.vision.two_view import TwoView
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningProblem:
+    """Bring a camera from where it is to where it should see the points as wanted."""
+
+    arm: Arm  # up to the camera
+    camera: Camera
+    q_start: FloatArray  # (n,)
+    T_world_goal: FloatArray  # (4, 4) wanted pose of the camera
+    points_world: FloatArray  # (N, 3) what must stay in view, m
+    margin_px: float = 10.0  # distance to keep from the border of the image
+    margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
+
+    def __post_init__(self) -> None:
+        q = frozen(self.q_start, (self.arm.joint_count,), "q_start")
+        object.__setattr__(self, "q_start", q)
+        object.__setattr__(self, "T_world_goal", frozen(self.T_world_goal, (4, 4), "T_world_goal"))
+        points = frozen(self.points_world, (None, 3), "points_world")
+        object.__setattr__(self, "points_world", points)
+        if not len(points) or not np.isfinite(points).all():
+            raise InputError(
+                "PlanningProblem", "points_world", f"{len(points)} points", "one or more, finite"
+            )
+        for name in ("margin_px", "margin_joint"):
+            if not getattr(self, name) >= 0:
+                raise InputError("PlanningProblem", name, getattr(self, name), "zero or more")
+
+    @classmethod
+    def from_two_view(
+        cls,
+        two_view: TwoView,
+        distance: float,
+        arm: Arm,
+        camera: Camera,
+        q_start: FloatArray,
+        *,
+        margin_px: float = 10.0,
+        margin_joint: float = 0.01,
+    ) -> Self:
+        """Take the goal and the object from two views, given d*.
+
+        Args:
+            two_view: the reconstruction; matches that were dropped are left out.
+            distance: d*, of the desired camera from the reference plane, m. An estimate will do:
+                it cancels in the image path, joints and depths need it.
+            arm: up to the camera.
+            camera: that took both views, the current one at q_start.
+            q_start: joint positions now, (n,).
+            margin_px: see the fields.
+            margin_joint: see the fields.
+        """
+        T_world_camera = arm.forward_kinematics(q_start)
+        T_world_goal = T_world_camera @ se3_inverse(two_view.T_star_camera(distance))
+        points_star = np.ascontiguousarray(two_view.points_star(distance)[two_view.inliers])
+        points_world = transform_points(T_world_goal, points_star)
+        return cls(arm, camera, q_start, T_world_goal, points_world, margin_px, margin_joint)
+
+    @property
+    def T_goal_start(self) -> FloatArray:
+        """Pose of the camera at the start in the frame of the goal, (4, 4)."""
+        T: FloatArray = se3_inverse(self.T_world_goal) @ self.arm.forward_kinematics(self.q_start)
+        return T
+
+    @property
+    def points_goal(self) -> FloatArray:
+        """The points in the frame of the goal, (N, 3), m."""
+        points: FloatArray = transform_points(se3_inverse(self.T_world_goal), self.points_world)
+        return points
+
+    @property
+    def depth_min(self) -> float:
+        """Least depth to keep, m: half of the smaller one of start and goal."""
+        T_camera_world = se3_inverse(self.arm.forward_kinematics(self.q_start))
+        depths = transform_points(T_camera_world, self.points_world)[:, 2]
+        return 0.5 * float(min(depths.min(), self.points_goal[:, 2].min()))
+
+    def view(self, margin_px: float | None = None) -> View:
+        """Return what the camera must see, with the problem's margin or another."""
+        margin = self.margin_px if margin_px is None else margin_px
+        return make_view(self.camera, self.points_world, margin, max(self.depth_min, 1e-6))
+
+    def joint_range(self, q_goal: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return the joint limits less the margin; less of it where start or goal have less."""
+        q_min, q_max = self.arm.q_min, self.arm.q_max
+        span = np.where(np.isfinite(q_max - q_min), q_max - q_min, 0.0)
+        margin = 0.5 * self.margin_joint * span
+        ends = [self.q_start] if q_goal is None else [self.q_start, q_goal]
+        low = np.minimum(q_min + margin, np.min(ends, axis=0))
+        high = np.maximum(q_max - margin, np.max(ends, axis=0))
+        return np.maximum(low, q_min), np.minimum(high, q_max)
+
+    def clearance(self, q: FloatArray, margin_px: float | None = None) -> float:
+        """Return the sine of the least angle between a point and a side of the view at q (n,)."""
+        return float(clearance_at(self.arm.chain, np.asarray(q), self.view(margin_px)))

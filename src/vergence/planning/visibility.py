@@ -1,0 +1,132 @@
+"""What keeps points in a camera's view, as kernels: five half-spaces, their depth, their slopes."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.robot import Chain, chain_state, world_jacobian
+
+
+class View(NamedTuple):
+    """The space a camera sees, and the points that must stay in it.
+
+    A point X of the camera frame is seen where h_k = (a_k·X - b_k)/‖X‖ > 0 for every k. For the
+    four sides, through the focal point, h is the sine of the angle to the side; it stays smooth
+    where the pixel coordinates blow up and change sign. The fifth keeps a least depth.
+    """
+
+    normals: FloatArray  # (5, 3) a_k, unit
+    offsets: FloatArray  # (5,) b_k, m
+    points_world: FloatArray  # (N, 3) m
+
+
+def image_bounds(camera: Camera, margin_px: float = 0.0) -> FloatArray:
+    """Return the largest rectangle x_min, x_max, y_min, y_max of normalized coordinates in view.
+
+    Args:
+        camera: any; with distortion the rectangle lies inside the curved border.
+        margin_px: distance to keep from the border of the image.
+    """
+    low, right, bottom = margin_px - 0.5, camera.width - 0.5, camera.height - 0.5
+    u, v = np.linspace(low, right - margin_px, 33), np.linspace(low, bottom - margin_px, 33)
+
+    def side(us: FloatArray, vs: FloatArray, axis: int) -> FloatArray:
+        return camera.normalize(np.column_stack(np.broadcast_arrays(us, vs)))[:, axis]
+
+    return np.array(
+        [
+            side(u[:1], v, 0).max(),
+            side(u[-1:], v, 0).min(),
+            side(u, v[:1], 1).max(),
+            side(u, v[-1:], 1).min(),
+        ]
+    )
+
+
+def make_view(camera: Camera, points_world: FloatArray, margin_px: float, depth_min: float) -> View:
+    """Return the view of a camera that keeps a margin in pixels and a least depth in metres."""
+    x_min, x_max, y_min, y_max = image_bounds(camera, margin_px)
+    sides = np.array([[1, 0, -x_min], [-1, 0, x_max], [0, 1, -y_min], [0, -1, y_max], [0, 0, 1.0]])
+    return View(
+        sides / np.linalg.norm(sides, axis=1, keepdims=True),
+        np.array([0.0, 0.0, 0.0, 0.0, depth_min]),
+        np.array(points_world, dtype=np.float64),
+    )
+
+
+@njit(cache=True)
+def view_clearances(R: FloatArray, p: FloatArray, view: View) -> FloatArray:
+    """Return h of every point and side, (N, 5), from the camera's pose R, p in the world."""
+    h = np.empty((len(view.points_world), 5))
+    for j in range(len(h)):
+        d0 = view.points_world[j, 0] - p[0]
+        d1 = view.points_world[j, 1] - p[1]
+        d2 = view.points_world[j, 2] - p[2]
+        x = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2
+        y = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2
+        z = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2
+        norm = np.sqrt(x * x + y * y + z * z) + 1e-12
+        for k in range(5):
+            a = view.normals[k]
+            h[j, k] = (a[0] * x + a[1] * y + a[2] * z - view.offsets[k]) / norm
+    return h
+
+
+@njit(cache=True)
+def clearance_at(chain: Chain, q: FloatArray, view: View) -> float:
+    """Return the smallest h over all points and sides at joint positions q."""
+    state = chain_state(chain, q)
+    least: float = view_clearances(state.R, state.p, view).min()
+    return least
+
+
+@njit(cache=True)
+def add_visibility_penalty(
+    chain: Chain,
+    q: FloatArray,
+    view: View,
+    margin: float,
+    weight: float,
+    gradient: FloatArray,
+    hessian: FloatArray,
+) -> float:
+    """Return weight/2 Σ max(0, margin - h)²; add its gradient (n,) and Gauss-Newton matrix (n, n).
+
+    With x̂ = X/‖X‖ and c = (a - h x̂)/‖X‖ along world axes, the point moves against the camera, so
+    ∂h/∂q = -(c·J_v + ((P - p) × c)·J_ω).
+    """
+    state = chain_state(chain, q)
+    h = view_clearances(state.R, state.p, view)
+    if h.min() >= margin:
+        return 0.0
+    J = world_jacobian(chain, state)
+    n, cost = len(q), 0.0
+    slope, c, d = np.empty(n), np.empty(3), np.empty(3)
+    for j in range(len(h)):
+        for i in range(3):
+            d[i] = view.points_world[j, i] - state.p[i]
+        norm = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2) + 1e-12
+        for k in range(5):
+            short = margin - h[j, k]
+            if short <= 0.0:
+                continue
+            a = view.normals[k]
+            for i in range(3):
+                turned = state.R[i, 0] * a[0] + state.R[i, 1] * a[1] + state.R[i, 2] * a[2]
+                c[i] = (turned - h[j, k] * d[i] / norm) / norm
+            l0 = d[1] * c[2] - d[2] * c[1]
+            l1 = d[2] * c[0] - d[0] * c[2]
+            l2 = d[0] * c[1] - d[1] * c[0]
+            for i in range(n):
+                slope[i] = -(c[0] * J[0, i] + c[1] * J[1, i] + c[2] * J[2, i]) - (
+                    l0 * J[3, i] + l1 * J[4, i] + l2 * J[5, i]
+                )
+            cost += 0.5 * weight * short * short
+            for i in range(n):
+                gradient[i] -= weight * short * slope[i]
+                for r in range(n):
+                    hessian[i, r] += weight * slope[i] * slope[r]
+    return cost
