@@ -138,7 +138,9 @@ def test_picture_of_another_thing_is_refused_and_doubted():
     update = filter_.update(belief, scrambled)
     assert update.verdict is Verdict.CONTRADICTED
     assert not update.kept.any()
-    assert not update.belief.state().consistent
+    assert update.belief.doubts == 1
+    again = filter_.update(update.belief, scrambled._replace(time=time + 0.08))
+    assert not again.belief.state().consistent
     np.testing.assert_array_equal(
         update.belief.T_world_target, filter_.predict(belief, time + 0.04).T_world_target
     )

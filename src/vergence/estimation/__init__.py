@@ -2,15 +2,20 @@
 
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
+from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
+from vergence.estimation.measure import CameraPose, Find, Joints, Measure
+from vergence.estimation.perception import PerceptionSettings, PosePerception
 from vergence.estimation.pose_filter import PoseFilter
+from vergence.estimation.recovery import NoPose, PoseFit, pose_from_points
 from vergence.estimation.rig import CameraRig
 from vergence.estimation.rpy_belief import RpyBelief
 from vergence.estimation.rpy_filter import RpyPoseFilter
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
+from vergence.estimation.tracked_points import TrackedPoints
 from vergence.estimation.view import View, view_of
 from vergence.estimation.visibility import (
     Blocked,
@@ -24,13 +29,22 @@ from vergence.estimation.windows import WindowRule
 __all__ = [
     "Belief",
     "Blocked",
+    "CameraPose",
     "CameraRig",
     "Candidates",
     "Consistency",
+    "ExactPoints",
     "FilterHistory",
+    "Find",
     "IndexSelection",
     "InformationSelection",
+    "Joints",
+    "Measure",
+    "NoPose",
+    "PerceptionSettings",
     "PoseFilter",
+    "PoseFit",
+    "PosePerception",
     "RpyBelief",
     "RpyPoseFilter",
     "Selection",
@@ -38,12 +52,14 @@ __all__ = [
     "TargetBelief",
     "TargetFilter",
     "TargetShape",
+    "TrackedPoints",
     "Update",
     "Verdict",
     "View",
     "Visibility",
     "WindowRule",
     "add_obstacles",
+    "pose_from_points",
     "predict_visibility",
     "view_of",
 ]

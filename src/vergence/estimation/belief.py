@@ -23,6 +23,7 @@ class Belief:
     consistency: Consistency = field(default_factory=Consistency)
     seen: float = -np.inf  # s, exposure of the last picture that was used
     doubts: int = 0  # pictures in a row that contradicted the prediction and were not used
+    disagreeing: float = 0.0  # share of the last points that fell outside the gate, fading
 
     @property
     def honest_covariance(self) -> FloatArray:
@@ -36,5 +37,5 @@ class Belief:
             self.T_world_target,
             self.velocity,
             self.honest_covariance,
-            self.consistency.holds and self.doubts == 0,
+            self.consistency.holds and self.disagreeing < 0.5,
         )

@@ -14,7 +14,7 @@ factor of its covariance, so that its noise is the identity.
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 
 POSE = 6  # columns that depend on the pose; the one after them holds the residual
 
@@ -87,6 +87,23 @@ def whitened_rows(
     return rows
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _pair_square(pair: FloatArray, P: FloatArray, sign: float) -> tuple[float, float]:
+    """Return rᵀ S⁻¹ r and det S of two whitened rows (2, 7), S = I + sign · H P Hᵀ."""
+    s00, s01, s11 = 1.0, 0.0, 1.0
+    for j in range(POSE):
+        a, b = 0.0, 0.0
+        for i in range(POSE):
+            a += pair[0, i] * P[i, j]
+            b += pair[1, i] * P[i, j]
+        s00 += sign * a * pair[0, j]
+        s01 += sign * a * pair[1, j]
+        s11 += sign * b * pair[1, j]
+    determinant: float = s00 * s11 - s01 * s01
+    r0, r1 = pair[0, POSE], pair[1, POSE]
+    return (s11 * r0 * r0 - 2.0 * s01 * r0 * r1 + s00 * r1 * r1) / determinant, determinant
+
+
 @njit(cache=True)
 def mahalanobis_squared(rows: FloatArray, pose_covariance: FloatArray) -> FloatArray:
     """Return rᵀ (H P Hᵀ + I)⁻¹ r of each pair of whitened rows, (M,).
@@ -96,26 +113,36 @@ def mahalanobis_squared(rows: FloatArray, pose_covariance: FloatArray) -> FloatA
         pose_covariance: P, at least (6, 6); only its first six rows and columns are used.
     """
     squares = np.empty(len(rows) // 2)
-    spread = np.empty(POSE)
     for n in range(len(squares)):
-        first, second = rows[2 * n], rows[2 * n + 1]
-        s00, s01, s11 = 1.0, 0.0, 1.0
-        for i in range(POSE):
-            spread[i] = 0.0
-        for i in range(POSE):
-            for j in range(POSE):
-                spread[j] += first[i] * pose_covariance[i, j]
-        for j in range(POSE):
-            s00 += spread[j] * first[j]
-            s01 += spread[j] * second[j]
-            spread[j] = 0.0
-        for i in range(POSE):
-            for j in range(POSE):
-                spread[j] += second[i] * pose_covariance[i, j]
-        for j in range(POSE):
-            s11 += spread[j] * second[j]
-        r0, r1 = first[POSE], second[POSE]
-        numerator = s11 * r0 * r0 - 2.0 * s01 * r0 * r1 + s00 * r1 * r1
-        square = numerator / (s00 * s11 - s01 * s01)
+        square, _ = _pair_square(rows[2 * n : 2 * n + 2], pose_covariance, 1.0)
         squares[n] = square if square >= 0.0 else np.inf  # what is not a number fits nothing
+    return squares
+
+
+@njit(cache=True)
+def deletion_squares(
+    rows: FloatArray, kept: BoolArray, correction: FloatArray, updated: FloatArray
+) -> FloatArray:
+    """Return how far each kept point is from what all the others and the prediction say, (M,).
+
+    The normalised innovation squared would fall by rᵀ (I - H P⁺ Hᵀ)⁻¹ r, of the residuals r left
+    after the update, if the point had been left out.
+
+    Args:
+        rows: whitened measurement, (2M, 7).
+        kept: points that were used, (M,); 0 for the others.
+        correction: what the update added to the state, at least (6,).
+        updated: P⁺, at least (6, 6).
+    """
+    squares = np.zeros(len(kept))
+    pair = np.empty((2, POSE + 1))
+    for n in range(len(kept)):
+        if kept[n]:
+            for i in range(2):
+                pair[i] = rows[2 * n + i]
+                for k in range(POSE):
+                    pair[i, POSE] -= pair[i, k] * correction[k]
+            square, determinant = _pair_square(pair, updated, -1.0)
+            if determinant > 1e-9:  # else nothing but this point tells about some direction
+                squares[n] = square
     return squares

@@ -10,7 +10,7 @@ from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.errors import InputError
 from vergence.estimation.belief import Belief
 from vergence.estimation.information import compress, joseph_update, keep_rows
-from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
+from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
 from vergence.estimation.motion import correct_pose, predict_covariance, predict_pose
 from vergence.estimation.target_filter import (
     Update,
@@ -22,7 +22,8 @@ from vergence.estimation.target_filter import (
 from vergence.estimation.view import View
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
-CONSENSUS = 4  # points from which on a majority can overrule the prediction
+CONSENSUS = 5  # points that must agree to overrule the prediction: any three agree on some pose
+PATIENCE = 4.0  # by how much the covariance may grow with a picture that proves nothing by itself
 
 
 class Correction(NamedTuple):
@@ -49,6 +50,9 @@ def correct(
 ) -> Correction:
     """Correct a predicted state by one picture, without the points beyond the gate.
 
+    A point must pass the gate twice: against the prediction, and against what the prediction and
+    all other points say together. While the pose is uncertain only the second finds wrong matches.
+
     Args:
         T_world_target: predicted pose, (4, 4).
         velocity: predicted (v, ω), (6,).
@@ -62,31 +66,23 @@ def correct(
     rows = whitened_rows(T_world_target, T_camera_world, points, measured, covariance)
     squares = mahalanobis_squared(rows, P)
     kept = squares <= gate
-    rows = keep_rows(rows, kept)
-    rest = compress(rows)
-    correction, P, square = joseph_update(P, rows)
+    while True:
+        used = keep_rows(rows, kept)
+        rest = compress(used)
+        correction, updated, square = joseph_update(P, used)
+        alone = deletion_squares(rows, kept, correction, updated)
+        worst = np.argmax(alone)
+        if alone[worst] <= gate:
+            break
+        kept[worst] = False
     return Correction(
         correct_pose(T_world_target, correction),
         velocity + correction[6:],
-        P,
+        updated,
         square + rest,
         kept,
         squares,
     )
-
-
-@njit(cache=True)
-def residual_squares(
-    T_world_target: FloatArray,
-    P: FloatArray,
-    T_camera_world: FloatArray,
-    points: FloatArray,
-    measured: FloatArray,
-    covariance: FloatArray,
-) -> FloatArray:
-    """Return the Mahalanobis distance squared of each point of a picture, (M,)."""
-    rows = whitened_rows(T_world_target, T_camera_world, points, measured, covariance)
-    return mahalanobis_squared(rows, P)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,21 +97,23 @@ class PoseFilter:
     A point beyond the gate is left out only while the prediction agrees with most of its picture.
     Where the gate would throw out the majority, not the points but the prediction is in doubt: then
     the covariance is enlarged until the median point has its expected distance, and the picture is
-    used if one pose then explains the majority.
+    used if one pose then explains the majority. A picture of fewer than four points cannot know
+    that by itself: it is believed if most of the points before it were outside the gate, too.
     """
 
     acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
     angular_acceleration_density: float = 0.25  # rad²/s³
     gate: float = 13.8  # χ² with 2 degrees of freedom: one good point in a thousand is lost
     fading: float = 0.9  # weight of the past in the consistency test, for each picture
-    doubts_allowed: int = 3  # contradicting pictures in a row before small ones are believed too
+    point_fading: float = 0.93  # weight of the past in the share of disagreeing points, for each
 
     def __post_init__(self) -> None:
         for name in ("acceleration_density", "angular_acceleration_density", "gate"):
             if not getattr(self, name) > 0.0:
                 raise InputError("PoseFilter", name, getattr(self, name), "a number above zero")
-        if not 0.0 < self.fading < 1.0:
-            raise InputError("PoseFilter", "fading", self.fading, "between 0 and 1")
+        for name in ("fading", "point_fading"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InputError("PoseFilter", name, getattr(self, name), "between 0 and 1")
 
     def start(
         self,
@@ -173,6 +171,10 @@ class PoseFilter:
         if view.size == 0:
             return unused(belief, view, Verdict.EMPTY)
         found = self._correct(belief, belief.covariance, view, belief.consistency.scale)
+        weight = self.point_fading**view.size
+        share = 1.0 - float(np.mean(found.kept))
+        disagreeing = weight * belief.disagreeing + (1.0 - weight) * share
+        belief = replace(belief, disagreeing=disagreeing)
         if 2 * np.count_nonzero(found.kept) >= view.size:
             return self._used(belief, found, Verdict.USED)
         return self._overruled(belief, view, found)
@@ -205,30 +207,25 @@ class PoseFilter:
             found.covariance,
             belief.consistency.add(square, freedom, self.fading),
             seen=belief.time,
+            disagreeing=belief.disagreeing,
         )
         return Update(after, verdict, found.kept, found.squares)
 
     def _overruled(self, belief: Belief, view: View, first: Correction) -> Update:
         """Believe the picture rather than the prediction, if its majority agrees on a pose."""
         median = float(np.median(first.squares))
-        believed = view.size >= CONSENSUS or belief.doubts >= self.doubts_allowed
-        if believed and np.isfinite(median):
-            enlarged = max(1.0, median / MEDIAN)
+        enlarged = max(1.0, median / MEDIAN)
+        if belief.disagreeing > 0.5 and view.size < CONSENSUS:
+            enlarged, needed = min(enlarged, PATIENCE), 1
+            belief = replace(belief, covariance=enlarged * belief.covariance)
+            found = self._correct(belief, belief.covariance, view, 1.0)
+        elif np.isfinite(median):
+            needed = max(CONSENSUS, (view.size + 1) // 2)
             found = self._correct(belief, enlarged * belief.covariance, view, 1.0)
-            agreeing = found.kept & (self._squares(found, view) <= self.gate)
-            if 2 * np.count_nonzero(agreeing) >= view.size:
-                update = self._used(belief, found, Verdict.RECOVERED, enlarged)
-                return update._replace(squares=first.squares)
+        else:
+            found, needed = first, view.size + 1
+        if np.count_nonzero(found.kept) >= needed:
+            update = self._used(belief, found, Verdict.RECOVERED, enlarged)
+            return update._replace(squares=first.squares)
         refused = unused(replace(belief, doubts=belief.doubts + 1), view, Verdict.CONTRADICTED)
         return refused._replace(squares=first.squares)
-
-    def _squares(self, found: Correction, view: View) -> FloatArray:
-        squares: FloatArray = residual_squares(
-            found.T_world_target,
-            found.covariance,
-            view.T_camera_world,
-            view.points,
-            view.measured,
-            view.covariance,
-        )
-        return squares

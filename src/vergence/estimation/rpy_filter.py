@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray, frozen
 from vergence.errors import InputError
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
-from vergence.estimation.rpy_belief import RpyBelief
+from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
 from vergence.estimation.target_filter import (
     Update,
     Verdict,
@@ -98,7 +98,7 @@ class RpyPoseFilter:
             time: s.
             T_world_target: a rough pose, (4, 4).
             velocity: (v, ω) along world axes, (6,); zero by default.
-            covariance: of the state (o, φ, ϑ, ψ, rates), (12, 12); by default 3 cm, 0.1 rad,
+            covariance: of (δp, δθ, δv, δω), world axes, (12, 12); by default 3 cm, 0.1 rad,
                 0.2 m/s, 0.5 rad/s. The paper's is zero: then the first two gains are zero.
 
         Raises:
@@ -116,7 +116,8 @@ class RpyPoseFilter:
         w = np.concatenate((pose[:3, 3], rpy, twist))
         if twist[3:].any():
             w[9:] = np.linalg.solve(rpy_rates_to_omega(rpy), twist[3:])
-        return RpyBelief(time, w, covariance)
+        to_state = np.linalg.inv(twist_jacobian(w))
+        return RpyBelief(time, w, to_state @ covariance @ to_state.T)
 
     def predict(self, belief: RpyBelief, time: float) -> RpyBelief:
         """Return the belief at another time; Q counts in proportion to the frames between."""

@@ -1,0 +1,266 @@
+"""The inner circle of perception: predict, see, choose, open windows, measure, update."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.camera import Frame
+from vergence.estimation.history import FilterHistory
+from vergence.estimation.measure import CameraPose, Find, Joints, Measure, spread_out
+from vergence.estimation.recovery import NoPose, pose_from_points
+from vergence.estimation.rig import HEIGHT, WIDTH, CameraRig, normalized_noise
+from vergence.estimation.selection import Candidates, InformationSelection, Selection
+from vergence.estimation.target_filter import B, TargetFilter, Verdict
+from vergence.estimation.target_shape import TargetShape
+from vergence.estimation.view import View, view_of
+from vergence.estimation.visibility import (
+    Blocked,
+    Visibility,
+    add_obstacles,
+    predict_visibility,
+)
+from vergence.estimation.windows import WindowRule, innovation_spread
+from vergence.features import ImagePoints, Observation
+from vergence.geometry import se3_compose, se3_inverse, transform_points
+
+USED = (Verdict.USED, Verdict.RECOVERED)
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionSettings:
+    """How the inner circle looks."""
+
+    budget: int = 8  # features measured a tick, over all cameras
+    margin_px: float = 8.0  # from the border of a picture
+    least_cosine: float = 0.1  # between a face's normal and the line of sight
+    horizon: float = 0.5  # s, how late a picture may arrive
+    lost_after: float = 1.0  # s without a picture that was used
+    lost_doubts: int = 8  # contradicting pictures in a row
+
+
+class _Picture(NamedTuple):
+    """A picture with what is expected of it."""
+
+    frame: Frame
+    number: int  # of its camera in the rig
+    T_world_camera: FloatArray  # (4, 4)
+    T_camera_world: FloatArray  # (4, 4)
+    T_world_target: FloatArray  # (4, 4) predicted for the exposure
+
+
+class PosePerception(Generic[B]):
+    """Follows one target with any number of cameras; a stage of the loop.
+
+    For every picture that arrives: the target's pose is predicted to its exposure, the features the
+    camera will see are worked out, the few worth measuring chosen over all cameras together, and
+    only small windows around them looked at; what is found there corrects the pose.
+    [Lippiello2005] section IV, Fig. 3.
+
+    A target that is lost is looked for around the place where it was seen last, with the widest
+    windows, and over whole pictures if `find` is given; while it is lost no pose is reported.
+    """
+
+    def __init__(
+        self,
+        rig: CameraRig,
+        shape: TargetShape,
+        camera_pose: CameraPose,
+        measure: Measure,
+        target_filter: TargetFilter[B],
+        start: B,
+        *,
+        selection: Selection | None = None,
+        windows: WindowRule | None = None,
+        settings: PerceptionSettings | None = None,
+        blocked_at: Callable[[Joints], Blocked] | None = None,
+        find: Find | None = None,
+    ) -> None:
+        """Prepare to follow a target.
+
+        Args:
+            rig: the cameras.
+            shape: the target.
+            camera_pose: gives the pose of a camera from the joints at the exposure.
+            measure: finds features inside windows.
+            target_filter: `PoseFilter`, or `RpyPoseFilter` for the paper's.
+            start: what is believed at first, of that filter.
+            selection: how features are chosen; by information unless told.
+            windows: how large windows are.
+            settings: budget and patience.
+            blocked_at: gives, for the joints at an exposure, the function that tells what stands
+                between a camera and points of the target; the target itself must not count.
+            find: finds the target in a whole picture, when it is lost.
+        """
+        self._rig, self._shape, self._camera_pose = rig, shape, camera_pose
+        self._measure, self._blocked_at, self._find = measure, blocked_at, find
+        self._selection = selection or InformationSelection()
+        self._windows = windows or WindowRule()
+        self._settings = settings or PerceptionSettings()
+        self._noise = normalized_noise(rig)
+        self._diagonal = np.hypot(rig.lenses[:, WIDTH], rig.lenses[:, HEIGHT])
+        self._filter = target_filter
+        self._history = FilterHistory(target_filter, start, self._settings.horizon)
+        self._patience_from = start.time
+        self._held: dict[str, BoolArray] = {}
+        self._lost = ""
+
+    @property
+    def belief(self) -> B:
+        """What is believed after the newest picture."""
+        return self._history.belief
+
+    @property
+    def lost(self) -> str:
+        """Why the target counts as lost; empty while it is followed."""
+        return self._lost
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the pictures show and where the target is, or None without a picture.
+
+        Pictures of cameras that are not in the rig do not concern it.
+        """
+        known = [frame for frame in frames if frame.camera in self._rig.numbers]
+        if not known:
+            return None
+        pictures = [
+            self._expect(frame) for frame in sorted(known, key=lambda f: (f.time, f.camera))
+        ]
+        visibility = self._see(pictures)
+        chosen = self._choose(pictures, visibility)
+        points, views = [], []
+        for n, picture in enumerate(pictures):
+            view, seen = self._look(picture, chosen[n], visibility, n)
+            views.append(view)
+            points.append(seen)
+        time = pictures[-1].frame.time
+        self._judge(time, views, [picture.frame for picture in pictures])
+        return Observation(time, tuple(points), None if self._lost else self.belief.state())
+
+    def _expect(self, frame: Frame) -> _Picture:
+        T_world_camera = self._camera_pose(frame.camera, frame.joints)
+        belief = self._history.belief if self._lost else self._history.at(frame.time)
+        return _Picture(
+            frame,
+            self._rig.numbers[frame.camera],
+            T_world_camera,
+            se3_inverse(T_world_camera),
+            belief.T_world_target,
+        )
+
+    def _see(self, pictures: list[_Picture]) -> Visibility:
+        T_camera_target = np.array(
+            [se3_compose(p.T_camera_world, p.T_world_target) for p in pictures]
+        )
+        visibility = predict_visibility(
+            self._shape,
+            T_camera_target,
+            self._rig.lenses[[p.number for p in pictures]],
+            margin_px=self._settings.margin_px,
+            least_cosine=self._settings.least_cosine,
+        )
+        if self._blocked_at is not None:
+            for sight, p in zip(visibility.sight, pictures, strict=True):
+                blocked = self._blocked_at(p.frame.joints)
+                world = transform_points(p.T_world_target, self._shape.points)
+                add_obstacles(sight, blocked, p.T_world_camera[:3, 3], world)
+        return visibility
+
+    def _choose(self, pictures: list[_Picture], visibility: Visibility) -> BoolArray:
+        if self._lost:
+            return visibility.visible
+        none = np.zeros(len(self._shape.points), dtype=np.bool_)
+        numbers = [p.number for p in pictures]
+        newest = self._history.at(pictures[-1].frame.time)
+        chosen = self._selection.choose(
+            Candidates(
+                visibility.visible,
+                visibility.points_px,
+                self._shape.points,
+                np.array([p.T_world_target for p in pictures]),
+                np.array([p.T_camera_world for p in pictures]),
+                self._noise[numbers],
+                self._diagonal[numbers],
+                np.ascontiguousarray(newest.honest_covariance[:6, :6]),
+                np.array([self._held.get(p.frame.camera, none) for p in pictures]),
+            ),
+            self._settings.budget,
+        )
+        for picture, mask in zip(pictures, chosen, strict=True):
+            self._held[picture.frame.camera] = mask
+        return chosen
+
+    def _look(
+        self, picture: _Picture, chosen: BoolArray, visibility: Visibility, n: int
+    ) -> tuple[View, ImagePoints]:
+        """Measure inside windows, correct the pose, and say what became of every feature."""
+        features = np.flatnonzero(chosen)
+        expected = visibility.points_px[n]
+        camera = self._rig.cameras[picture.number]
+        half = self._half_sizes(picture, features)
+        found = self._measure(
+            picture.frame,
+            features,
+            expected[features],
+            half,
+            se3_compose(picture.T_camera_world, picture.T_world_target),
+        )
+        view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
+        kept = view.features
+        if not self._lost:
+            self._history, update = self._history.add(view)
+            if update.verdict in USED:
+                kept = view.features[update.kept]
+        seen = spread_out(
+            found, features, kept, expected, visibility.sight[n], self._windows.most_px
+        )
+        return view, seen
+
+    def _half_sizes(self, picture: _Picture, features: IntArray) -> FloatArray:
+        if self._lost:
+            return np.full((len(features), 2), self._windows.most_px)
+        belief = self._history.at(picture.frame.time)
+        spread = innovation_spread(
+            picture.T_world_target,
+            picture.T_camera_world,
+            self._shape.points[features],
+            belief.honest_covariance,
+        )
+        camera, noise = self._rig.cameras[picture.number], self._rig.noise_px[picture.number]
+        scale = 1.0 if belief.state().consistent else 2.0
+        return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
+
+    def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:
+        """Give a target up that contradicts too long; look for one that was given up."""
+        belief = self._history.belief
+        if not self._lost:
+            unseen = time - max(belief.seen, self._patience_from)
+            if belief.doubts >= self._settings.lost_doubts:
+                self._lost = f"{belief.doubts} pictures in a row contradict the prediction"
+            elif unseen > self._settings.lost_after:
+                self._lost = f"not seen for {unseen:.2f} s"
+        if self._lost:
+            self._recover(views, frames)
+
+    def _recover(self, views: list[View], frames: list[Frame]) -> None:
+        if self._find is not None:
+            views = [view for frame in frames if (view := self._found(frame)) is not None]
+        fit = pose_from_points([view for view in views if view.size])
+        if isinstance(fit, NoPose):
+            return
+        covariance = np.diag(np.repeat([0.0, 0.0, 0.2, 0.5], 3) ** 2)
+        covariance[:6, :6] = fit.covariance
+        start = self._filter.start(fit.time, fit.T_world_target, covariance=covariance)
+        self._history = FilterHistory(self._filter, start, self._settings.horizon)
+        self._patience_from, self._lost = fit.time, ""
+
+    def _found(self, frame: Frame) -> View | None:
+        assert self._find is not None
+        points = self._find(frame)
+        if points is None:
+            return None
+        camera = self._rig.cameras[self._rig.numbers[frame.camera]]
+        T_world_camera = self._camera_pose(frame.camera, frame.joints)
+        return view_of(points, camera, T_world_camera, self._shape.points)
