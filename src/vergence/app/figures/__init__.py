@@ -3,7 +3,7 @@
 from vergence.app.figures.arm import joints_figure, measures_figure, twist_figure
 from vergence.app.figures.image import error_figure, paths_figure
 from vergence.app.figures.motion import motion_figure
-from vergence.app.figures.style import Panels, mark_events, panels, svg
+from vergence.app.figures.layout import Panels, mark_events, panels, svg
 
 __all__ = [
     "Panels",

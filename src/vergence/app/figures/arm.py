@@ -4,8 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vergence.app.figures.style import LIMIT, Panels, curve, legend, panels
+from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
+from vergence.drawing import LIMIT, curve, legend
 from vergence.runtime.recording import ArmInfo, ArmTrace
 
 if TYPE_CHECKING:

@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vergence.app.figures.style import COLORS, Panels, curve, legend, panels
+from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
+from vergence.drawing import COLORS, curve, legend
 from vergence.runtime.recording import CameraTrace
 
 if TYPE_CHECKING:

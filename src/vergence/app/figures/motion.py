@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from vergence.app.figures.style import Panels, curve, legend, panels
+from vergence.app.figures.layout import Panels, panels
+from vergence.drawing import curve, legend
 from vergence.runtime.recording import CameraTrace, TargetTrace
 
 
