@@ -9,6 +9,7 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 
 _TOLERANCE = 1e-10
 _MAX_STEPS = 200
+_FAR = 1e5  # farther than any row lets x go
 
 
 class OrderedSolution(NamedTuple):
@@ -26,9 +27,9 @@ def solve_ordered_qp(
 ) -> OrderedSolution:
     """Minimise ½ xᵀ H x - gᵀ x subject to C x ≥ d, where rows of higher rank bend first.
 
-    All rows are tried together. Only if they contradict each other are they taken rank by rank: a
-    row that cannot be met beside those of lower or equal rank is relaxed to the best value it can
-    have. By Farkas' lemma that value is known where the dual method stops: there its normal is a
+    All rows are tried together. Only if they contradict each other are they taken rank by rank, and
+    of the rows in conflict the least loyal is relaxed to the best value it can have. Where the dual
+    method stops at that row itself, the value is known: by Farkas' lemma its normal is there a
     non-positive combination of the active normals, so no feasible point has more of it.
 
     Args:
@@ -56,19 +57,36 @@ def solve_ordered_qp(
             for i in range(len(d)):  # what bends is the least loyal of those in conflict
                 if active[i] and rank[i] > rank[bending]:
                     bending = i
-            value = 0.0
-            for j in range(len(g)):
-                value += C[bending, j] * x[j]
-            slack = 1e-9 * (1.0 + abs(value))
-            relaxed[bending] = value - slack if bending == stuck else -np.inf
+            best = _value(C, bending, x)
+            if bending != stuck:
+                best = _best_value(H_inverse, C, relaxed, rank, bending)
+            eased = best - 1e-9 * (1.0 + abs(best))
+            relaxed[bending] = eased if eased < relaxed[bending] else -np.inf
     given_up = np.zeros(len(d))
     for i in range(len(d)):
-        value = 0.0
-        for j in range(len(g)):
-            value += C[i, j] * x[j]
-        if np.isfinite(d[i]) and d[i] - value > 1e-7:
-            given_up[i] = d[i] - value
+        violation = d[i] - _value(C, i, x)
+        if violation > 1e-7:
+            given_up[i] = violation
     return OrderedSolution(x, active, given_up, True)
+
+
+@njit(cache=True)
+def _value(C: FloatArray, row: int, x: FloatArray) -> float:
+    """Return the row's left-hand side at x."""
+    value = 0.0
+    for j in range(len(x)):
+        value += C[row, j] * x[j]
+    return value
+
+
+@njit(cache=True)
+def _best_value(
+    H_inverse: FloatArray, C: FloatArray, d: FloatArray, rank: IntArray, row: int
+) -> float:
+    """Return the most a row can have beside all rows of lower rank: a pull so strong it decides."""
+    pull = C[row] / max(_value(C, row, H_inverse @ C[row]), 1e-300)
+    x, _, _, _ = solve_qp(H_inverse, _FAR * pull, C, d, rank, rank[row] - 1)
+    return _value(C, row, x)
 
 
 @njit(cache=True)
