@@ -16,18 +16,19 @@ from vergence.vision.pyramid import Patch, load_window
 
 PATCH_PX = 24  # side of the patch that is aligned
 AREA_PX = 64  # side of the part of the image that it is looked for in
+FREE, RIGID = 0, 1  # whether the affine matrix may change
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
 CONVERGED_PX = 0.03  # a step; what is left after it is a tenth
 NOISE_GREY = 4.0  # grey levels; scales the prior on the affine matrix, nothing else
-FORM_DEVIATION = 0.1  # how far the affine matrix strays from what is expected
+FORM_DEVIATION = 0.05  # how far the affine matrix strays from what is expected
 
 
 class AlignmentTemplate(NamedTuple):
     """A patch of a picture and all that an alignment to it needs."""
 
     jacobian: Patch  # (8, n) by x, y, a11, a12, a21, a22, gain, bias; n = 24 × 24
-    inverse: FloatArray  # (8, 8) inverse of JᵀJ + prior
+    inverse: FloatArray  # (2, 8, 8) inverse of JᵀJ + prior; and with a rigid affine matrix
     facts: FloatArray  # (4,) feature point less patch centre x and y, px; mean; sum of squares
 
 
@@ -96,7 +97,12 @@ def fill_template(
         normal[k, k] += prior
     for k in range(UNKNOWNS):
         normal[k, k] += 1e-3  # keeps a patch without texture invertible
-    out.inverse[:] = np.linalg.inv(normal)
+    out.inverse[FREE] = np.linalg.inv(normal)
+    for k in range(2, 6):
+        normal[k, :], normal[:, k], normal[k, k] = 0.0, 0.0, 1.0
+    out.inverse[RIGID] = np.linalg.inv(normal)
+    for k in range(2, 6):
+        out.inverse[RIGID, k, k] = 0.0
 
 
 @njit(cache=True, fastmath=True)
@@ -144,7 +150,7 @@ def product(a: Patch, b: Patch) -> np.float32:
 
 @njit(cache=True)
 def align(
-    x: float, y: float, A: FloatArray, template: AlignmentTemplate, work: Resampling
+    x: float, y: float, A: FloatArray, template: AlignmentTemplate, form: int, work: Resampling
 ) -> Alignment:
     """Align the area of the image to a template; A is changed in place, its start is the prior.
 
@@ -157,6 +163,7 @@ def align(
         y: likewise.
         A: affine matrix from template to image, (2, 2).
         template: what to align to.
+        form: FREE, or RIGID to keep A as it is.
         work: the area, and memory.
     """
     prior = (NOISE_GREY / FORM_DEVIATION) ** 2
@@ -172,7 +179,7 @@ def align(
         for k in range(UNKNOWNS):
             total = 0.0
             for m in range(UNKNOWNS):
-                total += template.inverse[k, m] * right[m]
+                total += template.inverse[form, k, m] * right[m]
             q[k] = total
         gain = q[6]
         if not 0.05 < gain < 20.0:

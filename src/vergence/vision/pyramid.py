@@ -40,47 +40,48 @@ def load_window(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) -> 
 
 
 @njit(cache=True, fastmath=True)
-def halve(window: Patch, top: int, left: int, out: Patch) -> None:
-    """Average 2 × 2 pixels of a window into each entry of out, from (top, left) on."""
+def halve(window: Patch, out: Patch) -> None:
+    """Average 2 × 2 entries of a window into each entry of out."""
     rows, columns = out.shape
     scale = np.float32(0.25)
     for i in range(rows):
-        above = window[top + 2 * i, left : left + 2 * columns]
-        below = window[top + 2 * i + 1, left : left + 2 * columns]
+        above = window[2 * i, : 2 * columns]
+        below = window[2 * i + 1, : 2 * columns]
         target = out[i]
         for j in range(columns):
             target[j] = scale * (above[2 * j] + above[2 * j + 1] + below[2 * j] + below[2 * j + 1])
 
 
 @njit(cache=True, fastmath=True)
-def quarter(window: Patch, top: int, left: int, out: Patch) -> None:
-    """Average 4 × 4 pixels of a window into each entry of out, from (top, left) on."""
-    rows, columns = out.shape
+def average_rows(rows: ImageArray, start: int, out: Patch) -> None:
+    """Average 4 × 4 pixels of four rows into each entry of out, from a column on."""
+    first, second = rows[0, start:], rows[1, start:]
+    third, fourth = rows[2, start:], rows[3, start:]
     scale = np.float32(1.0 / 16.0)
-    total = np.empty(4 * columns, np.float32)
-    for i in range(rows):
-        line0 = window[top + 4 * i, left : left + 4 * columns]
-        line1 = window[top + 4 * i + 1, left : left + 4 * columns]
-        line2 = window[top + 4 * i + 2, left : left + 4 * columns]
-        line3 = window[top + 4 * i + 3, left : left + 4 * columns]
-        for j in range(4 * columns):
-            total[j] = line0[j] + line1[j] + line2[j] + line3[j]
-        target = out[i]
-        for j in range(columns):
-            target[j] = scale * (
-                total[4 * j] + total[4 * j + 1] + total[4 * j + 2] + total[4 * j + 3]
-            )
+    for j in range(np.uint64(out.size)):
+        total = np.int32(0)
+        for k in range(np.uint64(4)):
+            m = np.uint64(4) * j + k
+            total += np.int32(first[m]) + np.int32(second[m])
+            total += np.int32(third[m]) + np.int32(fourth[m])
+        out[j] = scale * np.float32(total)
 
 
-@njit(cache=True, fastmath=True)
-def smooth(window: Patch, out: Patch) -> None:
-    """Smooth by (1 2 1)/4 along both axes; out loses one pixel at every side."""
+@njit(cache=True)
+def load_quarter(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) -> None:
+    """Average 4 × 4 pixels of the window at an anchor into each entry of out, as load_window."""
+    height, width = image.shape
     rows, columns = out.shape
-    two, scale = np.float32(2.0), np.float32(1.0 / 16.0)
+    top, left = anchor_y - 2 * rows, anchor_x - 2 * columns
+    inside = left >= 0 and left + 4 * columns <= width
+    if inside and top >= 0 and top + 4 * rows <= height:
+        for i in range(rows):
+            average_rows(image[top + 4 * i : top + 4 * i + 4], left, out[i])
+        return
+    part = np.empty((4, 4 * columns), np.uint8)
     for i in range(rows):
-        above, here, below, target = window[i], window[i + 1], window[i + 2], out[i]
-        for j in range(columns):
-            left = above[j] + two * here[j] + below[j]
-            middle = above[j + 1] + two * here[j + 1] + below[j + 1]
-            right = above[j + 2] + two * here[j + 2] + below[j + 2]
-            target[j] = scale * (left + two * middle + right)
+        for k in range(4):
+            source = image[min(max(top + 4 * i + k, 0), height - 1)]
+            for j in range(4 * columns):
+                part[k, j] = source[min(max(left + j, 0), width - 1)]
+        average_rows(part, 0, out[i])

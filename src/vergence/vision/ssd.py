@@ -1,8 +1,11 @@
 """The search of [Nelson1995] section 2.3: the displacement that minimises the SSD, eq. (19).
 
-Coarse, middle and full resolution, on one window of the image. Two departures from the paper:
-the mean of template and window is taken out, so that a change of brightness costs nothing, and
-the best few minima of the coarse level are followed to full resolution instead of one alone.
+Coarse, middle and full resolution, on windows of the image alone. Departures from the paper, each
+because it makes the search right more often: the mean of template and window is taken out, so that
+a change of brightness costs nothing; a level of half the coarse resolution and twice its window
+joins the coarse level, so that one of many equal marks is told by its surroundings; the best few
+minima of the coarse level are followed to full resolution; a far window has to match a little
+better than a near one.
 """
 
 from collections.abc import Callable
@@ -12,81 +15,93 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import ImageArray
-from vergence.vision.pyramid import Patch, halve, load_window, quarter
+from vergence.vision.pyramid import Patch, halve, load_quarter, load_window
 
 RANGE_PX = 32  # the search reaches this far to every side
-TEMPLATE_PX = 16  # side of the full-resolution template
 COARSE, MIDDLE = 4, 2  # pixels averaged along each axis
 SIDE = 8  # entries along a side of the averaged templates
+POSITIONS = 2 * RANGE_PX // COARSE + 1  # along each axis of the coarse level
+WIDE_POSITIONS = RANGE_PX // COARSE + 1
 CANDIDATES = 3  # minima of the coarse level that are followed
 MIDDLE_REACH = 3  # middle pixels searched around each of them
 FULL_REACH = 2  # pixels searched around the middle minimum
-SEARCHED_PX = 2 * RANGE_PX + COARSE * SIDE  # side of the area that is searched
-WORTH_FOLLOWING = 3.0  # times the best SSD of the middle level: followed to full resolution
+WIDE_SHARE = 1.0  # weight of the surroundings against the coarse template
+DISTANCE_COST = 0.6  # at 32 px, in units of the template's variance
+WORTH_FOLLOWING = 3.0  # times the best sum so far: candidates followed to full resolution
 
-
-SurfaceKernel: TypeAlias = Callable[[Patch, int, int, Patch, int, Patch, Patch], None]
+SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None]
 
 
 class SsdTemplate(NamedTuple):
-    """What the search looks for: one window at three resolutions, all with the same centre."""
+    """What the search looks for: one window at four resolutions, all with the same centre."""
 
+    wide: Patch  # (8, 8) 64 × 64 px averaged
     coarse: Patch  # (8, 8) 32 × 32 px averaged
     middle: Patch  # (8, 8) 16 × 16 px averaged
     full: Patch  # (16, 16)
 
 
-TEMPLATE_SIZE = 8 * 8 + 8 * 8 + 16 * 16
+TEMPLATE_SIZE = 3 * 8 * 8 + 16 * 16
 
 
 @njit(cache=True)
 def template_in(memory: Patch) -> SsdTemplate:
     """Lay a template out in flat memory of TEMPLATE_SIZE."""
     return SsdTemplate(
-        memory[:64].reshape(8, 8), memory[64:128].reshape(8, 8), memory[128:].reshape(16, 16)
+        memory[:64].reshape(8, 8),
+        memory[64:128].reshape(8, 8),
+        memory[128:192].reshape(8, 8),
+        memory[192:].reshape(16, 16),
     )
 
 
 class SsdWorkspace(NamedTuple):
     """Memory that the search writes to, so that it allocates none."""
 
-    window: Patch  # (96, 96) the part of the image that is searched
-    averaged: Patch  # (24, 24) the same at the coarse level
-    part: Patch  # (14, 14) a part of it at the middle level
-    strip: Patch  # (320,) one column of positions, see ssd_surface
+    coarse: Patch  # (32, 32) 128 × 128 px around the anchor, averaged
+    wide: Patch  # (16, 16) the same at half that resolution
+    window: Patch  # (28, 28) what is searched at the middle level
+    middle: Patch  # (14, 14) the same averaged
+    full: Patch  # (20, 20) what is searched at full resolution
+    strip: Patch  # (320,) one column of positions
     surface: Patch  # (17, 17) SSD of the coarse level
+    wide_surface: Patch  # (9, 9)
     small: Patch  # (7, 7) SSD of the middle level
     tiny: Patch  # (5, 5) SSD at full resolution
-    candidates: Patch  # (3, 3) corner x, y and SSD at the middle level
+    candidates: Patch  # (3, 3) displacement x, y and score at the middle level
 
 
-WORKSPACE_SIZE = 96 * 96 + 24 * 24 + 14 * 14 + 320 + 17 * 17 + 7 * 7 + 5 * 5 + 3 * 3
+WORKSPACE_SIZE = 3433
 
 
 @njit(cache=True)
 def make_workspace(memory: Patch) -> SsdWorkspace:
     """Lay the parts of a workspace out in flat memory of WORKSPACE_SIZE."""
     return SsdWorkspace(
-        memory[:9216].reshape(96, 96),
-        memory[9216:9792].reshape(24, 24),
-        memory[9792:9988].reshape(14, 14),
-        memory[9988:10308],
-        memory[10308:10597].reshape(17, 17),
-        memory[10597:10646].reshape(7, 7),
-        memory[10646:10671].reshape(5, 5),
-        memory[10671:10680].reshape(3, 3),
+        memory[:1024].reshape(32, 32),
+        memory[1024:1280].reshape(16, 16),
+        memory[1280:2064].reshape(28, 28),
+        memory[2064:2260].reshape(14, 14),
+        memory[2260:2660].reshape(20, 20),
+        memory[2660:2980],
+        memory[2980:3269].reshape(17, 17),
+        memory[3269:3350].reshape(9, 9),
+        memory[3350:3399].reshape(7, 7),
+        memory[3399:3424].reshape(5, 5),
+        memory[3424:3433].reshape(3, 3),
     )
 
 
 @njit(cache=True)
 def make_template(
-    image: ImageArray, anchor_x: int, anchor_y: int, window: Patch, out: SsdTemplate
+    image: ImageArray, anchor_x: int, anchor_y: int, memory: Patch, out: SsdTemplate
 ) -> None:
-    """Fill a template from the windows at an anchor; window (32, 32) is memory."""
-    load_window(image, anchor_x, anchor_y, window)
-    quarter(window, 0, 0, out.coarse)
-    halve(window, 8, 8, out.middle)
-    out.full[:] = window[8:24, 8:24]
+    """Fill a template from the windows at an anchor; memory is (16, 16)."""
+    load_quarter(image, anchor_x, anchor_y, memory)
+    halve(memory, out.wide)
+    out.coarse[:] = memory[4:12, 4:12]
+    load_window(image, anchor_x, anchor_y, out.full)
+    halve(out.full, out.middle)
 
 
 def _surface_kernel(side: int) -> SurfaceKernel:
@@ -109,22 +124,22 @@ def _surface_kernel(side: int) -> SurfaceKernel:
 
     @njit(cache=True, fastmath=True)
     def surface(
-        area: Patch, top: int, left: int, template: Patch, count: int, strip: Patch, out: Patch
+        area: Patch, corner: int, template: Patch, count: int, strip: Patch, out: Patch
     ) -> None:
-        first, start, positions = np.uint64(top), np.uint64(left), np.uint64(count)
+        positions, start = np.uint64(count), np.uint64(corner)
         flat = template.reshape(side * side)
         for x in range(positions):
             for i in range(width + positions - np.uint64(1)):
                 for block in offsets:
                     for j in range(np.uint64(8)):
-                        strip[i * width + block + j] = area[first + i, start + x + block + j]
+                        strip[i * width + block + j] = area[start + i, start + x + block + j]
             for y in range(positions):
                 out[y, x] = ssd(strip, y * width, flat)
 
     return surface
 
 
-# SSD of a template at count × count positions of an area from (top, left) on, template and window
+# SSD of a template at count × count positions of an area from (corner, corner) on, template and window
 # both freed of their mean: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each column of
 # positions is copied to a strip as wide as the template, in which the windows lie one below the
 # other without a gap, so that the sums run over flat memory.
@@ -161,6 +176,28 @@ def vertex(before: float, here: float, after: float) -> float:
 
 
 @njit(cache=True)
+def coarse_scores(
+    image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
+) -> None:
+    """Fill work.surface: SSD of the coarse level, of the surroundings, and the cost of distance."""
+    load_quarter(image, anchor_x, anchor_y, work.coarse)
+    halve(work.coarse, work.wide)
+    # The area is 64 px wider than the window that is looked for; the coarse one is 32 px smaller.
+    ssd_surface_8(work.coarse, 4, template.coarse, POSITIONS, work.strip, work.surface)
+    ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
+    middle = POSITIONS // 2
+    cost = DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse)
+    wide, share = work.wide_surface, WIDE_SHARE / 4.0
+    for i in range(POSITIONS):
+        above, below = wide[i // 2], wide[(i + 1) // 2]
+        for j in range(POSITIONS):
+            left, right = j // 2, (j + 1) // 2
+            around = above[left] + above[right] + below[left] + below[right]
+            distance = (i - middle) ** 2 + (j - middle) ** 2
+            work.surface[i, j] += np.float32(share * around + cost * distance)
+
+
+@njit(cache=True)
 def search(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[float, float, float]:
@@ -168,72 +205,59 @@ def search(
 
     Returns:
         The displacement x and y of the best window from the anchor, px, with the vertex of a
-        parabola as fraction; and the SSD there, grey levels² summed over 16 × 16 px.
+        parabola as fraction; and its score, grey levels² a pixel summed over the levels.
     """
-    load_window(image, anchor_x, anchor_y, work.window)
-    quarter(work.window, 0, 0, work.averaged)
-    count = 2 * RANGE_PX // COARSE + 1
-    ssd_surface_8(work.averaged, 0, 0, template.coarse, count, work.strip, work.surface)
+    coarse_scores(image, anchor_x, anchor_y, template, work)
+    entries, middle, first = SIDE * SIDE, POSITIONS // 2, np.inf
     work.candidates[:, 2] = np.inf
-    coarse_limit = np.inf
     for k in range(CANDIDATES):
-        y, x = lowest(work.surface, count, count)
-        if not work.surface[y, x] <= coarse_limit:
+        row, column = lowest(work.surface, POSITIONS, POSITIONS)
+        score = work.surface[row, column] / entries
+        if k > 0 and score > WORTH_FOLLOWING * first:
             break
-        coarse_limit = WORTH_FOLLOWING * work.surface[y, x] if k == 0 else coarse_limit
-        strike_out(work.surface, count, count, y, x)
-        # The corner of the middle window stands 8 px from its anchor, that of the area 48.
-        left, top, value = search_middle(COARSE * x + 8, COARSE * y + 8, template, work)
+        first = min(first, score)
+        strike_out(work.surface, POSITIONS, POSITIONS, row, column)
+        dx, dy = COARSE * (column - middle), COARSE * (row - middle)
+        move_x, move_y, value = search_middle(image, anchor_x + dx, anchor_y + dy, template, work)
         found = work.candidates[k]
-        found[0], found[1], found[2] = left, top, value
+        found[0], found[1], found[2] = dx + move_x, dy + move_y, score + value / entries
     limit = WORTH_FOLLOWING * work.candidates[:, 2].min()
     best, best_x, best_y = np.inf, 0.0, 0.0
     for k in range(CANDIDATES):
         found = work.candidates[k]
         if found[2] <= limit:
-            column, row, total = search_full(int(found[0]), int(found[1]), template, work)
+            dx, dy = int(found[0]), int(found[1])
+            fine_x, fine_y, value = search_full(image, anchor_x + dx, anchor_y + dy, template, work)
+            total = found[2] + value / (4 * entries)
             if total < best:
-                best, best_x, best_y = total, column, row
-    start = (SEARCHED_PX - TEMPLATE_PX) / 2
-    return best_x - start, best_y - start, best
+                best, best_x, best_y = total, dx + fine_x, dy + fine_y
+    return best_x, best_y, best
 
 
 @njit(cache=True)
 def search_middle(
-    left: int, top: int, template: SsdTemplate, work: SsdWorkspace
+    image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[int, int, float]:
-    """Search the middle level around a window given by its corner in the area.
-
-    Returns:
-        The corner of the best window, left and top, and the SSD there. Near the edge of the area
-        the positions searched shift inwards.
-    """
+    """Search the middle level around an anchor: displacement x and y in px, and the SSD there."""
     count = 2 * MIDDLE_REACH + 1
-    last = SEARCHED_PX - MIDDLE * (SIDE + 2 * MIDDLE_REACH)
-    left = min(max(left - MIDDLE * MIDDLE_REACH, 0), last)
-    top = min(max(top - MIDDLE * MIDDLE_REACH, 0), last)
-    halve(work.window, top, left, work.part)
-    ssd_surface_8(work.part, 0, 0, template.middle, count, work.strip, work.small)
+    load_window(image, anchor_x, anchor_y, work.window)
+    halve(work.window, work.middle)
+    ssd_surface_8(work.middle, 0, template.middle, count, work.strip, work.small)
     row, column = lowest(work.small, count, count)
-    return left + MIDDLE * column, top + MIDDLE * row, float(work.small[row, column])
+    value = float(work.small[row, column])
+    return MIDDLE * (column - MIDDLE_REACH), MIDDLE * (row - MIDDLE_REACH), value
 
 
 @njit(cache=True)
 def search_full(
-    left: int, top: int, template: SsdTemplate, work: SsdWorkspace
+    image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[float, float, float]:
-    """Search full resolution around a window given by its corner, as search_middle does.
-
-    Returns:
-        The corner of the best window with fraction, left and top, and the SSD there.
-    """
+    """Search full resolution around an anchor: displacement with fraction, and the SSD there."""
     count, tiny = 2 * FULL_REACH + 1, work.tiny
-    last = SEARCHED_PX - TEMPLATE_PX - 2 * FULL_REACH
-    left = min(max(left - FULL_REACH, 0), last)
-    top = min(max(top - FULL_REACH, 0), last)
-    ssd_surface_16(work.window, top, left, template.full, count, work.strip, tiny)
+    load_window(image, anchor_x, anchor_y, work.full)
+    ssd_surface_16(work.full, 0, template.full, count, work.strip, tiny)
     row, column = lowest(tiny, count, count)
-    x, y = float(left + column), float(top + row)
+    x, y = float(column - FULL_REACH), float(row - FULL_REACH)
     if 0 < column < count - 1:
         x += vertex(tiny[row, column - 1], tiny[row, column], tiny[row, column + 1])
     if 0 < row < count - 1:

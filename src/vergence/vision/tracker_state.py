@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.vision.alignment import (
     AREA_PX,
+    FREE,
     PATCH_PX,
     RESAMPLING_SIZE,
+    RIGID,
     UNKNOWNS,
     Alignment,
     AlignmentTemplate,
@@ -40,7 +42,7 @@ KEYS = 16  # key templates kept for each point
 REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or shrunk by this
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
 LOST_CORRELATION = 0.7
-LOST_SHIFT_PX = 3.5  # search and alignment must agree within this
+LOST_SHIFT_PX = 2.5  # search and alignment must agree within this
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
 FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
@@ -57,9 +59,9 @@ class TrackerState(NamedTuple):
 
     places: FloatArray  # (M, 8) px where last found; affine 2 × 2 from first image to last; search
     # offset: point less centre of the search template, px
-    search: Patch  # (M, 384) search template
+    search: Patch  # (M, 448) search template
     jacobian: Patch  # (M, K, 8, n) of the key templates
-    inverse: FloatArray  # (M, K, 8, 8) of the key templates
+    inverse: FloatArray  # (M, K, 2, 8, 8) of the key templates
     facts: FloatArray  # (M, K, 12) of the key templates: 4 of the alignment; affine 2 × 2 from the
     # first image to the template's; covariance 2 × 2 of the point's place in it, px²
     keys: IntArray  # (M, 2) how many key templates there are, and which one is in use
@@ -82,7 +84,7 @@ def empty_state(count: int) -> TrackerState:
         places,
         np.zeros((count, TEMPLATE_SIZE), f4),
         np.zeros((count, KEYS, UNKNOWNS, n), f4),
-        np.zeros((count, KEYS, UNKNOWNS, UNKNOWNS)),
+        np.zeros((count, KEYS, 2, UNKNOWNS, UNKNOWNS)),
         np.zeros((count, KEYS, 12)),
         np.zeros((count, 2), np.int64),
         np.zeros(WORKSPACE_SIZE + RESAMPLING_SIZE, f4),
@@ -166,8 +168,8 @@ def renew_search(image: ImageArray, state: TrackerState, k: int) -> None:
     """Take the window at point k as what to search for next."""
     x, y = state.places[k, 0], state.places[k, 1]
     anchor_x, anchor_y = anchor_of(x), anchor_of(y)
-    window = state.memory[:1024].reshape(32, 32)
-    make_template(image, anchor_x, anchor_y, window, template_in(state.search[k]))
+    memory = state.memory[:256].reshape(16, 16)
+    make_template(image, anchor_x, anchor_y, memory, template_in(state.search[k]))
     state.places[k, 6], state.places[k, 7] = x - (anchor_x - 0.5), y - (anchor_y - 0.5)
 
 
@@ -227,13 +229,17 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
     load_window(image, anchor_of(x), anchor_of(y), work.area)
     key = state.keys[k, 1]
     key_affine, affine = key_affine_of(state, k, key), affine_of(state, k)
-    A = product2(affine, inverse2(key_affine))
-    before = A.copy()
-    found = align(x - corner_x, y - corner_y, A, key_template_of(state, k, key), work)
-    point_x, point_y = found.x + corner_x, found.y + corner_y
-    shift = np.hypot(point_x - x, point_y - y)
-    verdict, detail = judge(found, shift, stretch(product2(A, inverse2(before))))
-    out[RESIDUAL], out[CORRELATION], out[DETAIL] = found.residual, found.correlation, detail
+    before = product2(affine, inverse2(key_affine))
+    template, verdict = key_template_of(state, k, key), NO_MATCH
+    for form in (FREE, RIGID):
+        A = before.copy()
+        found = align(x - corner_x, y - corner_y, A, template, form, work)
+        point_x, point_y = found.x + corner_x, found.y + corner_y
+        shift = np.hypot(point_x - x, point_y - y)
+        verdict, detail = judge(found, shift, stretch(product2(A, inverse2(before))))
+        out[RESIDUAL], out[CORRELATION], out[DETAIL] = found.residual, found.correlation, detail
+        if verdict == FOUND:
+            break
     if not fits(point_x, point_y, width, height):
         return LEFT
     if verdict != FOUND:
@@ -273,7 +279,7 @@ def place_covariance(
     scale = (found.residual / found.gain) ** 2
     for i in range(2):
         for j in range(2):
-            inner[i, j] += scale * state.inverse[k, key, i, j]
+            inner[i, j] += scale * state.inverse[k, key, FREE, i, j]
     out = product2(product2(A, inner), A.T)
     out[0, 0] += FLOOR_PX**2
     out[1, 1] += FLOOR_PX**2
