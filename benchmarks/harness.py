@@ -7,14 +7,19 @@ Python function, `loops(f)` of a function that repeats inside itself (a compiled
 """
 
 import gc
+import os
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 Block = Callable[[int], float]
 """Runs a case this many times; returns the seconds per call."""
+
+ONE_CORE = {max(os.sched_getaffinity(0))}
+"""Where rows with a peer of one thread run, both sides: cores differ in speed on a busy machine."""
 
 UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -103,6 +108,18 @@ def compare(
     return {name: Timing(tuple(values)) for name, values in seconds.items()}
 
 
+@contextmanager
+def on_one_core(wanted: bool) -> Iterator[None]:
+    """Keeps this thread on ONE_CORE meanwhile, if wanted."""
+    before = os.sched_getaffinity(0)
+    if wanted:
+        os.sched_setaffinity(0, ONE_CORE)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
 def row(
     name: str,
     ours: Block,
@@ -113,6 +130,7 @@ def row(
     value_aim: float | None = None,
     rounds: int = 31,
     round_seconds: float = 0.01,
+    one_core: bool = True,
 ) -> dict[str, Any]:
     """Times one case, with its peer in turn where there is one, and says whether its aim holds.
 
@@ -125,6 +143,7 @@ def row(
         value_aim: ours is at most this, in `unit`.
         rounds: how many rounds.
         round_seconds: about how long a block runs a round.
+        one_core: whether both sides share one core, as is fair where each uses one thread.
 
     Returns:
         A row with the keys `name`, `value`, `low`, `high` (quartiles), `unit`, `peer`,
@@ -134,7 +153,8 @@ def row(
     blocks = {"ours": ours}
     if isinstance(peer, Peer):
         blocks["peer"] = peer.block
-    timings = compare(blocks, rounds, round_seconds)
+    with on_one_core(one_core):
+        timings = compare(blocks, rounds, round_seconds)
     scale = UNITS[unit]
     low, high = timings["ours"].quartiles
     value = scale * timings["ours"].median

@@ -9,7 +9,7 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from harness import Missing, Peer
+from harness import ONE_CORE, Missing, Peer
 
 PROJECT = Path(__file__).parents[1]
 SOURCES = PROJECT / "benchmarks" / "peers"
@@ -31,6 +31,7 @@ class Program:
             env=os.environ | ONE_THREAD,
         )
         atexit.register(self._process.terminate)
+        os.sched_setaffinity(self._process.pid, ONE_CORE)
         self.name = self._answer()
 
     def _answer(self) -> str:
