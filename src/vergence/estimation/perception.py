@@ -26,6 +26,7 @@ from vergence.estimation.windows import WindowRule, innovation_spread
 from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 
+DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
 USED = (Verdict.USED, Verdict.RECOVERED)
 
 
@@ -34,6 +35,8 @@ class PerceptionSettings:
     """How the inner circle looks."""
 
     budget: int = 8  # features measured a tick, over all cameras
+    budget_in_doubt: int = 32  # the same while the filter is inconsistent
+    doubt_widens: float = 4.0  # windows by 1 + this · share of the last points that disagreed
     margin_px: float = 8.0  # from the border of a picture
     least_cosine: float = 0.1  # between a face's normal and the line of sight
     horizon: float = 0.5  # s, how late a picture may arrive
@@ -174,6 +177,7 @@ class PosePerception(Generic[B]):
         none = np.zeros(len(self._shape.points), dtype=np.bool_)
         numbers = [p.number for p in pictures]
         newest = self._history.at(pictures[-1].frame.time)
+        certain = newest.consistency.holds and newest.disagreeing < DOUBT
         chosen = self._selection.choose(
             Candidates(
                 visibility.visible,
@@ -186,7 +190,7 @@ class PosePerception(Generic[B]):
                 np.ascontiguousarray(newest.honest_covariance[:6, :6]),
                 np.array([self._held.get(p.frame.camera, none) for p in pictures]),
             ),
-            self._settings.budget,
+            self._settings.budget if certain else self._settings.budget_in_doubt,
         )
         for picture, mask in zip(pictures, chosen, strict=True):
             self._held[picture.frame.camera] = mask
@@ -229,7 +233,7 @@ class PosePerception(Generic[B]):
             belief.honest_covariance,
         )
         camera, noise = self._rig.cameras[picture.number], self._rig.noise_px[picture.number]
-        scale = 1.0 if belief.state().consistent else 2.0
+        scale = 1.0 + self._settings.doubt_widens * belief.disagreeing
         return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
 
     def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:

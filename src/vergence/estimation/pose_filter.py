@@ -15,6 +15,7 @@ from vergence.estimation.motion import correct_pose, predict_covariance, predict
 from vergence.estimation.target_filter import (
     Update,
     Verdict,
+    fading_share,
     require_covariance,
     require_finite,
     unused,
@@ -23,7 +24,7 @@ from vergence.estimation.view import View
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
 CONSENSUS = 5  # points that must agree to overrule the prediction: any three agree on some pose
-PATIENCE = 4.0  # by how much the covariance may grow with a picture that proves nothing by itself
+GROWTH = 2.0  # of the covariance, for a picture too small to prove which pose it contradicts
 
 
 class Correction(NamedTuple):
@@ -97,23 +98,22 @@ class PoseFilter:
     A point beyond the gate is left out only while the prediction agrees with most of its picture.
     Where the gate would throw out the majority, not the points but the prediction is in doubt: then
     the covariance is enlarged until the median point has its expected distance, and the picture is
-    used if one pose then explains the majority. A picture of fewer than four points cannot know
-    that by itself: it is believed if most of the points before it were outside the gate, too.
+    used if one pose then explains the majority, five points at least. A smaller picture proves
+    nothing by itself: it is left out, and if most of the points before it were outside the gate,
+    too, the covariance grows until points are let in again.
     """
 
     acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
     angular_acceleration_density: float = 0.25  # rad²/s³
     gate: float = 13.8  # χ² with 2 degrees of freedom: one good point in a thousand is lost
     fading: float = 0.9  # weight of the past in the consistency test, for each picture
-    point_fading: float = 0.93  # weight of the past in the share of disagreeing points, for each
 
     def __post_init__(self) -> None:
         for name in ("acceleration_density", "angular_acceleration_density", "gate"):
             if not getattr(self, name) > 0.0:
                 raise InputError("PoseFilter", name, getattr(self, name), "a number above zero")
-        for name in ("fading", "point_fading"):
-            if not 0.0 < getattr(self, name) < 1.0:
-                raise InputError("PoseFilter", name, getattr(self, name), "between 0 and 1")
+        if not 0.0 < self.fading < 1.0:
+            raise InputError("PoseFilter", "fading", self.fading, "between 0 and 1")
 
     def start(
         self,
@@ -171,10 +171,7 @@ class PoseFilter:
         if view.size == 0:
             return unused(belief, view, Verdict.EMPTY)
         found = self._correct(belief, belief.covariance, view, belief.consistency.scale)
-        weight = self.point_fading**view.size
-        share = 1.0 - float(np.mean(found.kept))
-        disagreeing = weight * belief.disagreeing + (1.0 - weight) * share
-        belief = replace(belief, disagreeing=disagreeing)
+        belief = replace(belief, disagreeing=fading_share(belief.disagreeing, found.kept))
         if 2 * np.count_nonzero(found.kept) >= view.size:
             return self._used(belief, found, Verdict.USED)
         return self._overruled(belief, view, found)
@@ -214,18 +211,14 @@ class PoseFilter:
     def _overruled(self, belief: Belief, view: View, first: Correction) -> Update:
         """Believe the picture rather than the prediction, if its majority agrees on a pose."""
         median = float(np.median(first.squares))
-        enlarged = max(1.0, median / MEDIAN)
-        if belief.disagreeing > 0.5 and view.size < CONSENSUS:
-            enlarged, needed = min(enlarged, PATIENCE), 1
-            belief = replace(belief, covariance=enlarged * belief.covariance)
-            found = self._correct(belief, belief.covariance, view, 1.0)
-        elif np.isfinite(median):
-            needed = max(CONSENSUS, (view.size + 1) // 2)
+        needed = max(CONSENSUS, (view.size + 1) // 2)
+        if view.size >= needed and np.isfinite(median):
+            enlarged = max(1.0, median / MEDIAN)
             found = self._correct(belief, enlarged * belief.covariance, view, 1.0)
-        else:
-            found, needed = first, view.size + 1
-        if np.count_nonzero(found.kept) >= needed:
-            update = self._used(belief, found, Verdict.RECOVERED, enlarged)
-            return update._replace(squares=first.squares)
+            if np.count_nonzero(found.kept) >= needed:
+                update = self._used(belief, found, Verdict.RECOVERED, enlarged)
+                return update._replace(squares=first.squares)
+        if belief.disagreeing > 0.5:
+            belief = replace(belief, covariance=GROWTH * belief.covariance)
         refused = unused(replace(belief, doubts=belief.doubts + 1), view, Verdict.CONTRADICTED)
         return refused._replace(squares=first.squares)

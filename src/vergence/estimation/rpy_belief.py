@@ -42,6 +42,7 @@ class RpyBelief:
     consistency: Consistency = field(default_factory=Consistency)
     seen: float = -np.inf  # s, exposure of the last picture that was used
     doubts: int = 0  # pictures in a row of which no point could be used
+    disagreeing: float = 0.0  # share of the last points that could not be used, fading
 
     @property
     def T_world_target(self) -> FloatArray:
@@ -74,5 +75,5 @@ class RpyBelief:
             self.T_world_target,
             self.velocity,
             self.honest_covariance,
-            self.consistency.holds and self.doubts == 0,
+            self.consistency.holds and self.disagreeing < 0.5,
         )

@@ -13,6 +13,7 @@ from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
 from vergence.estimation.target_filter import (
     Update,
     Verdict,
+    fading_share,
     require_covariance,
     require_finite,
     unused,
@@ -131,18 +132,21 @@ class RpyPoseFilter:
     def update(self, belief: RpyBelief, view: View) -> Update:
         """Predict to the exposure of a picture and correct by its points, eq. (11) to (13)."""
         belief = self.predict(belief, view.time)
+        if view.size == 0:
+            return unused(belief, view, Verdict.EMPTY)
         w, P = belief.vector, belief.vector_covariance
         rows = rpy_rows(w, view.T_camera_world, view.points, view.measured, view.covariance)
         squares = mahalanobis_squared(rows, P)
         kept = np.isfinite(squares) & (squares <= self.gate)
+        disagreeing = fading_share(belief.disagreeing, kept)
+        belief = replace(belief, disagreeing=disagreeing)
         if not kept.any():
-            verdict = Verdict.CONTRADICTED if view.size else Verdict.EMPTY
-            doubts = belief.doubts + (view.size > 0)
-            return unused(replace(belief, doubts=doubts), view, verdict)._replace(squares=squares)
+            doubting = replace(belief, doubts=belief.doubts + 1)
+            return unused(doubting, view, Verdict.CONTRADICTED)._replace(squares=squares)
         rows = keep_rows(rows, kept)
         rest = compress(rows)
         correction, P, square = joseph_update(P, rows)
-        count = 2 * int(np.count_nonzero(kept))
-        consistency = belief.consistency.add(square + rest, count, self.fading)
-        after = RpyBelief(view.time, w + correction, P, consistency, seen=view.time)
+        freedom = 2 * int(np.count_nonzero(kept))
+        consistency = belief.consistency.add(square + rest, freedom, self.fading)
+        after = RpyBelief(view.time, w + correction, P, consistency, view.time, 0, disagreeing)
         return Update(after, Verdict.USED, kept, squares)

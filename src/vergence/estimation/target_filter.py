@@ -56,6 +56,11 @@ class TargetBelief(Protocol):
         """Pictures in a row that contradicted the prediction and were not used."""
         ...
 
+    @property
+    def disagreeing(self) -> float:
+        """Share of the last points that fell outside the gate, fading."""
+        ...
+
     def state(self) -> TargetState:
         """Return the belief as perception hands it on."""
         ...
@@ -98,6 +103,18 @@ class TargetFilter(Protocol[B]):
 def unused(belief: TargetBelief, view: View, verdict: Verdict) -> Update:
     """Return the update by a picture of which nothing was used."""
     return Update(belief, verdict, np.zeros(view.size, np.bool_), np.full(view.size, np.nan))
+
+
+def fading_share(share: float, kept: BoolArray, fading: float = 0.93) -> float:
+    """Return the share of points outside the gate with those of one more picture, (M,).
+
+    Args:
+        share: before.
+        kept: points that passed the gate.
+        fading: weight of the past for each point; 0.93 looks back over some thirty points.
+    """
+    weight = fading ** len(kept)
+    return weight * share + (1.0 - weight) * (1.0 - float(np.mean(kept)))
 
 
 def require_covariance(covariance: FloatArray, source: str) -> None:
