@@ -139,9 +139,9 @@ def _surface_kernel(side: int) -> SurfaceKernel:
     return surface
 
 
-# SSD of a template at count × count positions of an area from (corner, corner) on, template and window
-# both freed of their mean: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each column of
-# positions is copied to a strip as wide as the template, in which the windows lie one below the
+# SSD of a template at count × count positions of an area from (corner, corner) on, template and
+# window both freed of their mean: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each column
+# of positions is copied to a strip as wide as the template, in which the windows lie one below the
 # other without a gap, so that the sums run over flat memory.
 ssd_surface_8 = _surface_kernel(8)
 ssd_surface_16 = _surface_kernel(16)
