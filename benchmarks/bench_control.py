@@ -9,7 +9,6 @@ from numba import njit
 
 from harness import calls, loops, row
 from peer_programs import machinevision, visp
-from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control import (
     OptimalTrackingLaw,
@@ -39,16 +38,17 @@ def law_of(arm: Arm, S: float) -> OptimalTrackingLaw:
     return OptimalTrackingLaw(arm, camera, DEPTH, avoidance_axes=("x", "y", "z"), S=S)
 
 
-def law_alone(law: OptimalTrackingLaw) -> Callable[[], FloatArray]:
+def law_alone(law: OptimalTrackingLaw) -> Callable[[], None]:
     """Interaction matrix and camera twist, without the arm: what `vpServo` does for a camera."""
-    packed = pack_setup(law.setup)
-    return lambda: packed_twist(packed, FEATURES)
+    weights, v_camera = pack_setup(law.setup).weights, np.empty(6)
+    return lambda: packed_twist(weights, FEATURES, v_camera)
 
 
-def whole_tick(law: OptimalTrackingLaw) -> Callable[[], FloatArray]:
+def whole_tick(law: OptimalTrackingLaw) -> Callable[[], None]:
     """From features and joint positions to joint rates."""
-    packed = pack_setup(law.setup)
-    return lambda: packed_tick(packed, POSE, FEATURES)
+    weights, joints = pack_setup(law.setup)
+    result = np.empty(16)
+    return lambda: packed_tick(weights, joints, POSE, FEATURES, result)
 
 
 @njit

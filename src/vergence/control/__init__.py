@@ -2,10 +2,15 @@
 
 from vergence.control.command import JointCommand
 from vergence.control.guard import Guard, guarded_step, stoppable_speed
+from vergence.control.inner import InnerLaw
+from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.law import Law
 from vergence.control.optimal_tracking import OptimalTrackingLaw
+from vergence.control.position_based import PositionBasedLaw, hand_rates
+from vergence.control.redundancy import resolve_redundant
 from vergence.control.resolve import resolve_twist
 from vergence.control.tracking_kernels import (
+    PackedSetup,
     TrackingGains,
     TrackingSetup,
     TrackingTick,
@@ -20,18 +25,27 @@ from vergence.control.tracking_kernels import (
 
 __all__ = [
     "Guard",
+    "InnerLaw",
     "JointCommand",
     "Law",
+    "MovingPose",
     "OptimalTrackingLaw",
+    "PackedSetup",
+    "PositionBasedLaw",
     "TrackingGains",
     "TrackingSetup",
     "TrackingTick",
     "guarded_step",
+    "hand_rates",
     "image_model",
+    "interpolate",
+    "moved",
     "optimal_tracking_tick",
     "pack_setup",
     "packed_tick",
     "packed_twist",
+    "pose_difference",
+    "resolve_redundant",
     "resolve_twist",
     "stoppable_speed",
     "tracking_displacement",

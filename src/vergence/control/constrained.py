@@ -112,9 +112,7 @@ def constrained_rates(
     rates = solution.x
     solved = solution.solved and np.all(np.isfinite(rates))
     if not solved:
-        rates = velocity - np.minimum(
-            np.maximum(velocity, -limits[3] * period), limits[3] * period
-        )
+        rates = velocity - np.minimum(np.maximum(velocity, -limits[3] * period), limits[3] * period)
     return ConstrainedRates(rates, m.value, m.penalty, active, given_up, solved)
 
 

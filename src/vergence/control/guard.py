@@ -84,6 +84,11 @@ class Guard:
         self.at_limit: BoolArray = np.zeros(arm.joint_count, dtype=np.bool_)
 
     @property
+    def position(self) -> FloatArray:
+        """The last set-point (n,), rad or m."""
+        return self._position
+
+    @property
     def moving(self) -> bool:
         """Whether the set-point still moves."""
         return bool(np.any(np.abs(self._velocity) > 1e-9))

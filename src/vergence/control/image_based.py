@@ -58,7 +58,6 @@ class ImageBased:
             L = interaction_matrix_points(desired, depth)
         else:
             L = 0.5 * (
-                interaction_matrix_points(points, depth)
-                + interaction_matrix_points(desired, depth)
+                interaction_matrix_points(points, depth) + interaction_matrix_points(desired, depth)
             )
         return L

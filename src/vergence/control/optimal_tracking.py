@@ -93,7 +93,9 @@ class OptimalTrackingLaw:
             float(penalty_k),
             penalty == "per_joint",
             singular_below,
-            np.vstack((arm.q_min, arm.q_max, arm.rate_max)),
+            arm.q_min,
+            arm.q_max,
+            arm.rate_max,
             arm.chain,
         )
         self._packed = pack_setup(self.setup)
@@ -109,7 +111,9 @@ class OptimalTrackingLaw:
         features = np.column_stack(
             (self.camera.normalize(seen), self.camera.normalize(wanted), depth[view.found])
         )
-        tick = unpack_tick(packed_tick(self._packed, joints.position, features))
+        result = np.empty(self.arm.joint_count + 10)
+        packed_tick(*self._packed, joints.position, features, result)
+        tick = unpack_tick(result)
         sigma = tick.sigma
         fault = None
         if sigma < self.singular_below:

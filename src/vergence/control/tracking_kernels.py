@@ -16,7 +16,7 @@ from vergence.robot.manipulability import (
     measure_gradient,
     posture,
 )
-from vergence.robot.positive_definite import invert_spd, times_six
+from vergence.robot.positive_definite import invert_spd, outer_square, times_six
 
 
 class TrackingGains(NamedTuple):
@@ -39,7 +39,9 @@ class TrackingSetup(NamedTuple):
     penalty_k: float  # steepness of the penalty (27)
     per_joint: bool  # whether the penalty is taken joint by joint
     damping: float  # smallest singular value below which J⁻¹ is damped
-    limits: FloatArray  # (3, n) rows q_min, q_max, rate_max
+    q_min: FloatArray  # (n,) rad or m
+    q_max: FloatArray  # (n,)
+    rate_max: FloatArray  # (n,) rad/s or m/s
     chain: Chain  # the arm up to its camera
 
 
@@ -73,17 +75,15 @@ def tracking_displacement(
         w: w'(q).
         gradient: ∂w'/∂x along the camera's axes, (6,), per m and per rad.
     """
-    H, g = np.zeros((6, 6)), np.zeros(6)
+    H, g = outer_square(B.T), np.zeros(6)
     for r in range(len(B)):
         for i in range(6):
-            weighted = gains.Q * B[r, i]
-            g[i] -= weighted * error_px[r]
-            for j in range(6):
-                H[i, j] += weighted * B[r, j]
+            g[i] -= B[r, i] * error_px[r]
     for i in range(6):
-        g[i] *= gains.controlled[i]
+        weight = gains.Q * gains.controlled[i]
+        g[i] *= weight
         for j in range(6):
-            H[i, j] *= gains.controlled[i] * gains.controlled[j]
+            H[i, j] *= weight * gains.controlled[j]
         H[i, i] += gains.R[i]
     inverse = invert_spd(H)[0]
     u = times_six(inverse, g)
@@ -132,9 +132,7 @@ def optimal_tracking_tick(
     """
     gains = setup.gains
     arm = posture(setup.chain, q, setup.damping)
-    P, gradient_P = limit_penalty(
-        q, setup.limits[0], setup.limits[1], setup.penalty_k, setup.per_joint
-    )
+    P, gradient_P = limit_penalty(q, setup.q_min, setup.q_max, setup.penalty_k, setup.per_joint)
     gradient = gains.avoiding
     if gains.S > 0.0:
         gradient = camera_gradient(arm, measure_gradient(arm, P, gradient_P))
@@ -144,76 +142,79 @@ def optimal_tracking_tick(
     for i in range(6):
         v_camera[i] /= gains.period
     rates = joint_rates(arm, v_camera)
-    scale = slow_down(rates, setup.limits[2])
+    scale = slow_down(rates, setup.rate_max)
     return TrackingTick(rates, v_camera, scale, w, P, arm.sigma)
 
 
-def pack_setup(setup: TrackingSetup) -> FloatArray:
-    """Write a setup into one flat array: a container of arrays costs a call from Python 3 µs."""
-    gains = setup.gains
+class PackedSetup(NamedTuple):
+    """A setup in two arrays: every array costs a call from Python 0.1 µs, a container more."""
+
+    weights: FloatArray  # (27,) the numbers and the gains
+    joints: FloatArray  # (n + 1, 4, 4) the chain's transforms; their last rows hold the limits
+
+
+def pack_setup(setup: TrackingSetup) -> PackedSetup:
+    """Write a setup into arrays, for `packed_tick`."""
+    gains, chain = setup.gains, setup.chain
     numbers = (gains.Q, gains.S, gains.avoidance_max, gains.period)
     penalty = (setup.penalty_k, setup.per_joint, setup.damping)
-    arrays = (gains.R, gains.controlled, gains.avoiding, setup.limits, *setup.chain)
-    count = setup.limits.shape[1]
-    flat = [np.ravel(part).astype(np.float64) for part in arrays]
-    return np.concatenate([[count, *numbers, *penalty, *setup.focal_px], *flat])
+    weights = (numbers, penalty, setup.focal_px, gains.R, gains.controlled, gains.avoiding)
+    joints = np.zeros((len(chain.position), 4, 4))
+    joints[:, :3, :3], joints[:, :3, 3] = chain.rotation, chain.position
+    joints[:-1, 3] = np.column_stack((setup.q_min, setup.q_max, setup.rate_max, chain.sliding))
+    return PackedSetup(np.concatenate(weights), joints)
 
 
 @njit(cache=True, error_model="numpy")
-def unpack_setup(packed: FloatArray) -> TrackingSetup:
+def unpack_gains(w: FloatArray) -> TrackingGains:
+    """Read the gains back."""
+    return TrackingGains(w[0], w[9:15], w[1], w[15:21], w[21:27], w[2], w[3])
+
+
+@njit(cache=True, error_model="numpy")
+def unpack_setup(w: FloatArray, joints: FloatArray) -> TrackingSetup:
     """Read a setup back, its arrays as views."""
-    n = int(packed[0])
-    limits, rotation = 28, 28 + 3 * n
-    position = rotation + 9 * (n + 1)
-    sliding = position + 3 * (n + 1)
-    gains = TrackingGains(
-        packed[1], packed[10:16], packed[2], packed[16:22], packed[22:28], packed[3], packed[4]
-    )
-    chain = Chain(
-        packed[rotation:position].reshape((n + 1, 3, 3)),
-        packed[position:sliding].reshape((n + 1, 3)),
-        packed[sliding:] != 0.0,
-    )
-    return TrackingSetup(
-        gains,
-        packed[8:10],
-        packed[5],
-        packed[6] != 0.0,
-        packed[7],
-        packed[limits:rotation].reshape((3, n)),
-        chain,
-    )
+    chain = Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 3, 3])
+    low, high, rate = joints[:-1, 3, 0], joints[:-1, 3, 1], joints[:-1, 3, 2]
+    gains = unpack_gains(w)
+    return TrackingSetup(gains, w[7:9], w[4], w[5] != 0.0, w[6], low, high, rate, chain)
 
 
 @njit(cache=True, error_model="numpy")
-def packed_tick(packed: FloatArray, q: FloatArray, features: FloatArray) -> FloatArray:
-    """The tick as Python calls it: arrays in, one array out.
+def packed_tick(
+    weights: FloatArray,
+    joints: FloatArray,
+    q: FloatArray,
+    features: FloatArray,
+    result: FloatArray,
+) -> None:
+    """The tick as Python calls it: arrays alone, the result in one of them.
 
     Args:
-        packed: `pack_setup` of the setup.
+        weights: of `pack_setup`.
+        joints: of `pack_setup`.
         q: joint positions, (n,).
         features: as for `image_model`, (M, 5).
-
-    Returns:
-        The fields of a `TrackingTick` one after the other, (n + 10,).
+        result: takes the fields of a `TrackingTick` one after the other, (n + 10,).
     """
-    tick = optimal_tracking_tick(unpack_setup(packed), q, features)
+    tick = optimal_tracking_tick(unpack_setup(weights, joints), q, features)
     n = len(q)
-    result = np.empty(n + 10)
-    result[:n] = tick.rates
-    result[n : n + 6] = tick.v_camera
+    for i in range(n):
+        result[i] = tick.rates[i]
+    for i in range(6):
+        result[n + i] = tick.v_camera[i]
     result[n + 6], result[n + 7] = tick.scale, tick.w
     result[n + 8], result[n + 9] = tick.penalty, tick.sigma
-    return result
 
 
 @njit(cache=True, error_model="numpy")
-def packed_twist(packed: FloatArray, features: FloatArray) -> FloatArray:
-    """Return the camera twist (6,) of the law alone, (17): no arm, no avoidance."""
-    Q, period, focal_px = packed[1], packed[4], packed[8:10]
-    gains = TrackingGains(Q, packed[10:16], 0.0, packed[16:22], packed[22:28], 0.0, period)
+def packed_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray) -> None:
+    """The law alone as Python calls it, (17): no arm, no avoidance; fills the twist (6,)."""
+    gains, focal_px = unpack_gains(weights), weights[7:9]
     error_px, B = image_model(features, focal_px)
-    return tracking_displacement(error_px, B, gains, 1.0, packed[22:28]) / period
+    u = tracking_displacement(error_px, B, gains, 0.0, gains.avoiding)
+    for i in range(6):
+        v_camera[i] = u[i] / gains.period
 
 
 def unpack_tick(result: FloatArray) -> TrackingTick:

@@ -20,9 +20,7 @@ _KINDS = {
 }
 
 
-def read_chain(
-    model: Any, tip: str, kind: str
-) -> tuple[tuple[str, ...], Chain, FloatArray]:
+def read_chain(model: Any, tip: str, kind: str) -> tuple[tuple[str, ...], Chain, FloatArray]:
     """Return joint names, chain and position limits (n, 2) of the joints that carry the tip.
 
     The transforms are read from the model in its reference configuration, where MuJoCo draws every

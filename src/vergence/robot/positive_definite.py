@@ -47,7 +47,7 @@ def outer_square(J: FloatArray) -> FloatArray:
             total = 0.0
             for k in range(J.shape[1]):
                 total += J[i, k] * J[j, k]
-            A[i, j] = A[j, i] = total
+            A[i, j], A[j, i] = total, total
     return A
 
 
