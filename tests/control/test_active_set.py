@@ -34,7 +34,11 @@ def test_minimum_agrees_with_a_general_solver(slack):
             cost,
             np.linalg.lstsq(C, d, rcond=None)[0],
             jac=lambda x, H=H, g=g: H @ x - g,
-            constraints={"type": "ineq", "fun": lambda x, C=C, d=d: C @ x - d, "jac": lambda x, C=C: C},
+            constraints={
+                "type": "ineq",
+                "fun": lambda x, C=C, d=d: C @ x - d,
+                "jac": lambda x, C=C: C,
+            },
             method="SLSQP",
             options={"ftol": 1e-12, "maxiter": 500},
         )

@@ -241,7 +241,34 @@ class PositionBasedTable(Table):
     singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping sets in at this singular value
 
 
-Law = Annotated[OptimalTrackingTable | PositionBasedTable, Field(discriminator="kind")]
+class ConstrainedTable(Table):
+    """Any objective in the image under hard joint limits, with view and singularities kept."""
+
+    kind: Literal["constrained"]
+    objective: Literal["image_based", "optimal_tracking"] = "image_based"
+    gain: Positive = 1.0  # λ of image_based, 1/s
+    interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
+    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
+    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
+    R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
+    S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
+    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
+    depth_range: tuple[Positive, Positive] = (0.5, 2.0)  # factors between which the truth lies
+    order: tuple[Literal["view", "singularity", "joint margin"], ...] = (
+        "view",
+        "singularity",
+        "joint margin",
+    )  # what is kept, most important first; joint limits always are
+    view_margin_px: Annotated[float, Field(ge=0)] = 10.0
+    joint_margin: Annotated[float, Field(ge=0, lt=0.5)] = 0.03  # share of each joint's range
+    manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
+    approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second
+    flow_smoothing_s: Annotated[float, Field(ge=0)] = 0.1  # of the target's motion in the image
+
+
+Law = Annotated[
+    OptimalTrackingTable | PositionBasedTable | ConstrainedTable, Field(discriminator="kind")
+]
 
 # What stands at a place in the file, or is the kind of what stands there.
 TABLES: dict[str, type[Table]] = {
@@ -261,4 +288,5 @@ TABLES: dict[str, type[Table]] = {
     "perception": PerceptionTable,
     "optimal_tracking": OptimalTrackingTable,
     "position_based": PositionBasedTable,
+    "constrained": ConstrainedTable,
 }

@@ -63,8 +63,9 @@ def constrained_rates(
 ) -> ConstrainedRates:
     """Return the joint rates that serve a twist objective best within every constraint.
 
-    Minimise ½ vᵀ H v - gᵀ v + μ/2 ‖q̇‖² + S/2 · 1/w'(q + T q̇) with v = J q̇, the last term linearised,
-    subject to the rows of `constraint_rows`. If the program is not solved, the arm brakes as fast as it may.
+    Minimise ½ vᵀ H v - gᵀ v + μ/2 ‖q̇‖² + S/2 · 1/w'(q + T q̇) with v = J q̇, the last term
+    linearised, subject to the rows of `constraint_rows`. If the program is not solved, the arm
+    brakes as fast as it may.
     """
     n = len(q)
     m = manipulability(chain, q, limits[0], limits[1], avoidance.penalty_k, True, 1e-3)
@@ -110,7 +111,7 @@ def constrained_rates(
         active[kind] += solution.active[i]
         given_up[kind] = max(given_up[kind], solution.given_up[i])
     rates = solution.x
-    solved = solution.solved and np.all(np.isfinite(rates))
+    solved = solution.solved and bool(np.isfinite(rates).all())
     if not solved:
         rates = velocity - np.minimum(np.maximum(velocity, -limits[3] * period), limits[3] * period)
     return ConstrainedRates(rates, m.value, m.penalty, active, given_up, solved)

@@ -1,4 +1,4 @@
-"""The last word before the joints: no set-point ever passes a position, rate or acceleration limit."""
+"""The last word before the joints: no set-point passes a position, rate or acceleration limit."""
 
 from typing import NamedTuple
 

@@ -55,6 +55,6 @@ class OptimalTracking:
         scale = np.tile(self._camera.focal_px, len(desired))
         wanted = -(features.points - desired + T * features.flow).ravel() * scale
         B = T * scale[:, None] * interaction_matrix_points(features.points, depth)
-        weight = self._Q * np.repeat(found, 2)
+        weight = self._Q * np.repeat(found, 2).astype(np.float64)
         objective: TwistObjective = least_squares_objective(B, wanted, weight, self._R)
         return objective

@@ -38,14 +38,12 @@ class Trial:
     @property
     def camera_m(self) -> FloatArray:
         """Camera translation along the motion, (K,)."""
-        x: FloatArray = self.trace["T_world_camera"][:, 0, 3]
-        return x - x[0]
+        return _travel(self.trace["T_world_camera"])
 
     @property
     def object_m(self) -> FloatArray:
         """Object translation along the motion, (K,)."""
-        x: FloatArray = self.trace["T_world_target"][:, 0, 3]
-        return x - x[0]
+        return _travel(self.trace["T_world_target"])
 
     @property
     def estimated_m(self) -> FloatArray:
@@ -59,7 +57,12 @@ class Trial:
         return self.camera_m + height * np.tan(tilt)
 
 
-def reproduce(out: Path, quick: bool, progress: Progress = lambda what, share: None) -> StudyResult:
+def _travel(T: FloatArray) -> FloatArray:
+    along_x: FloatArray = T[:, 0, 3] - T[0, 0, 3]
+    return along_x
+
+
+def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
     """Run section 5 and what follows from it; write the figures.
 
     Args:

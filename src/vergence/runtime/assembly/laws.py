@@ -2,10 +2,16 @@
 
 import numpy as np
 
+from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import OptimalTrackingTable
+from vergence.cell.schema import ConstrainedTable, OptimalTrackingTable
 from vergence.control import Law, OptimalTrackingLaw
+from vergence.control.constrained import ConstrainedLaw
+from vergence.control.image_based import ImageBased
+from vergence.control.objective import Objective
+from vergence.control.optimal_objective import OptimalTracking
 from vergence.errors import InputError
+from vergence.robot import yoshikawa_measure
 
 
 def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
@@ -18,6 +24,9 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
         case OptimalTrackingTable():
             _require_task(cell, "track")
             return _optimal_tracking(cell, driver, cell.law)
+        case ConstrainedTable():
+            _require_task(cell, "track")
+            return _constrained(cell, driver, cell.law)
         case _:
             raise AssertionError(cell.law.kind)
 
@@ -32,15 +41,7 @@ def _optimal_tracking(
     cell: Cell, driver: SimulatedDriver, table: OptimalTrackingTable
 ) -> OptimalTrackingLaw:
     name = cell.task.camera
-    truth = driver.first_frame(name).truth
-    assert truth is not None
-    depth = (
-        truth.depth_m if table.depth_m == "initial" else np.full(len(truth.depth_m), table.depth_m)
-    )
-    if isinstance(table.R, tuple) and len(table.R) != len(table.axes):
-        raise InputError(
-            str(cell.path), "law.R", f"{len(table.R)} weights", f"one, or {len(table.axes)}"
-        )
+    _check_weights(cell, table)
     if extra := set(table.avoidance_axes) - set(table.axes):
         raise InputError(
             str(cell.path), "law.avoidance_axes", ", ".join(sorted(extra)), "a subset of law.axes"
@@ -48,7 +49,7 @@ def _optimal_tracking(
     return OptimalTrackingLaw(
         driver.world.arm_to_camera(name),
         driver.cameras[name],
-        depth,
+        _depth(driver, name, table.depth_m),
         axes=table.axes,
         avoidance_axes=table.avoidance_axes,
         Q=table.Q,
@@ -60,3 +61,50 @@ def _optimal_tracking(
         avoidance_speed_max=table.avoidance_speed_max_m_s,
         singular_below=table.singular_below,
     )
+
+
+def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -> ConstrainedLaw:
+    name = cell.task.camera
+    arm, camera = driver.world.arm_to_camera(name), driver.cameras[name]
+    period = 1.0 / cell.cameras[name].rate_hz
+    objective: Objective
+    if table.objective == "image_based":
+        objective = ImageBased(camera, table.gain, table.interaction)
+    else:
+        _check_weights(cell, table)
+        objective = OptimalTracking(camera, table.axes, table.Q, table.R, period)
+    low, high = table.depth_range
+    if not low <= 1.0 <= high:
+        raise InputError(
+            str(cell.path), "law.depth_range", table.depth_range, "a factor up to 1 and one from 1"
+        )
+    start = yoshikawa_measure(arm.jacobian(driver.read().joints[cell.task.arm].position))
+    return ConstrainedLaw(
+        arm,
+        camera,
+        objective,
+        _depth(driver, name, table.depth_m),
+        period=period,
+        order=table.order,
+        view_margin_px=table.view_margin_px,
+        joint_margin=table.joint_margin,
+        manipulability_min=table.manipulability_share * start,
+        approach_rate=table.approach_rate_hz,
+        depth_range=(low, high),
+        S=table.S,
+        flow_smoothing_s=table.flow_smoothing_s,
+    )
+
+
+def _check_weights(cell: Cell, table: OptimalTrackingTable | ConstrainedTable) -> None:
+    if isinstance(table.R, tuple) and len(table.R) != len(table.axes):
+        raise InputError(
+            str(cell.path), "law.R", f"{len(table.R)} weights", f"one, or {len(table.axes)}"
+        )
+
+
+def _depth(driver: SimulatedDriver, camera: str, given: float | str) -> FloatArray:
+    """Return the depth of every feature, (M,): as given, or as the start shows."""
+    truth = driver.first_frame(camera).truth
+    assert truth is not None
+    return np.full(len(truth.depth_m), given) if isinstance(given, float) else truth.depth_m
