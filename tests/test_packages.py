@@ -17,7 +17,7 @@ import vergence
 SOURCE = Path(vergence.__file__).parent
 PROJECT = Path(__file__).parents[1]
 
-# A room uses rooms above it, never below; these modules of the root are above all rooms.
+# A room uses rooms above it, never below; the modules of the root are above all rooms.
 ROOMS = (
     "geometry",
     "camera",
@@ -32,7 +32,7 @@ ROOMS = (
     "studies",
     "app",
 )
-ROOT_MODULES = ("errors", "outcome", "arrays")
+ROOT_MODULES = sorted(path.stem for path in SOURCE.glob("*.py") if path.stem != "__init__")
 HEAVY = ("mujoco", "cv2", "matplotlib", "scipy", "pydantic", "mcap", "foxglove", "dask", "typer")
 
 
@@ -94,6 +94,7 @@ def level(name: str) -> int | None:
         return None
     if len(parts) == 1 or parts[1] in ROOT_MODULES or parts[1].startswith("__"):
         return 0
+    assert parts[1] in ROOMS, f"{name}: no room of that name"
     return 1 + ROOMS.index(parts[1])
 
 
