@@ -1,0 +1,172 @@
+"""One camera follows one known object: predict, look, fuse, and say when it is lost."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.camera import Camera
+from vergence.estimation import Belief, PoseFilter, Verdict, view_of
+from vergence.features import ImagePoints
+from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
+
+CAMERA = "camera"
+_USED = (Verdict.USED, Verdict.RECOVERED)
+
+
+class Sighting(StrEnum):
+    """What became of the object in a picture."""
+
+    SEEN = "seen"
+    PREDICTED = "predicted"  # not found in this picture: the pose is what motion makes expect
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The object after one picture."""
+
+    time: float  # s, of exposure
+    sighting: Sighting
+    reason: str  # why it is not seen; empty if it is
+    T_camera_target: FloatArray  # (4, 4)
+    velocity: FloatArray  # (6,) (v, ω) along camera axes, m/s and rad/s
+    covariance: FloatArray  # (12, 12) of (δp, δθ, δv, δω) along camera axes, SI
+    share: float  # of the edges that should be seen, how much was found, 0 … 1
+    samples_px: FloatArray  # (N, 2) the places looked at
+    samples_found: np.typing.NDArray[np.bool_]  # (N,)
+
+
+@dataclass(frozen=True, slots=True)
+class FollowRule:
+    """When a picture counts, and when the object is lost."""
+
+    jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the picture, per frame
+    least_share: float = 0.5  # of the edges expected, to believe a picture
+    least_lines: int = 3  # edges found, to believe a picture
+    patience: int = 12  # pictures in a row without the object, after which it is lost
+    turn_max_rad: float = (
+        0.25  # standard deviation of the rotation beyond which the pose is unknown
+    )
+    distance_max: float = 0.2  # and of the position, as a share of the distance
+
+
+class ObjectFollower:
+    """Follows an object from a starting pose.
+
+    Args:
+        tracker: finds the object's edges.
+        camera: the camera's model.
+        T_camera_target: pose in the first picture, (4, 4); may be rough, some 10 px.
+        time: of the first picture, s.
+        period: between pictures, s.
+        rule: when a picture counts.
+    """
+
+    def __init__(
+        self,
+        tracker: EdgeTracker,
+        camera: Camera,
+        T_camera_target: FloatArray,
+        time: float,
+        period: float,
+        rule: FollowRule | None = None,
+    ) -> None:
+        self._tracker, self._camera, self._rule = tracker, camera, rule or FollowRule()
+        depth = float(T_camera_target[2, 3])
+        lever = 0.5 * tracker.model.size
+        jolt = self._rule.jolt_px * depth / camera.fx  # m
+        # White acceleration of density d moves a target by √(d dt³/3) in a step of dt.
+        density = 3.0 * jolt**2 / period**3
+        self._filter = PoseFilter(
+            acceleration_density=density, angular_acceleration_density=density / lever**2
+        )
+        start = np.repeat(
+            [3.0 * jolt, 3.0 * jolt / lever, 2.0 * jolt / period, 2.0 * jolt / lever / period], 3
+        )
+        self._belief: Belief = self._filter.start(
+            time, T_camera_target, covariance=np.diag(start**2)
+        )
+        self._memory: EdgeMemory = tracker.blank()
+        self._missed = 0
+
+    def follow(self, image: ImageArray, time: float) -> Step:
+        """Look at the next picture.
+
+        Raises:
+            InputError: if the image is not of the camera's size.
+        """
+        belief = self._filter.predict(self._belief, time)
+        seen = self._tracker.measure(
+            image,
+            self._camera,
+            belief.T_world_target,
+            belief.honest_covariance[:6, :6],
+            self._memory,
+        )
+        reason = self._doubt(seen)
+        if not reason:
+            view = view_of(_points(seen, time), self._camera, np.eye(4), seen.points)
+            update = self._filter.update(self._belief, view)
+            belief = update.belief
+            if update.verdict not in _USED:
+                reason = f"the picture {update.verdict.value}"
+        self._belief = belief
+        if not reason:
+            self._missed = 0
+            self._memory = self._tracker.remember(self._memory, seen)
+            reason = self._vague()
+            sighting = Sighting.LOST if reason else Sighting.SEEN
+        else:
+            self._missed += 1
+            sighting = Sighting.LOST if self._missed > self._rule.patience else Sighting.PREDICTED
+        return Step(
+            time,
+            sighting,
+            reason,
+            belief.T_world_target,
+            belief.velocity,
+            belief.honest_covariance,
+            seen.share,
+            seen.samples_px,
+            seen.samples_found,
+        )
+
+    def _doubt(self, seen: EdgeMeasurement) -> str:
+        """Say why a picture is not to be believed; empty if it is."""
+        rule = self._rule
+        if not seen.expected:
+            return "the object is outside the image"
+        if seen.share < rule.least_share:
+            return (
+                f"{seen.share:.0%} of the edges expected were found; "
+                f"{rule.least_share:.0%} are needed"
+            )
+        if len(seen.points) < 2 * rule.least_lines:
+            return f"{len(seen.points) // 2} edges were found; {rule.least_lines} are needed"
+        return ""
+
+    def _vague(self) -> str:
+        """Say why the pose is too uncertain to be told; empty if it is not."""
+        deviation = np.sqrt(np.diag(self._belief.honest_covariance)[:6])
+        distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
+        turn, place = float(deviation[3:].max()), float(deviation[:3].max())
+        if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
+            return (
+                f"the edges seen leave the pose open: {place:.3g} m and "
+                f"{np.rad2deg(turn):.2g} degrees of standard deviation"
+            )
+        return ""
+
+
+def _points(seen: EdgeMeasurement, time: float) -> ImagePoints:
+    count = len(seen.points)
+    return ImagePoints(
+        CAMERA,
+        time,
+        seen.points_px,
+        seen.covariance_px,
+        np.ones(count, dtype=np.bool_),
+        ("",) * count,
+    )

@@ -1,0 +1,222 @@
+"""Corners of a known object in windows of a picture."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
+from vergence.camera import Camera
+from vergence.errors import InputError
+from vergence.vision.known_object.corner_fit import FOUND, TOO_FEW, fit_corner
+from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.projection import (
+    edge_faces_camera,
+    face_table,
+    hidden,
+    in_camera,
+    lens_of,
+    pixel_of,
+)
+
+REASONS = (
+    "",
+    "outside the image",
+    "no contrast",
+    "edges inconsistent",
+    "fewer than two edges seen",
+    "left its window",
+)
+_LEAST_COSINE = 0.05  # flatter faces make no edge to be told from its neighbour
+
+
+class CornerMeasurements(NamedTuple):
+    """What was found in the windows of one picture."""
+
+    points_px: FloatArray  # (M, 2); the predicted place where nothing was found
+    covariance_px: FloatArray  # (M, 2, 2) px²
+    found: BoolArray  # (M,)
+    reasons: tuple[str, ...]  # (M,) empty where found, else why not
+
+
+@njit(cache=True)
+def measure_corners(
+    image: ImageArray,
+    T: FloatArray,
+    lens: FloatArray,
+    corners: FloatArray,
+    corner_edges: IntArray,
+    edges: FloatArray,
+    edge_normals: FloatArray,
+    surface: FloatArray,
+    chosen: IntArray,
+    half_px: FloatArray,
+    contrast: float,
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Measure the chosen corners; return places (M, 2), covariances (M, 2, 2) and codes (M,).
+
+    Args:
+        image: grey, (height, width).
+        T: predicted pose of the object in the camera, (4, 4).
+        lens: packed camera, (11,).
+        corners: of the object, (C, 3), m.
+        corner_edges: the edges at each, (C, K).
+        edges: ends of the sharp edges, (E, 2, 3), m.
+        edge_normals: of the faces at each, (E, 2, 3).
+        surface: triangles that hide, (F, 3, 3), m.
+        chosen: which corners, (M,).
+        half_px: half the sizes of the windows around their predicted places, (M, 2).
+        contrast: least step of an edge, grey values.
+    """
+    places = np.empty((len(chosen), 2))
+    covariances = np.zeros((len(chosen), 2, 2))
+    codes = np.empty(len(chosen), dtype=np.int64)
+    table = face_table(T, surface)
+    directions = np.empty((corner_edges.shape[1], 2))
+    lengths = np.empty(corner_edges.shape[1])
+    for m in range(len(chosen)):
+        X = corners[chosen[m]]
+        x, y, z = in_camera(T, X)
+        if not z > 0.0:
+            places[m] = np.nan
+            codes[m] = 1
+            continue
+        u, v = pixel_of(lens, x / z, y / z)
+        places[m, 0], places[m, 1] = u, v
+        count = 0
+        for k in range(corner_edges.shape[1]):
+            e = corner_edges[chosen[m], k]
+            if e >= 0 and edge_faces_camera(T, X, edge_normals[e], _LEAST_COSINE):
+                length = _arm(T, lens, X, edges[e], table, u, v, directions[count])
+                if length > 0.0:
+                    lengths[count] = length
+                    count += 1
+        if count < 2:
+            codes[m] = TOO_FEW
+            continue
+        found = np.empty(2)
+        codes[m] = fit_corner(
+            image,
+            u,
+            v,
+            directions[:count],
+            lengths[:count],
+            half_px[m],
+            contrast,
+            found,
+            covariances[m],
+        )
+        if codes[m] == FOUND:
+            places[m] = found
+    return places, covariances, codes
+
+
+@njit(cache=True)
+def _arm(
+    T: FloatArray,
+    lens: FloatArray,
+    X: FloatArray,
+    edge: FloatArray,
+    table: FloatArray,
+    u: float,
+    v: float,
+    direction: FloatArray,
+) -> float:
+    """Fill the direction in the picture of an edge that starts at X; return its length, 0 if hidden.
+
+    An edge that runs behind the camera is cut.
+    """
+    first = 0.0
+    for j in range(3):
+        first += (edge[0, j] - X[j]) ** 2 - (edge[1, j] - X[j]) ** 2
+    near, far = (0, 1) if first < 0.0 else (1, 0)
+    length = 0.0
+    share = 1.0
+    for _ in range(6):
+        P = edge[near] + share * (edge[far] - edge[near])
+        x, y, z = in_camera(T, P)
+        if z > 1e-6:
+            pu, pv = pixel_of(lens, x / z, y / z)
+            length = np.sqrt((pu - u) ** 2 + (pv - v) ** 2)
+            if length < 40.0:
+                break
+        share *= 0.5
+    if length < 1e-6:
+        return 0.0
+    direction[0], direction[1] = (pu - u) / length, (pv - v) / length
+    for part in (0.25, 0.6):
+        P = edge[near] + part * share * (edge[far] - edge[near])
+        x, y, z = in_camera(T, P)
+        if not hidden(table, x / z, y / z, z):
+            return length
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CornerExtractor:
+    """Measures corners of a known object to a fraction of a pixel, in windows only.
+
+    From the predicted pose follow the edges that meet in a corner. Each is looked for along lines
+    across its prediction; the steps that most profiles agree on make a line, and the lines are met
+    with the covariance that their scatter tells.
+    """
+
+    model: ObjectModel
+    contrast: float = 6.0  # least step of an edge, grey values
+
+    def __post_init__(self) -> None:
+        if not len(self.model.edges):
+            allowed = "a model with edges, from a mesh"
+            raise InputError(self.model.name, "edges", "none", allowed)
+        if not self.contrast > 0.0:
+            raise InputError("CornerExtractor", "contrast", self.contrast, "above zero")
+
+    def measure(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        T_camera_target: FloatArray,
+        features: IntArray,
+        half_px: FloatArray,
+    ) -> CornerMeasurements:
+        """Measure corners in windows around where a pose predicts them.
+
+        Args:
+            image: grey, of the camera's size, (height, width).
+            camera: the camera's model.
+            T_camera_target: predicted pose of the object in the camera, (4, 4).
+            features: which corners of the model, (M,).
+            half_px: half the width and height of each window, (M, 2), px.
+
+        Raises:
+            InputError: if the image is not grey 8 bit or not of the camera's size.
+        """
+        require_image(image, camera)
+        model = self.model
+        places, covariances, codes = measure_corners(
+            np.ascontiguousarray(image),
+            np.ascontiguousarray(T_camera_target),
+            lens_of(camera),
+            model.corners,
+            model.corner_edges,
+            model.edges,
+            model.edge_normals,
+            model.surface,
+            np.asarray(features, dtype=np.int64),
+            np.asarray(half_px, dtype=np.float64),
+            self.contrast,
+        )
+        reasons = tuple(REASONS[code] for code in codes)
+        return CornerMeasurements(places, covariances, codes == FOUND, reasons)
+
+
+def require_image(image: ImageArray, camera: Camera) -> None:
+    """Raise InputError unless an image is grey, of 8 bit, and of the camera's size."""
+    if image.ndim != 2 or image.dtype != np.uint8:
+        given = f"{image.dtype} of shape {image.shape}"
+        raise InputError("image", "", given, "8-bit grey of shape (height, width)")
+    if image.shape != (camera.height, camera.width):
+        given = f"{image.shape[1]} x {image.shape[0]} pixels"
+        allowed = f"{camera.width} x {camera.height}, as the camera's intrinsics say"
+        raise InputError("image", "", given, allowed)

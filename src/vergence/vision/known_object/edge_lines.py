@@ -1,0 +1,137 @@
+"""What the samples of an edge say together: a line, told by two points.
+
+A line has two numbers. They are handed on as the distances across the edge at two places, one
+standard deviation of the samples to either side of their middle, where least squares makes their
+errors independent. Each place is a point of the object measured well across its edge and hardly at
+all along it, which is a point with a long covariance to any filter of points.
+"""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.vision.known_object.edge_samples import EdgeSamples
+from vergence.vision.known_object.pose_fit import PoseFit
+from vergence.vision.known_object.projection import pixel_rows
+
+LEAST_SAMPLES = 4
+SLIDING_PX = 100.0  # standard deviation along an edge
+
+
+@njit(cache=True)
+def edge_points(
+    fit: PoseFit,
+    lens: FloatArray,
+    samples: EdgeSamples,
+    found: BoolArray,
+    bias_px: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return points (M, 3), places (M, 2) and covariances (M, 2, 2), two for each edge seen.
+
+    Args:
+        fit: the pose fitted to the picture; only what the picture says is handed on, not the pose.
+        lens: packed camera, (11,).
+        samples: on the edges, those of one edge beside each other.
+        found: which of them found their edge, (N,).
+        bias_px: standard deviation of what does not average out over an edge: model and lens.
+    """
+    count = len(samples.edge)
+    points = np.empty((2 * count, 3))
+    places = np.empty((2 * count, 2))
+    covariances = np.empty((2 * count, 2, 2))
+    pixels = np.empty((count, 2))
+    rows = np.empty((2, 6))
+    for n in range(count):
+        pixels[n, 0], pixels[n, 1], _ = pixel_rows(fit.T, lens, samples.points[n], rows)
+    filled, first = 0, 0
+    while first < count:
+        last = first
+        while last < count and samples.edge[last] == samples.edge[first]:
+            last += 1
+        filled += _line(
+            fit,
+            lens,
+            samples,
+            found,
+            pixels,
+            first,
+            last,
+            bias_px,
+            points[filled : filled + 2],
+            places[filled : filled + 2],
+            covariances[filled : filled + 2],
+        )
+        first = last
+    return points[:filled], places[:filled], covariances[:filled]
+
+
+@njit(cache=True)
+def _line(
+    fit: PoseFit,
+    lens: FloatArray,
+    samples: EdgeSamples,
+    found: BoolArray,
+    pixels: FloatArray,
+    first: int,
+    last: int,
+    bias_px: float,
+    points: FloatArray,
+    places: FloatArray,
+    covariances: FloatArray,
+) -> int:
+    """Fill the two points of one edge, samples first … last - 1; return 2, or 0 if it has none."""
+    nu, nv = 0.0, 0.0
+    n, ss, so, sss, sso, soo = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last):
+        nu += samples.normals[i, 0]
+        nv += samples.normals[i, 1]
+    norm = np.sqrt(nu * nu + nv * nv)
+    nu, nv = nu / norm, nv / norm
+    for i in range(first, last):
+        if found[i]:
+            s = nv * (pixels[i, 0] - pixels[first, 0]) - nu * (pixels[i, 1] - pixels[first, 1])
+            o = fit.residuals[i]
+            n += 1
+            ss += s
+            so += o
+            sss += s * s
+            sso += s * o
+            soo += o * o
+    if n < LEAST_SAMPLES:
+        return 0
+    middle, spread = ss / n, sss - ss * ss / n
+    if spread < 4.0 * n:  # shorter than a few pixels
+        return 0
+    slope = (sso - ss * so / n) / spread
+    residual = max(soo - so * so / n - slope * slope * spread, 0.0) / (n - 2)
+    variance = 2.0 * max(residual, fit.spread_px**2) / n + bias_px**2
+    rows = np.empty((2, 6))
+    for k in range(2):
+        wanted = middle + (2 * k - 1) * np.sqrt(spread / n)
+        a, b = first, last - 1
+        while b - a > 1:  # the samples lie along the edge in order
+            m = (a + b) // 2
+            s = nv * (pixels[m, 0] - pixels[first, 0]) - nu * (pixels[m, 1] - pixels[first, 1])
+            rising = nv * (pixels[last - 1, 0] - pixels[first, 0]) > nu * (
+                pixels[last - 1, 1] - pixels[first, 1]
+            )
+            if (s < wanted) == rising:
+                a = m
+            else:
+                b = m
+        sa = nv * (pixels[a, 0] - pixels[first, 0]) - nu * (pixels[a, 1] - pixels[first, 1])
+        sb = nv * (pixels[b, 0] - pixels[first, 0]) - nu * (pixels[b, 1] - pixels[first, 1])
+        share = (wanted - sa) / (sb - sa)
+        for j in range(3):
+            points[k, j] = samples.points[a, j] + share * (
+                samples.points[b, j] - samples.points[a, j]
+            )
+        u, v, _ = pixel_rows(fit.T, lens, points[k], rows)
+        s = nv * (u - pixels[first, 0]) - nu * (v - pixels[first, 1])
+        offset = so / n + slope * (s - middle)
+        places[k, 0], places[k, 1] = u + offset * nu, v + offset * nv
+        along = SLIDING_PX**2
+        covariances[k, 0, 0] = variance * nu * nu + along * nv * nv
+        covariances[k, 1, 1] = variance * nv * nv + along * nu * nu
+        covariances[k, 0, 1] = covariances[k, 1, 0] = (variance - along) * nu * nv
+    return 2

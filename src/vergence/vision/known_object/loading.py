@@ -1,0 +1,148 @@
+"""Object models from files: OBJ, STL, MJCF. MuJoCo reads them all."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray, IntArray
+from vergence.errors import InputError
+from vergence.vision.known_object.object_model import SHARP_RAD, ObjectModel
+from vergence.vision.known_object.primitives import box, cylinder
+
+MESHES = (".obj", ".stl")
+SCENES = (".xml", ".mjcf")
+SEEN_GROUPS = 3  # MuJoCo draws geoms of groups 0, 1, 2
+
+
+def load_object_model(
+    path: str | Path, scale: float = 1.0, sharp_rad: float = SHARP_RAD
+) -> ObjectModel:
+    """Read an object: a mesh (OBJ, STL) or the geometry of an MJCF model at rest.
+
+    Args:
+        path: the file.
+        scale: metres in a unit of the file; 0.001 for a mesh in millimetres.
+        sharp_rad: the angle between the normals of two faces from which on their edge is sharp.
+
+    Raises:
+        InputError: if there is no such file, it cannot be read, or its geometry has no corners.
+    """
+    file = Path(path)
+    kind = file.suffix.lower()
+    if kind not in MESHES + SCENES:
+        allowed = "an object model: " + ", ".join(MESHES + SCENES)
+        raise InputError(str(path), "", f"a file of kind {kind or '(none)'}", allowed)
+    if not file.is_file():
+        raise InputError(str(path), "", "no such file", "an OBJ, STL or MJCF file that exists")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise InputError(str(path), "scale", scale, "metres in a unit of the file, above zero")
+    compiled = _compile_mesh(file) if kind in MESHES else _compile_scene(file)
+    vertices, triangles = _joined(compiled, str(path))
+    return ObjectModel.from_mesh(str(path), vertices * scale, triangles, sharp_rad)
+
+
+def object_model_of(model: Any, body: str, sharp_rad: float = SHARP_RAD) -> ObjectModel:
+    """Return the object that a body of a compiled MuJoCo model is, with all that hangs on it.
+
+    Args:
+        model: an `mjModel`.
+        body: name of the body whose frame the object's frame is.
+        sharp_rad: see `load_object_model`.
+
+    Raises:
+        InputError: if there is no such body or its geometry has no corners.
+    """
+    import mujoco
+
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    if number < 0:
+        raise InputError("object model", "body", body, "the name of a body of the model")
+    vertices, triangles = _joined(model, body, number)
+    return ObjectModel.from_mesh(body, vertices, triangles, sharp_rad)
+
+
+def _compile_mesh(file: Path) -> Any:
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    mesh = spec.add_mesh(name="object", file=str(file.resolve()))
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # so that it may be open
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object", contype=0, conaffinity=0
+    )
+    return _compiled(spec, file)
+
+
+def _compile_scene(file: Path) -> Any:
+    import mujoco
+
+    try:
+        spec = mujoco.MjSpec.from_file(str(file))
+    except ValueError as error:
+        raise InputError(str(file), "", _one_line(error), "a model that MuJoCo reads") from None
+    return _compiled(spec, file)
+
+
+def _compiled(spec: Any, file: Path) -> Any:
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise InputError(str(file), "", _one_line(error), "geometry that MuJoCo reads") from None
+
+
+def _one_line(error: ValueError) -> str:
+    return " ".join(str(error).split())
+
+
+def _joined(model: Any, source: str, body: int = 0) -> tuple[FloatArray, IntArray]:
+    """Return the visible geometry below a body as one mesh in that body's frame."""
+    parts = list(_parts(model, body))
+    if not parts:
+        allowed = "a mesh, box or cylinder among the geometry that is drawn (groups 0, 1, 2)"
+        raise InputError(source, "geom", "none with edges", allowed)
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    triangles = [tri + start for (_, tri), start in zip(parts, starts, strict=True)]
+    return np.vstack([vertices for vertices, _ in parts]), np.vstack(triangles)
+
+
+def _parts(model: Any, body: int) -> Iterator[tuple[FloatArray, IntArray]]:
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    R_body, p_body = data.xmat[body].reshape(3, 3), data.xpos[body]
+    for geom in range(model.ngeom):
+        drawn = model.geom_group[geom] < SEEN_GROUPS
+        if not (drawn and _hangs_on(model, int(model.geom_bodyid[geom]), body)):
+            continue
+        shape = _shape(model, geom)
+        if shape is None:
+            continue
+        vertices, triangles = shape
+        world = vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        yield (world - p_body) @ R_body, triangles
+
+
+def _hangs_on(model: Any, body: int, ancestor: int) -> bool:
+    while body != ancestor and body > 0:
+        body = int(model.body_parentid[body])
+    return body == ancestor
+
+
+def _shape(model: Any, geom: int) -> tuple[FloatArray, IntArray] | None:
+    """Return vertices and triangles in the geom's frame; None for what has no edges."""
+    import mujoco
+
+    size, kind = model.geom_size[geom], model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return box(size)
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return cylinder(float(size[0]), float(size[1]))
+    if kind != mujoco.mjtGeom.mjGEOM_MESH:
+        return None
+    mesh = model.geom_dataid[geom]
+    v, f = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    vertices = model.mesh_vert[v : v + model.mesh_vertnum[mesh]].astype(np.float64)
+    return vertices, model.mesh_face[f : f + model.mesh_facenum[mesh]].astype(np.int64)

@@ -1,0 +1,122 @@
+"""A rigid object as vision knows it: sharp edges, corners where they meet, a surface that hides."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vergence.arrays import FloatArray, IntArray, frozen
+from vergence.errors import InputError
+from vergence.vision.known_object.mesh import (
+    corner_table,
+    merge_vertices,
+    sharp_edges,
+    triangle_normals,
+)
+
+SHARP_RAD = np.deg2rad(30.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectModel:
+    """Geometry of a known object in its own frame, m.
+
+    A sharp edge is where two faces meet at more than a threshold angle, or where a surface ends;
+    mesh edges in one line are one sharp edge. A corner is where sharp edges of different
+    directions meet. Round parts (the side of a cylinder) have neither.
+    """
+
+    name: str
+    vertices: FloatArray  # (V, 3)
+    triangles: IntArray  # (F, 3) vertices, counter-clockwise seen from outside
+    normals: FloatArray  # (F, 3) unit normals of the triangles
+    edges: FloatArray  # (E, 2, 3) ends of each sharp edge
+    edge_normals: FloatArray  # (E, 2, 3) of the faces on its two sides; opposite at a border
+    corners: FloatArray  # (C, 3)
+    corner_edges: IntArray  # (C, K) the sharp edges at each corner, filled up with -1
+
+    @classmethod
+    def from_mesh(
+        cls, name: str, vertices: ArrayLike, triangles: ArrayLike, sharp_rad: float = SHARP_RAD
+    ) -> Self:
+        """Find the sharp edges and corners of a mesh.
+
+        Args:
+            name: what to call it in messages, such as its file.
+            vertices: (V, 3), m; those at the same place are merged.
+            triangles: three vertices each, counter-clockwise seen from outside, (F, 3).
+            sharp_rad: the angle between the normals of two faces from which on their edge is sharp.
+
+        Raises:
+            InputError: if there is no triangle, anything is not finite, a triangle names a vertex
+                that is not there, or the mesh has no corner.
+        """
+        places = frozen(vertices, (None, 3), "vertices")
+        index = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+        if not index.size:
+            raise InputError(name, "faces", "none", "a mesh of at least one face")
+        if not np.isfinite(places).all():
+            raise InputError(name, "vertices", "a coordinate that is not finite", "numbers, m")
+        if index.min() < 0 or index.max() >= len(places):
+            allowed = f"0 … {len(places) - 1}"
+            raise InputError(name, "faces", f"vertex {index.min()} … {index.max()}", allowed)
+        places, index = merge_vertices(places, index)
+        normals = triangle_normals(places, index)
+        ends, sides = sharp_edges(places, index, normals, sharp_rad)
+        corner_vertices, corner_edges = corner_table(places, ends)
+        if not len(corner_vertices):
+            given = f"{len(index)} triangles, {len(ends)} sharp edges, no corner"
+            allowed = "an object with corners, where sharp edges of different directions meet"
+            raise InputError(name, "faces", given, allowed)
+        return cls(
+            name,
+            frozen(places),
+            _frozen_index(index),
+            frozen(normals),
+            frozen(places[ends]),
+            frozen(sides),
+            frozen(places[corner_vertices]),
+            _frozen_index(corner_edges),
+        )
+
+    @classmethod
+    def from_corners(cls, name: str, corners: ArrayLike) -> Self:
+        """Make a model of bare features, (C, 3), m: marks, or corners that a list names.
+
+        It has no edges and hides nothing, so that its features can be measured as marks only.
+
+        Raises:
+            InputError: if there is none, or one is not finite.
+        """
+        places = frozen(corners, (None, 3), "corners")
+        if not len(places) or not np.isfinite(places).all():
+            given = "none" if not len(places) else "a coordinate that is not finite"
+            raise InputError(name, "corners", given, "at least one point, m")
+        return cls(
+            name,
+            places,
+            _frozen_index(np.zeros((0, 3))),
+            frozen(np.zeros((0, 3))),
+            frozen(np.zeros((0, 2, 3))),
+            frozen(np.zeros((0, 2, 3))),
+            places,
+            _frozen_index(np.full((len(places), 1), -1)),
+        )
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around it, m."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @property
+    def surface(self) -> FloatArray:
+        """The corners of each triangle, (F, 3, 3), m."""
+        surface: FloatArray = self.vertices[self.triangles]
+        return surface
+
+
+def _frozen_index(values: NDArray[np.generic]) -> IntArray:
+    index = np.array(values, dtype=np.int64, order="C")
+    index.flags.writeable = False
+    return index
