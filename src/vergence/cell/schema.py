@@ -175,6 +175,7 @@ class TrackTable(Table):
     feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
     desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = "initial"
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Positive = 0.2  # with pictures, but none of the features found
 
 
 class FollowTable(Table):
@@ -185,6 +186,7 @@ class FollowTable(Table):
     camera: str  # carried by the arm
     desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Positive = 2.0  # with pictures, but the target lost
 
 
 def _task_kind(value: Any) -> str:
@@ -206,10 +208,13 @@ class PerceptionTable(Table):
     selection: Literal["information", "indexes"] = "information"
     budget: Annotated[int, Field(ge=3)] = 16  # features measured a tick, over all cameras
     noise_px: Positive = 0.5  # expected of a measured point; drawn where there are no images
+    believed_noise_px: Positive | None = None  # in place of what each measurement says of itself
     outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches, without images
     occlusion: bool = True  # whether arms and fixtures in the way are predicted
     start_error_m: Annotated[float, Field(ge=0)] = 0.01  # how well the first pose is known
     start_error_deg: Annotated[float, Field(ge=0)] = 2.0
+    acceleration_density: Positive = 0.01  # m²/s³, of the target, for the filter on SE(3)
+    angular_acceleration_density: Positive = 0.25  # rad²/s³
 
 
 class OptimalTrackingTable(Table):
@@ -238,7 +243,7 @@ class PositionBasedTable(Table):
     prediction: bool = True  # the target's pose is predicted from the exposure to now
     closed_loop_hz: Positive = 5.0  # how fast the joints make up for what they are behind
     null_space: Annotated[float, Field(ge=0)] = 0.5  # 1/s, pull of spare joints to mid-range
-    singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping sets in at this singular value
+    singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping below it, of the largest value
 
 
 class ConstrainedTable(Table):

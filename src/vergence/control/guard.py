@@ -63,7 +63,8 @@ def stoppable_speed(room: float, a: float, dt: float) -> float:
     if np.isinf(room):
         return np.inf
     usable = max(room - a * dt * dt / 8.0, 0.0)
-    return max(np.sqrt((0.5 * a * dt) ** 2 + 2.0 * a * usable) - 0.5 * a * dt, 0.0)
+    speed: float = max(np.sqrt((0.5 * a * dt) ** 2 + 2.0 * a * usable) - 0.5 * a * dt, 0.0)
+    return speed
 
 
 class Guard:

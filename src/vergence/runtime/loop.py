@@ -1,13 +1,13 @@
 """The one loop: driver, perception, planning, control, and back to the driver."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control import Guard, JointCommand, Law
-from vergence.features import Observation
+from vergence.control import Guard, InnerLaw, JointCommand, Law
+from vergence.features import ImagePoints, Observation
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.robot import Sample
 from vergence.runtime.driver import Driver
@@ -27,7 +27,8 @@ class Loop:
     """Runs one arm's task; simulated or real is the driver's business.
 
     Each outer tick reads the cell, looks, and asks the law for joint rates; each inner tick hands a
-    guarded set-point to the driver, so that whatever the law says no joint passes its limits. The
+    guarded set-point to the driver, so that whatever the law says no joint passes its limits. An
+    `InnerLaw` is asked for new rates at each inner tick, any other keeps them between pictures. The
     k-th outer tick begins at inner tick ⌊k · inner/outer⌋, exact also where 26 Hz meets 500 Hz.
 
     Args:
@@ -61,10 +62,11 @@ class Loop:
         dt = 1.0 / driver.inner_rate_hz
         joints = driver.read().joints
         self._guards = {n: Guard(a, joints[n].position, dt) for n, a in driver.arms.items()}
-        self._hold = np.zeros(driver.arms[arm].joint_count)
+        self._still = np.zeros(driver.arms[arm].joint_count)
         self._inner_tick = 0
         self._last_picture = self._last_seen = 0.0
         self._lost: set[int] = set()
+        self._target_lost = False
         self._last_command: JointCommand | None = None
 
     def run(self, duration_s: float) -> Outcome:
@@ -91,9 +93,8 @@ class Loop:
             if outcome is not None:
                 return outcome
             outer_tick += 1
-            rates = self._hold if command is None else command.velocity
             next_tick = int(outer_tick * self._driver.inner_rate_hz / self._outer_rate_hz + 1e-9)
-            if limited := self._move(rates, next_tick):
+            if limited := self._move(self._rates(command), next_tick):
                 joints = " and ".join(limited)
                 reason = f"{joints} at the end of its range, driven against it"
                 return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
@@ -116,7 +117,7 @@ class Loop:
             return self._last_command, None
         self._last_picture = time
         self._report_losses(time, observation)
-        if not any(view.found.any() for view in observation.views):
+        if not (observation.target or any(view.found.any() for view in observation.views)):
             self._last_command = None
             self._record(sample, observation, None)
             if time - self._last_seen > self._patience.target_s:
@@ -131,13 +132,24 @@ class Loop:
             return None, Outcome(*command.fault, time)
         return command, None
 
-    def _move(self, rates: FloatArray, until_tick: int) -> list[str]:
+    def _rates(self, command: JointCommand | None) -> Callable[[FloatArray], FloatArray]:
+        """Return what says, given the last set-point, how fast it shall move."""
+        law = self._law
+        if isinstance(law, InnerLaw):
+            if command is not None:
+                return law.follow
+            law.hold()
+        rates = self._still if command is None else command.velocity
+        return lambda _: rates
+
+    def _move(self, rates: Callable[[FloatArray], FloatArray], until_tick: int) -> list[str]:
         """Step the driver to an inner tick; return the joints stuck at a limit all the while."""
         guard = self._guards[self._arm]
-        stuck = np.ones(len(rates), dtype=np.bool_)
+        stuck = np.ones(guard.joint_count, dtype=np.bool_)
         while self._inner_tick < until_tick:
+            wanted = rates(guard.position)
             setpoints = {
-                name: other.step(rates if name == self._arm else np.zeros(other.joint_count))
+                name: other.step(wanted if name == self._arm else np.zeros(other.joint_count))
                 for name, other in self._guards.items()
             }
             stuck &= guard.at_limit
@@ -167,7 +179,15 @@ class Loop:
             listener.tick(record)
 
     def _report_losses(self, time: float, observation: Observation) -> None:
-        view = observation.views[-1]
+        lost = not (observation.target or any(view.found.any() for view in observation.views))
+        if lost != self._target_lost:
+            self._target_lost = lost
+            text = _why_lost(observation) if lost else "it is back"
+            self._tell(time, "target out of sight" if lost else "target in sight", text)
+        if observation.target is None and not lost:
+            self._report_features(time, observation.views[-1])
+
+    def _report_features(self, time: float, view: ImagePoints) -> None:
         lost = set(np.flatnonzero(~view.found).tolist())
         for feature in sorted(lost - self._lost):
             self._tell(time, "feature lost", f"feature {feature}: {view.reasons[feature]}")

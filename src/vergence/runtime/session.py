@@ -53,7 +53,7 @@ def _run(
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
         listeners=everyone,
-        patience=Patience(image_s=cell.task.image_timeout_s),
+        patience=Patience(cell.task.image_timeout_s, cell.task.target_timeout_s),
     )
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
     for listener in everyone:

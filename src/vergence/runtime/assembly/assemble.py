@@ -1,7 +1,8 @@
 """From a cell to the parts of its loop."""
 
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import TrackTable
+from vergence.cell.schema import FollowTable, TrackTable
+from vergence.runtime.assembly.follow import follow_parts
 from vergence.runtime.assembly.parts import Parts
 from vergence.runtime.assembly.track import track_parts
 
@@ -15,5 +16,5 @@ def assemble_parts(cell: Cell, driver: SimulatedDriver, images: bool) -> Parts:
     match cell.task:
         case TrackTable():
             return track_parts(cell, cell.task, driver, images)
-        case _:
-            raise AssertionError(cell.task.kind)
+        case FollowTable():
+            return follow_parts(cell, cell.task, driver, images)

@@ -4,8 +4,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import ConstrainedTable, OptimalTrackingTable
-from vergence.control import Law, OptimalTrackingLaw
+from vergence.cell.schema import ConstrainedTable, OptimalTrackingTable, PositionBasedTable
+from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
@@ -27,8 +27,9 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
         case ConstrainedTable():
             _require_task(cell, "track")
             return _constrained(cell, driver, cell.law)
-        case _:
-            raise AssertionError(cell.law.kind)
+        case PositionBasedTable():
+            _require_task(cell, "follow")
+            return _position_based(cell, driver, cell.law)
 
 
 def _require_task(cell: Cell, *kinds: str) -> None:
@@ -108,3 +109,13 @@ def _depth(driver: SimulatedDriver, camera: str, given: float | str) -> FloatArr
     truth = driver.first_frame(camera).truth
     assert truth is not None
     return np.full(len(truth.depth_m), given) if isinstance(given, float) else truth.depth_m
+
+
+def _position_based(
+    cell: Cell, driver: SimulatedDriver, table: PositionBasedTable
+) -> PositionBasedLaw:
+    return PositionBasedLaw(
+        driver.world.arm_to_camera(cell.task.camera),
+        1.0 / driver.inner_rate_hz,
+        **table.model_dump(exclude={"kind"}),
+    )

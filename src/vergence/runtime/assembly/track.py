@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.cell import Cell, SimulatedDriver
 from vergence.cell.schema import TrackTable
 from vergence.errors import InputError
@@ -60,9 +60,9 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
         return _grid(camera.width, camera.height, count)
     from vergence.vision import pick_features
 
-    picked = pick_features(image, 4 * count)
-    on_target = ~np.isnan(driver.anchor(name, picked)).any(axis=1)
-    points: FloatArray = picked[on_target]
+    picked = pick_features(image, 4 * count, _middle(camera.width, camera.height))
+    on_target = ~np.isnan(driver.anchor(name, picked.points_px)).any(axis=1)
+    points: FloatArray = picked.points_px[on_target]
     if len(points) < count:
         raise InputError(
             str(cell.path),
@@ -71,6 +71,13 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
             f"at most {len(points)}: no more good features of the target are in the first picture",
         )
     return points[:count]
+
+
+def _middle(width: int, height: int) -> BoolArray:
+    """Return a mask of the middle of the picture: what is picked there has room to move."""
+    mask = np.zeros((height, width), dtype=np.bool_)
+    mask[height // 4 : height - height // 4, width // 4 : width - width // 4] = True
+    return mask
 
 
 def _grid(width: int, height: int, count: int) -> FloatArray:

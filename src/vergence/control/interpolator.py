@@ -1,0 +1,60 @@
+"""Between two pictures: a trajectory of poses at the inner rate, by a second-order filter."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.geometry import so3_exp, so3_log
+
+
+class MovingPose(NamedTuple):
+    """A pose and how fast it moves, both along world axes."""
+
+    T: FloatArray  # (4, 4) in the world
+    twist: FloatArray  # (6,) velocity of its origin and angular velocity, m/s and rad/s
+
+
+@njit(cache=True)
+def moved(pose: MovingPose, dt: float) -> FloatArray:
+    """Return the pose (4, 4) after dt seconds at its present velocity."""
+    T = np.eye(4)
+    T[:3, :3] = so3_exp(pose.twist[3:] * dt) @ np.ascontiguousarray(pose.T[:3, :3])
+    T[:3, 3] = pose.T[:3, 3] + pose.twist[:3] * dt
+    return T
+
+
+@njit(cache=True)
+def pose_difference(T_to: FloatArray, T_from: FloatArray) -> FloatArray:
+    """Return (Δp, Δθ), (6,), along world axes: p_to = p_from + Δp, R_to = exp(Δθ) R_from."""
+    difference = np.empty(6)
+    difference[:3] = T_to[:3, 3] - T_from[:3, 3]
+    difference[3:] = so3_log(
+        np.ascontiguousarray(T_to[:3, :3]) @ np.ascontiguousarray(T_from[:3, :3]).T
+    )
+    return difference
+
+
+@njit(cache=True)
+def interpolate(
+    reference: MovingPose, goal: MovingPose, frequency: float, damping: float, dt: float
+) -> MovingPose:
+    """Advance the filter by one inner period.
+
+    a = ω² Δ(goal, reference) + 2 ζ ω (goal's twist - reference's twist): the second-order
+    interpolating filter of [Lippiello2005] section IV. With the goal's twist zero it lags behind a
+    moving goal by 2 ζ/ω seconds, as the paper's does; with it, it keeps up.
+
+    Args:
+        reference: the filter's state.
+        goal: where to, and how fast that moves.
+        frequency: ω, rad/s.
+        damping: ζ.
+        dt: inner period, s.
+    """
+    pull = frequency * frequency * pose_difference(goal.T, reference.T)
+    twist = reference.twist + dt * (
+        pull + 2.0 * damping * frequency * (goal.twist - reference.twist)
+    )
+    return MovingPose(moved(MovingPose(reference.T, twist), dt), twist)

@@ -1,0 +1,140 @@
+"""Position-based servoing: the hand kept at a wanted pose relative to the target."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.control.command import JointCommand
+from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
+from vergence.control.redundancy import resolve_redundant
+from vergence.features import Observation, TargetState
+from vergence.geometry import se3_compose, se3_inverse
+from vergence.planning import Reference
+from vergence.robot import Arm, Chain, JointState, forward_kinematics, jacobian
+
+
+@njit(cache=True)
+def hand_rates(
+    chain: Chain,
+    q: FloatArray,
+    reference: MovingPose,
+    gain: float,
+    spare: FloatArray,
+    rate_max: FloatArray,
+    singular_below: float,
+) -> FloatArray:
+    """Return joint rates that keep the hand on a reference trajectory, (n,).
+
+    q̇ = J⁺ (twist + gain · Δ(reference, hand)), the closed-loop inverse kinematics.
+
+    Args:
+        chain: with the hand as its tip.
+        q: joint set-points, (n,).
+        reference: where the hand should be, and how fast it should move.
+        gain: 1/s.
+        spare: rates wanted of redundant joints, (n,).
+        rate_max: (n,).
+        singular_below: see `resolve_redundant`.
+    """
+    T = forward_kinematics(chain, q)
+    twist = reference.twist + gain * pose_difference(reference.T, T)
+    R = np.ascontiguousarray(T[:3, :3].T)
+    twist_hand = np.concatenate((R @ twist[:3], R @ twist[3:]))
+    return resolve_redundant(jacobian(chain, q), twist_hand, spare, rate_max, singular_below)
+
+
+class PositionBasedLaw:
+    """Moves the hand so that the target keeps a wanted pose in it, [Lippiello2005] section IV.
+
+    Each picture gives a goal T_world_hand = T_world_target (T*_hand_target)⁻¹. At the inner rate a
+    second-order filter makes a trajectory of it, and closed-loop inverse kinematics gives the joint
+    rates. By default the goal is predicted over the latency and its velocity fed forward; the paper
+    does neither, and so lags.
+
+    Args:
+        arm: with the hand (a camera or tool) as its tip.
+        period: the inner one, s.
+        filter_hz: natural frequency of the interpolating filter.
+        damping: of that filter.
+        feed_forward: whether the goal's velocity goes into the filter.
+        prediction: whether the target's pose is predicted from the exposure to now.
+        closed_loop_hz: how fast the joints make up for what the hand is behind.
+        null_space: rate at which a spare joint leaves its limit, rad/s or m/s; it falls to zero
+            in the middle of the joint's range.
+        singular_below: singular values of the weighted Jacobian, relative to the largest, below
+            which a direction is damped.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        period: float,
+        *,
+        filter_hz: float = 3.0,
+        damping: float = 1.0,
+        feed_forward: bool = True,
+        prediction: bool = True,
+        closed_loop_hz: float = 5.0,
+        null_space: float = 0.5,
+        singular_below: float = 0.02,
+    ) -> None:
+        self._arm, self._period = arm, period
+        self._frequency, self._damping = 2 * np.pi * filter_hz, damping
+        self._feed_forward, self._prediction = feed_forward, prediction
+        self._gain = 2 * np.pi * closed_loop_hz
+        self._null_space, self._singular_below = null_space, singular_below
+        self._goal: MovingPose | None = None
+        self._reference: MovingPose | None = None
+
+    def command(
+        self, observation: Observation, reference: Reference, joints: JointState
+    ) -> JointCommand:
+        """Take the target's new pose as the goal; return the rates to set out with."""
+        target, wanted = observation.target, reference.T_camera_target
+        if target is None or wanted is None:
+            self.hold()
+            return JointCommand(np.zeros(self._arm.joint_count), np.zeros(6))
+        self._goal = self._goal_of(target, wanted, joints.time)
+        if self._reference is None:
+            T_hand = forward_kinematics(self._arm.chain, joints.position)
+            self._reference = MovingPose(T_hand, np.zeros(6))
+        rates = self._rates(joints.position, self._reference)
+        return JointCommand(rates, jacobian(self._arm.chain, joints.position) @ rates)
+
+    def follow(self, position: FloatArray) -> FloatArray:
+        """Return joint rates (n,) for the next inner period from the last set-point (n,)."""
+        if self._goal is None or self._reference is None:
+            return np.zeros(self._arm.joint_count)
+        self._goal = MovingPose(moved(self._goal, self._period), self._goal.twist)
+        self._reference = interpolate(
+            self._reference, self._goal, self._frequency, self._damping, self._period
+        )
+        return self._rates(position, self._reference)
+
+    def hold(self) -> None:
+        """Forget the goal and the trajectory."""
+        self._goal = self._reference = None
+
+    def _goal_of(self, target: TargetState, wanted: FloatArray, now: float) -> MovingPose:
+        """Return where the hand should be now, and how fast that place moves."""
+        seen = MovingPose(target.T_world_target, target.velocity)
+        T_target = moved(seen, now - target.time) if self._prediction else target.T_world_target
+        T_hand = se3_compose(T_target, se3_inverse(wanted))
+        twist = np.zeros(6)
+        if self._feed_forward:
+            lever = T_hand[:3, 3] - T_target[:3, 3]
+            twist[:3] = target.velocity[:3] + np.cross(target.velocity[3:], lever)
+            twist[3:] = target.velocity[3:]
+        return MovingPose(T_hand, twist)
+
+    def _rates(self, position: FloatArray, reference: MovingPose) -> FloatArray:
+        rates: FloatArray = hand_rates(
+            self._arm.chain,
+            position,
+            reference,
+            self._gain,
+            -self._null_space * self._arm.normalized(position),
+            self._arm.rate_max,
+            self._singular_below,
+        )
+        return rates

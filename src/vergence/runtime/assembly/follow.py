@@ -1,0 +1,76 @@
+"""The task `follow`: the hand kept at a wanted pose relative to the target."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Frame
+from vergence.cell import Cell, SimulatedDriver, placement_pose
+from vergence.cell.schema import FollowTable, Placement
+from vergence.errors import InputError
+from vergence.features import ImagePoints, Observation
+from vergence.geometry import se3_inverse
+from vergence.planning import FixedReference, Reference
+from vergence.runtime.assembly.laws import build_law
+from vergence.runtime.assembly.parts import Parts
+from vergence.runtime.assembly.pose import FollowedPose, follow_pose, target_shape
+
+
+def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images: bool) -> Parts:
+    """Put together what estimates the target's pose and keeps the hand beside it.
+
+    Raises:
+        InputError: if the cell cannot be run as it is written.
+    """
+    model = target_shape(cell, driver)
+    driver.look_for(model.corners)
+    _require_sight(cell, driver)
+    planner = FixedReference(Reference(0.0, T_camera_target=_wanted_pose(task, driver)))
+    perception = FoundOrNothing(follow_pose(cell, driver, model, images))
+    return Parts(perception, planner, build_law(cell, driver))
+
+
+class FoundOrNothing:
+    """Calls every point not found while the target is lost, so that the loop holds the arm.
+
+    Args:
+        perception: estimates the target's pose.
+    """
+
+    def __init__(self, perception: FollowedPose) -> None:
+        self._perception = perception
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the frames show, or None if none of them concerns it."""
+        observation = self._perception.observe(frames)
+        if observation is None or observation.target is not None:
+            return observation
+        views = tuple(_nothing_found(view, self._perception.lost) for view in observation.views)
+        return Observation(observation.time, views)
+
+
+def _nothing_found(view: ImagePoints, why: str) -> ImagePoints:
+    none = np.zeros(len(view.found), dtype=np.bool_)
+    reasons = (why,) * len(none)
+    return ImagePoints(view.camera, view.time, view.points_px, view.covariance_px, none, reasons)
+
+
+def _wanted_pose(task: FollowTable, driver: SimulatedDriver) -> FloatArray:
+    """Return T_camera_target (4, 4) as the task wants it."""
+    if isinstance(task.desired, Placement):
+        return placement_pose(task.desired)
+    truth = driver.first_frame(task.camera).truth
+    assert truth is not None
+    T_camera_target: FloatArray = se3_inverse(truth.T_world_camera) @ truth.T_world_target
+    return T_camera_target
+
+
+def _require_sight(cell: Cell, driver: SimulatedDriver) -> None:
+    names = cell.perception.cameras or tuple(cell.cameras)
+    for name in names:
+        truth = driver.first_frame(name).truth
+        if truth is not None and truth.visible.any():
+            return
+    given = f"at the start none of the cameras ({', '.join(names)}) sees a corner of it"
+    raise InputError(str(cell.path), "target", given, "a start from which a camera sees it")

@@ -1,0 +1,115 @@
+"""How the corners of a target are measured: in images, or from what a simulated camera knows."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vergence.arrays import FloatArray, IntArray
+from vergence.camera import Camera, Frame
+from vergence.estimation import Measure
+from vergence.features import ImagePoints
+
+if TYPE_CHECKING:
+    from vergence.vision.known_object.object_model import ObjectModel
+
+
+class CornerWindows:
+    """Measures corners in windows of rendered or real images.
+
+    Args:
+        model: the target's geometry; feature j is its corner j.
+        cameras: by name.
+    """
+
+    def __init__(self, model: "ObjectModel", cameras: Mapping[str, Camera]) -> None:
+        from vergence.vision.known_object.corner_extractor import CornerExtractor
+
+        self._extractor = CornerExtractor(model)
+        self._cameras = cameras
+
+    def __call__(
+        self,
+        frame: Frame,
+        features: IntArray,
+        points_px: FloatArray,
+        half_px: FloatArray,
+        T_camera_target: FloatArray,
+    ) -> ImagePoints:
+        """Return the points asked for; see `vergence.estimation.Measure`."""
+        assert frame.image is not None
+        if not len(features):
+            return _no_points(frame)
+        found = self._extractor.measure(
+            frame.image, self._cameras[frame.camera], T_camera_target, features, half_px
+        )
+        return ImagePoints(frame.camera, frame.time, *found)
+
+
+class ExactWindows:
+    """Takes corners from the truth of a simulated camera, with noise and wrong matches.
+
+    A point outside its window is not found, as in an image. A wrong match lies anywhere in its
+    window.
+
+    Args:
+        noise_px: standard deviation of the noise on each coordinate.
+        rng: draws the noise.
+        outliers: share of wrong matches.
+    """
+
+    def __init__(self, noise_px: float, rng: np.random.Generator, outliers: float = 0.0) -> None:
+        self._noise_px, self._rng, self._outliers = noise_px, rng, outliers
+
+    def __call__(
+        self,
+        frame: Frame,
+        features: IntArray,
+        points_px: FloatArray,
+        half_px: FloatArray,
+        T_camera_target: FloatArray,
+    ) -> ImagePoints:
+        """Return the points asked for; see `vergence.estimation.Measure`."""
+        truth, count = frame.truth, len(features)
+        assert truth is not None
+        if not count:
+            return _no_points(frame)
+        measured = truth.points_px[features] + self._rng.normal(0.0, self._noise_px, (count, 2))
+        wrong = self._rng.random(count) < self._outliers
+        anywhere = points_px + self._rng.uniform(-1.0, 1.0, (count, 2)) * half_px
+        measured = np.where(wrong[:, None], anywhere, measured)
+        visible = truth.visible[features] | wrong
+        found = visible & (np.abs(measured - points_px) <= half_px).all(axis=1)
+        reasons = tuple(
+            "" if ok else "outside its window" if seen else "not in sight"
+            for ok, seen in zip(found, visible, strict=True)
+        )
+        covariance = np.tile(np.eye(2) * self._noise_px**2, (count, 1, 1))
+        places = np.where(found[:, None], measured, points_px)
+        return ImagePoints(frame.camera, frame.time, places, covariance, found, reasons)
+
+
+def with_noise(measure: Measure, noise_px: float) -> Measure:
+    """Return a measure whose points all claim the same noise, as R of [Lippiello2005] has it."""
+
+    def claimed(
+        frame: Frame,
+        features: IntArray,
+        points_px: FloatArray,
+        half_px: FloatArray,
+        T_camera_target: FloatArray,
+    ) -> ImagePoints:
+        seen = measure(frame, features, points_px, half_px, T_camera_target)
+        covariance = np.tile(np.eye(2) * noise_px**2, (len(features), 1, 1))
+        return ImagePoints(
+            seen.camera, seen.time, seen.points_px, covariance, seen.found, seen.reasons
+        )
+
+    return claimed
+
+
+def _no_points(frame: Frame) -> ImagePoints:
+    none = np.empty((0, 2))
+    return ImagePoints(
+        frame.camera, frame.time, none, np.empty((0, 2, 2)), np.zeros(0, dtype=np.bool_), ()
+    )

@@ -1,0 +1,134 @@
+"""Perception of a target's pose, as a cell describes it."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Frame
+from vergence.cell import Cell, SimulatedDriver
+from vergence.estimation import (
+    Blocked,
+    CameraPose,
+    CameraRig,
+    IndexSelection,
+    InformationSelection,
+    Joints,
+    Measure,
+    PerceptionSettings,
+    PoseFilter,
+    PosePerception,
+    RpyPoseFilter,
+    TargetShape,
+)
+from vergence.features import Observation
+from vergence.geometry import se3, so3_exp
+from vergence.robot import forward_kinematics
+from vergence.runtime.assembly.measure import CornerWindows, ExactWindows, with_noise
+
+if TYPE_CHECKING:
+    from vergence.vision.known_object.object_model import ObjectModel
+
+
+class FollowedPose(Protocol):
+    """A perception that may lose its target."""
+
+    @property
+    def lost(self) -> str:
+        """Why the target counts as lost; empty while it is followed."""
+        ...
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the frames show, or None if none of them concerns it."""
+        ...
+
+
+def target_shape(cell: Cell, driver: SimulatedDriver) -> "ObjectModel":
+    """Return the target's geometry; its features are the file's, else its sharp corners.
+
+    Raises:
+        InputError: if it has no corners and the file names no features.
+    """
+    from vergence.vision.known_object.loading import object_model_of
+    from vergence.vision.known_object.object_model import ObjectModel
+
+    if cell.target.features:
+        return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
+    return object_model_of(driver.world.model, "target")
+
+
+def follow_pose(
+    cell: Cell, driver: SimulatedDriver, model: "ObjectModel", images: bool
+) -> FollowedPose:
+    """Return the perception that a cell describes, for a target of known geometry."""
+    table = cell.perception
+    names = table.cameras or tuple(cell.cameras)
+    rig = CameraRig.of({name: driver.cameras[name] for name in names}, table.noise_px)
+    measure: Measure
+    if images:
+        measure = CornerWindows(model, driver.cameras)
+    else:
+        rng = np.random.default_rng([cell.seed, 3])
+        measure = ExactWindows(table.noise_px, rng, table.outliers)
+    if table.believed_noise_px is not None:
+        measure = with_noise(measure, table.believed_noise_px)
+    parts: dict[str, Any] = {
+        "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
+        "settings": PerceptionSettings(budget=table.budget),
+        "blocked_at": _blocked_at(driver) if table.occlusion else None,
+    }
+    shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
+    camera_pose, start = camera_poses(cell, driver), _rough_pose(cell, driver)
+    if table.filter == "rpy":
+        period = 1.0 / max(cell.cameras[name].rate_hz for name in names)
+        rpy = RpyPoseFilter(frame_period=period)
+        return PosePerception(rig, shape, camera_pose, measure, rpy, rpy.start(0.0, start), **parts)
+    pose = PoseFilter(
+        acceleration_density=table.acceleration_density,
+        angular_acceleration_density=table.angular_acceleration_density,
+    )
+    return PosePerception(rig, shape, camera_pose, measure, pose, pose.start(0.0, start), **parts)
+
+
+def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
+    """Return the function from a camera's name and joints at the exposure to T_world_camera."""
+    fixed = {n: driver.world.camera_pose(n) for n, t in cell.cameras.items() if t.arm is None}
+    carried = {
+        n: (t.arm, driver.world.arm_to_camera(n).chain)
+        for n, t in cell.cameras.items()
+        if t.arm is not None
+    }
+
+    def pose(camera: str, joints: Joints) -> FloatArray:
+        if camera in fixed:
+            return fixed[camera]
+        arm, chain = carried[camera]
+        T_world_camera: FloatArray = forward_kinematics(chain, joints[arm])
+        return T_world_camera
+
+    return pose
+
+
+def _blocked_at(driver: SimulatedDriver) -> Any:
+    from vergence.cell.obstacles import Obstacles
+
+    obstacles = Obstacles(driver.world)
+
+    def at(joints: Joints) -> Blocked:
+        obstacles.move(joints)
+        return obstacles.blocked
+
+    return at
+
+
+def _rough_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:
+    """Return the target's pose at the start as well as it is known, (4, 4)."""
+    table = cell.perception
+    rng = np.random.default_rng([cell.seed, 4])
+    shift, turn = rng.normal(size=3), rng.normal(size=3)
+    truth = driver.world.target_pose()
+    angle = np.deg2rad(table.start_error_deg)
+    R = so3_exp(angle * turn / np.linalg.norm(turn)) @ truth[:3, :3]
+    T: FloatArray = se3(R, truth[:3, 3] + table.start_error_m * shift / np.linalg.norm(shift))
+    return T
