@@ -8,6 +8,7 @@ import pytest
 from vergence.app.figures import (
     Panels,
     error_figure,
+    estimate_figure,
     joints_figure,
     mark_events,
     measures_figure,
@@ -17,7 +18,8 @@ from vergence.app.figures import (
     twist_figure,
 )
 from vergence.app.figures.arm import normalized
-from vergence.runtime.recording import ArmInfo, Event, Recording
+from vergence.geometry import se3_exp
+from vergence.runtime.recording import ArmInfo, Event, Recording, TargetTrace
 
 FIGURES = ["error", "paths", "joints", "twist", "measures", "motion"]
 
@@ -92,6 +94,24 @@ def test_events_are_marked_in_every_panel(recording: Recording) -> None:
     after = [len(axes.lines) for axes in made.axes]
     assert after == [count + len(recording.events) for count in before]
     assert [text.get_text() for text in made.axes[0].texts] == ["1", "2"]
+
+
+def test_a_filters_error_is_its_distance_from_the_truth(recording: Recording) -> None:
+    camera = recording.cameras["wrist"]
+    poses = camera.T_world_target.copy()
+    poses[:, :3, 3] += [0.003, 0.0, 0.004]
+    poses[:, :3, :3] = se3_exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.1]))[:3, :3]
+    count = len(camera.time)
+    covariance = np.tile(1e-6 * np.eye(12), (count, 1, 1))
+    sure = np.ones(count, dtype=bool)
+    made = estimate_figure(
+        camera, TargetTrace(camera.time, poses, np.zeros((count, 6)), covariance, sure)
+    )
+    assert made is not None
+    position, rotation = made.axes
+    np.testing.assert_allclose(position.lines[0].get_ydata(), 5.0)
+    np.testing.assert_allclose(position.lines[1].get_ydata(), np.sqrt(3.0))
+    np.testing.assert_allclose(rotation.lines[0].get_ydata(), np.degrees(0.1))
 
 
 def test_events_at_one_time_share_a_number(recording: Recording) -> None:

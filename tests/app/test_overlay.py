@@ -15,20 +15,19 @@ def marks(tracked: object = NOWHERE, found: bool = True, **others: object) -> Ma
     return Marks(np.asarray(tracked), np.array([found]), **points)
 
 
-def drawn_centre(image: NDArray[np.uint8], canvas: NDArray[np.uint8], scale: int) -> object:
-    """Where the ink lies on average, in pixels of the small image."""
-    ground = np.repeat(np.repeat(image, scale, axis=0), scale, axis=1)
-    ink = np.abs(canvas.astype(float) - ground[..., None]).sum(axis=2)
+def drawn_centre(canvas: NDArray[np.uint8], width: int) -> object:
+    """Where the ink on grey lies on average, in pixels of the picture."""
+    ink = np.abs(canvas.astype(float) - 128).sum(axis=2)
     v, u = np.indices(ink.shape)
-    large = np.array([(u * ink).sum(), (v * ink).sum()]) / ink.sum()
-    return (large + 0.5) / scale - 0.5
+    drawn = np.array([(u * ink).sum(), (v * ink).sum()]) / ink.sum()
+    return (drawn + 0.5) * 100 / width - 0.5
 
 
-@pytest.mark.parametrize("scale", [1, 2, 3])
+@pytest.mark.parametrize("width", [60, 100, 300])
 @pytest.mark.parametrize("point", [(50.0, 40.0), (50.5, 40.25), (31.8, 22.3)])
 @pytest.mark.parametrize("kind", ["tracked", "lost", "desired", "true"])
 def test_a_mark_is_centred_on_its_point_to_a_quarter_of_a_pixel(
-    scale: int, point: tuple[float, float], kind: str
+    width: int, point: tuple[float, float], kind: str
 ) -> None:
     at = np.array([point])
     what = {
@@ -37,12 +36,12 @@ def test_a_mark_is_centred_on_its_point_to_a_quarter_of_a_pixel(
         "desired": marks(desired_px=at),
         "true": marks(true_px=at),
     }[kind]
-    centre = drawn_centre(GREY, draw(GREY, what, scale), scale)
+    centre = drawn_centre(draw(GREY, what, width), width)
     np.testing.assert_allclose(centre, point, atol=0.25)
 
 
 def test_unknown_points_are_not_drawn() -> None:
-    canvas = draw(GREY, marks(), 2)
+    canvas = draw(GREY, marks(), 200)
     assert canvas.shape == (160, 200, 3)
     assert (canvas == 128).all()
 

@@ -29,7 +29,7 @@ def test_a_film_plays_every_kept_picture_in_real_time(recording: Recording, tmp_
     frames, rate = decoded(data, tmp_path)
     assert len(frames) == len(list(recording.images("wrist")))
     assert rate == pytest.approx(15.0, rel=0.02)
-    assert frames[0].shape == (240, 320, 3)
+    assert frames[0].shape == (300, 400, 3)
 
 
 def test_a_film_shows_the_picture_it_was_given(tmp_path: Path) -> None:

@@ -42,22 +42,19 @@ class Marks:
         )
 
 
-def draw(image: ImageArray, marks: Marks, scale: int = 1) -> NDArray[np.uint8]:
-    """Return the picture in colour, enlarged, with the marks over it.
+def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[np.uint8]:
+    """Return the picture in colour with the marks over it.
 
     Args:
         image: (height, width) grey.
         marks: where to draw.
-        scale: every pixel becomes scale × scale, marks keep their size.
+        width: of what is returned, the picture's own if None; marks keep their size.
 
     Returns:
-        (scale height, scale width, 3) blue, green, red.
+        (…, width, 3) blue, green, red.
     """
-    import cv2
-
-    size = (image.shape[1] * scale, image.shape[0] * scale)
-    enlarged = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
-    canvas = np.asarray(cv2.cvtColor(enlarged, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    canvas = _colored(image, width or image.shape[1])
+    scale = np.array(canvas.shape[1::-1]) / image.shape[::-1]
     for point in _known(marks.desired_px, scale):
         _cross(canvas, point, DESIRED, upright=True)
     for point in _known(marks.true_px, scale):
@@ -69,8 +66,17 @@ def draw(image: ImageArray, marks: Marks, scale: int = 1) -> NDArray[np.uint8]:
     return canvas
 
 
-def _known(points_px: FloatArray, scale: int) -> FloatArray:
-    """Return the points that can be drawn, as places in the enlarged picture."""
+def _colored(image: ImageArray, width: int) -> NDArray[np.uint8]:
+    import cv2
+
+    size = (width, round(image.shape[0] * width / image.shape[1]))
+    method = cv2.INTER_AREA if width < image.shape[1] else cv2.INTER_LINEAR
+    resized = cv2.resize(image, size, interpolation=method)
+    return np.asarray(cv2.cvtColor(resized, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+
+
+def _known(points_px: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return the points that can be drawn, as places in the resized picture."""
     drawable = np.isfinite(points_px).all(axis=1) & (np.abs(points_px) < 1e4).all(axis=1)
     return np.asarray((points_px[drawable] + 0.5) * scale - 0.5)
 

@@ -7,6 +7,7 @@ from vergence.app import markup
 from vergence.app.figures import (
     Panels,
     error_figure,
+    estimate_figure,
     joints_figure,
     mark_events,
     measures_figure,
@@ -97,6 +98,11 @@ def _camera(recording: Recording, name: str) -> str:
             recording,
             motion_figure(trace, recording.target),
             "How target and camera moved through the world since the first picture.",
+        ),
+        _figure(
+            recording,
+            estimate_figure(trace, recording.target),
+            "How far the filter's target is from the true one.",
         ),
     )
 

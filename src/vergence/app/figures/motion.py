@@ -1,8 +1,9 @@
-"""The figure of how target and camera moved through the world."""
+"""Figures of how target and camera moved through the world, and what a filter believed."""
 
 import numpy as np
 
 from vergence.app.figures.layout import Panels, panels
+from vergence.arrays import FloatArray, IntArray
 from vergence.drawing import curve, legend
 from vergence.runtime.recording import CameraTrace, TargetTrace
 
@@ -27,3 +28,45 @@ def motion_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | 
             out.axes[0].plot(estimate.time, believed[:, index], label=f"{axis} estimated", **style)
     legend(out.axes[0])
     return out
+
+
+def estimate_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
+    """Draw how far a filter's target is from the true one, and how far it thinks it might be."""
+    known = np.isfinite(trace.T_world_target[:, 0, 0])
+    if estimate is None or not known.any():
+        return None
+    true = trace.T_world_target[known][_nearest(trace.time[known], estimate.time)]
+    believed = estimate.T_world_target
+    distance = np.linalg.norm(believed[:, :3, 3] - true[:, :3, 3], axis=1)
+    angle = _angles(np.swapaxes(true[:, :3, :3], 1, 2) @ believed[:, :3, :3])
+    rows = (
+        ("position (mm)", 1e3 * distance, 1e3 * _spread(estimate, slice(0, 3))),
+        ("rotation (deg)", np.degrees(angle), np.degrees(_spread(estimate, slice(3, 6)))),
+    )
+    out = panels(2)
+    for axes, (label, error, spread) in zip(out.axes, rows, strict=True):
+        axes.plot(estimate.time, error, label="error", **curve(0))
+        axes.plot(
+            estimate.time, spread, label="1 σ, as believed", **{**curve(1), "linestyle": "--"}
+        )
+        axes.set_ylabel("estimated target\n" + label)
+        axes.set_ylim(bottom=0.0)
+    legend(out.axes[0])
+    return out
+
+
+def _nearest(times: FloatArray, wanted: FloatArray) -> IntArray:
+    """Return the row of the time nearest to each wanted one."""
+    return np.asarray(np.abs(times[None, :] - wanted[:, None]).argmin(axis=1))
+
+
+def _angles(rotations: FloatArray) -> FloatArray:
+    """Return the angle of each rotation (K, 3, 3), rad, exact near zero as well."""
+    skew = rotations - np.swapaxes(rotations, 1, 2)
+    sine = np.sqrt(skew[:, 2, 1] ** 2 + skew[:, 0, 2] ** 2 + skew[:, 1, 0] ** 2)
+    return np.asarray(np.arctan2(sine, np.trace(rotations, axis1=1, axis2=2) - 1.0))
+
+
+def _spread(estimate: TargetTrace, part: slice) -> FloatArray:
+    """Return the standard deviation of a distance, the square root of a covariance's trace."""
+    return np.asarray(np.sqrt(np.trace(estimate.covariance[:, part, part], axis1=1, axis2=2)))
