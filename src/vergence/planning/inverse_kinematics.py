@@ -1,0 +1,101 @@
+"""Joint positions that bring the tip to a pose: all branches that random seeds find."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.geometry import se3_compose, se3_inverse, se3_log
+from vergence.robot import Arm, Chain, forward_kinematics, jacobian
+
+SEEDS = 48  # random starts of the search
+TOLERANCE = 1e-8  # of the pose, m and rad together
+
+
+@njit(cache=True)
+def solve_pose(
+    chain: Chain, q: FloatArray, T: FloatArray, low: FloatArray, high: FloatArray, iterations: int
+) -> tuple[FloatArray, float]:
+    """Move q to where the tip has pose T, inside the limits (Levenberg-Marquardt, projected).
+
+    Returns:
+        joint positions (n,) and the norm of the twist (m, rad) that is still missing.
+    """
+    n, damping = len(q), 1e-2
+    missing = se3_log(se3_compose(se3_inverse(forward_kinematics(chain, q)), T))
+    error = np.sqrt(np.sum(missing**2))
+    for _ in range(iterations):
+        if error < TOLERANCE or damping > 1e6:
+            break
+        J = jacobian(chain, q)
+        A = J.T @ J
+        for i in range(n):
+            A[i, i] += damping * error * error + 1e-12
+        candidate = q + np.linalg.solve(A, J.T @ missing)
+        candidate = np.minimum(np.maximum(candidate, low), high)
+        missing_new = se3_log(se3_compose(se3_inverse(forward_kinematics(chain, candidate)), T))
+        error_new = np.sqrt(np.sum(missing_new**2))
+        if error_new < error:
+            q, missing, error = candidate, missing_new, error_new
+            damping *= 0.2
+        else:
+            damping *= 8.0
+    return q, error
+
+
+@njit(cache=True)
+def solve_from_seeds(
+    chain: Chain, seeds: FloatArray, T: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return the solutions (K, n) that the seeds (S, n) lead to, in their order, each once."""
+    found, count = np.empty_like(seeds), 0
+    for seed in seeds:
+        q, error = solve_pose(chain, seed, T, low, high, 40)
+        known = error >= 100 * TOLERANCE
+        for k in range(count):
+            known = known or np.abs(found[k] - q).max() < 1e-4
+        if not known:
+            found[count] = q
+            count += 1
+    return found[:count]
+
+
+def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4) -> FloatArray:
+    """Return joint positions (K, n) inside the limits that bring the tip to T, nearest first.
+
+    Branches are found from fixed seeds, so the same question has the same answer; turning joints
+    with more than a full turn of travel contribute every turn that fits. With more than six joints
+    the solutions are samples of a continuum.
+
+    Args:
+        arm: any.
+        T: wanted pose of the tip in the world, (4, 4).
+        near: joint positions from which distances count, (n,), measured in travel time.
+        most: how many to return.
+    """
+    low, high = finite_range(arm, near)
+    random = np.random.default_rng(0)
+    seeds = np.vstack((near, random.uniform(low, high, (SEEDS, len(near)))))
+    solutions = solve_from_seeds(arm.chain, seeds, np.ascontiguousarray(T), low, high)
+    turned = [shifted for q in solutions for shifted in _full_turns(arm, q, low, high)]
+    turned.sort(key=lambda q: float(np.abs((q - near) / arm.rate_max).max()))
+    return np.array(turned[:most]).reshape(-1, arm.joint_count)
+
+
+def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the joint limits, a turn (a metre) either side of `near` where there are none."""
+    reach = np.where(arm.chain.sliding, 1.0, 2 * np.pi)
+    low = np.where(np.isfinite(arm.q_min), arm.q_min, near - reach)
+    high = np.where(np.isfinite(arm.q_max), arm.q_max, near + reach)
+    return low, high
+
+
+def _full_turns(arm: Arm, q: FloatArray, low: FloatArray, high: FloatArray) -> list[FloatArray]:
+    """Return q and q with single joints turned by whole turns inside the limits."""
+    result = [q]
+    for i in np.flatnonzero(~arm.chain.sliding):
+        for turn in (-2 * np.pi, 2 * np.pi):
+            shifted = q.copy()
+            shifted[i] += turn
+            if low[i] <= shifted[i] <= high[i]:
+                result.append(shifted)
+    return result

@@ -1,0 +1,213 @@
+"""The planner to use: an optimised continuous path, and a tree search behind it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.planning.failure import Obstacle, PlanFailure
+from vergence.planning.inverse_kinematics import finite_range, goal_configurations
+from vergence.planning.path import Path
+from vergence.planning.potential_field import PotentialFieldPlanner
+from vergence.planning.problem import PlanningProblem
+from vergence.planning.smoothing import SplineProblem, least_clearance, optimise_spline
+from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
+from vergence.planning.tree import connect_trees, pull_into_view, shorten
+from vergence.planning.visibility import View
+
+SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A spline that keeps every constraint."""
+
+    controls: FloatArray  # (K, n)
+    basis: SplineBasis
+    roughness: float
+
+
+@dataclass(frozen=True, slots=True)
+class OptimisedPlanner:
+    """Smooth joint paths under visibility and joint limits, from several guesses.
+
+    The cost is ∫ |q'/q̇_max|² + smoothing ∫ |q''/q̇_max|² over the path. Guesses: straight in joint
+    space to every inverse-kinematics branch, the same pulled into view, and the camera's straight
+    line turned in both senses; behind them a bidirectional tree. The same problem always has the
+    same answer.
+    """
+
+    controls: int = 12  # of the spline; twice as many for what the tree finds
+    samples: int = 60  # where visibility is weighed; it is checked at eight times as many
+    smoothing: float = 0.005
+    branches: int = 3  # of the goal's inverse kinematics
+    waypoints: int = 121  # of the path that comes out
+    tree_samples: int = 4000  # before the tree gives up; 0 for no tree
+
+    def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
+        """Return the smoothest path found that keeps every constraint, or what stood in the way."""
+        failure = _ends_refused(problem)
+        if failure is not None:
+            return failure
+        goals = goal_configurations(
+            problem.arm, problem.T_world_goal, problem.q_start, self.branches
+        )
+        if not len(goals):
+            return _unreachable(problem)
+        view = problem.view(_margin_kept(problem))
+        best = self._from_guesses(problem, view, goals)
+        if best is None and self.tree_samples > 0:
+            best = self._from_tree(problem, view, goals)
+        if best is None:
+            return self._obstacle(problem, view, goals)
+        samples = spline_basis(len(best.controls), self.waypoints).values
+        return Path.through(problem, samples @ best.controls, "optimised")
+
+    def _from_guesses(
+        self, problem: PlanningProblem, view: View, goals: FloatArray
+    ) -> _Candidate | None:
+        basis = spline_basis(self.controls, self.samples, self.smoothing)
+        found = [
+            self._smooth(problem, view, basis, guess)
+            for guess in self._guesses(problem, view, goals)
+        ]
+        return min((c for c in found if c is not None), key=lambda c: c.roughness, default=None)
+
+    def _guesses(
+        self, problem: PlanningProblem, view: View, goals: FloatArray
+    ) -> Iterator[FloatArray]:
+        """Yield joint waypoints from the start to a goal."""
+        for goal in goals:
+            straight = np.linspace(problem.q_start, goal, self.samples)
+            yield straight
+            yield _pulled(problem, view, straight)
+        walker = PotentialFieldPlanner(gain_image=0.0, gain_joint=0.0, step=0.05, steps_max=400)
+        for long_way in (False, True):
+            q = walker.walk(problem, long_way).q
+            nearest = goals[np.abs(goals - q[-1]).sum(axis=1).argmin()]
+            blend = np.linspace(0, 1, len(q))[:, None]
+            yield q + blend * (nearest - q[-1])
+
+    def _smooth(
+        self,
+        problem: PlanningProblem,
+        view: View,
+        basis: SplineBasis,
+        guess: FloatArray,
+        limited: bool = True,
+    ) -> _Candidate | None:
+        """Optimise one guess; None where it stays out of view."""
+        arm, goal = problem.arm, guess[-1]
+        low, high = problem.joint_range(goal)
+        if not limited:
+            low, high = np.full_like(low, -np.inf), np.full_like(high, np.inf)
+        scale = 1.0 / arm.rate_max
+        start = fit_controls(basis, guess, scale)
+        fine = spline_basis(len(start), 8 * self.samples).values
+        for margin in (SOFT_MARGIN, 3 * SOFT_MARGIN):
+            task = SplineProblem(view, margin, basis.values, basis.roughness, scale**2, low, high)
+            controls, roughness, least = optimise_spline(arm.chain, task, start, 5, 15)
+            if least > 0.0 and least_clearance(arm.chain, view, fine, controls) > 0.0:
+                return _Candidate(controls, basis, roughness)
+            if least < -0.02:
+                return None
+            start = controls
+        return None
+
+    def _from_tree(
+        self, problem: PlanningProblem, view: View, goals: FloatArray
+    ) -> _Candidate | None:
+        arm, random = problem.arm, np.random.default_rng(0)
+        low, high = finite_range(arm, problem.q_start)
+        samples = random.uniform(low, high, (self.tree_samples, arm.joint_count))
+        scale = 1.0 / arm.rate_max
+        path = connect_trees(
+            arm.chain, view, 2 * SOFT_MARGIN, low, high, scale,
+            problem.q_start.copy(), goals, samples, 0.15,
+        )  # fmt: skip
+        if not len(path):
+            return None
+        for controls in (2 * self.controls, 4 * self.controls):
+            basis = spline_basis(controls, 4 * controls, self.smoothing)
+            for draws in (random.random((200, 2)), np.empty((0, 2))):
+                waypoints = shorten(arm.chain, view, scale, path, draws)
+                found = self._smooth(problem, view, basis, waypoints)
+                if found is not None:
+                    return found
+        return None
+
+    def _obstacle(self, problem: PlanningProblem, view: View, goals: FloatArray) -> PlanFailure:
+        """Name the constraint without which there would be a path."""
+        basis = spline_basis(self.controls, self.samples, self.smoothing)
+        for guess in self._guesses(problem, view, goals):
+            free = self._smooth(problem, view, basis, guess, limited=False)
+            if free is not None:
+                over = np.abs(problem.arm.normalized(basis.values @ free.controls)).max(axis=0)
+                joint = problem.arm.names[int(over.argmax())]
+                return PlanFailure(
+                    Obstacle.JOINT_LIMIT, f"every path found in view takes {joint} past its limit"
+                )
+        return PlanFailure(
+            Obstacle.VISIBILITY, "no path was found on which all points stay in the image"
+        )
+
+
+def _pulled(problem: PlanningProblem, view: View, waypoints: FloatArray) -> FloatArray:
+    """Return waypoints (P, n), each pulled into view, its predecessor's shift taken along."""
+    low, high = problem.joint_range(waypoints[-1])
+    result, shift = waypoints.copy(), np.zeros(waypoints.shape[1])
+    for k in range(1, len(waypoints) - 1):
+        fade = min(1.0, (len(waypoints) - 1 - k) / 10)
+        q = np.clip(waypoints[k] + fade * shift, low, high)
+        result[k], _ = pull_into_view(problem.arm.chain, q, view, 0.03, low, high)
+        shift = result[k] - waypoints[k]
+    return result
+
+
+def _end_margins_px(problem: PlanningProblem) -> tuple[float, float]:
+    """Return the distance of the points to the image border at start and goal, px."""
+    ends = (problem.arm.forward_kinematics(problem.q_start), problem.T_world_goal)
+    start, goal = (_image_margin_px(problem, T) for T in ends)
+    return start, goal
+
+
+def _image_margin_px(problem: PlanningProblem, T_world_camera: FloatArray) -> float:
+    points = (problem.points_world - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
+    if points[:, 2].min() <= 0.0:
+        return -np.inf
+    camera, px = problem.camera, problem.camera.project(points)
+    far = np.array([camera.width - 0.5, camera.height - 0.5]) - px
+    return float(min((px + 0.5).min(), far.min()))
+
+
+def _margin_kept(problem: PlanningProblem) -> float:
+    """Return the margin to the image border: the wanted one, or less where the ends have less."""
+    return max(0.0, min(problem.margin_px, *(0.8 * m - 0.1 for m in _end_margins_px(problem))))
+
+
+def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
+    outside = problem.arm.outside(problem.q_start)
+    if outside.any():
+        joint = problem.arm.names[int(outside.argmax())]
+        return PlanFailure(Obstacle.START, f"{joint} starts at or beyond its limit")
+    start, goal = _end_margins_px(problem)
+    if start <= 0.0:
+        return PlanFailure(Obstacle.START, "points are out of view at the start")
+    if goal <= 0.0:
+        return PlanFailure(Obstacle.VISIBILITY, "points are out of view at the goal")
+    return None
+
+
+def _unreachable(problem: PlanningProblem) -> PlanFailure:
+    """Say whether limits or the arm's reach keep it from the goal."""
+    from dataclasses import replace
+
+    free = np.full(problem.arm.joint_count, np.inf)
+    unlimited = replace(problem.arm, q_min=-free, q_max=free)
+    solutions = goal_configurations(unlimited, problem.T_world_goal, problem.q_start, 1)
+    if not len(solutions):
+        return PlanFailure(Obstacle.REACH, "the arm cannot bring its camera to the goal")
+    over = np.abs(problem.arm.normalized(solutions[0]))
+    joint = problem.arm.names[int(over.argmax())]
+    return PlanFailure(Obstacle.JOINT_LIMIT, f"at the goal {joint} would be past its limit")
