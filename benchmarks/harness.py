@@ -13,13 +13,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 Block = Callable[[int], float]
 """Runs a case this many times; returns the seconds per call."""
-
-ONE_CORE = {max(os.sched_getaffinity(0))}
-"""Where rows with a peer of one thread run, both sides: cores differ in speed on a busy machine."""
 
 UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -108,12 +106,34 @@ def compare(
     return {name: Timing(tuple(values)) for name, values in seconds.items()}
 
 
+def busy_ticks() -> dict[int, int]:
+    """How long each core has worked since the machine started, as the kernel counts."""
+    lines = Path("/proc/stat").read_text().splitlines()
+    cores = [line.split() for line in lines if line.startswith("cpu") and line[3].isdigit()]
+    idle = (4, 5)  # columns: waiting for work, waiting for a disk
+    return {
+        int(words[0][3:]): sum(int(word) for i, word in enumerate(words) if i and i not in idle)
+        for words in cores
+    }
+
+
+def idlest_core() -> int:
+    """The core of ours that worked least for a moment."""
+    before = busy_ticks()
+    time.sleep(0.1)
+    after = busy_ticks()
+    return min(os.sched_getaffinity(0), key=lambda core: after[core] - before[core])
+
+
 @contextmanager
 def on_one_core(wanted: bool) -> Iterator[None]:
-    """Keeps this thread on ONE_CORE meanwhile, if wanted."""
+    """Keeps this thread on one idle core meanwhile, if wanted; peer programs follow it there.
+
+    Cores differ in speed on a busy machine, so a ratio is fair only on one.
+    """
     before = os.sched_getaffinity(0)
     if wanted:
-        os.sched_setaffinity(0, ONE_CORE)
+        os.sched_setaffinity(0, {idlest_core()})
     try:
         yield
     finally:
