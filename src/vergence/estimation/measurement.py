@@ -19,7 +19,7 @@ from vergence.arrays import BoolArray, FloatArray
 POSE = 6  # columns that depend on the pose; the one after them holds the residual
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def point_rows(
     T_world_target: FloatArray, T_camera_world: FloatArray, point: FloatArray, rows: FloatArray
 ) -> float:
@@ -44,7 +44,7 @@ def point_rows(
     return depth
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def whiten(rows: FloatArray, covariance: FloatArray) -> None:
     """Multiply two rows by L⁻¹, where L Lᵀ is their covariance (2, 2)."""
     l00 = np.sqrt(covariance[0, 0])
@@ -55,7 +55,7 @@ def whiten(rows: FloatArray, covariance: FloatArray) -> None:
         rows[1, j] = (rows[1, j] - l10 * rows[0, j]) / l11
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def whitened_rows(
     T_world_target: FloatArray,
     T_camera_world: FloatArray,
@@ -104,7 +104,7 @@ def _pair_square(pair: FloatArray, P: FloatArray, sign: float) -> tuple[float, f
     return (s11 * r0 * r0 - 2.0 * s01 * r0 * r1 + s00 * r1 * r1) / determinant, determinant
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def mahalanobis_squared(rows: FloatArray, pose_covariance: FloatArray) -> FloatArray:
     """Return rᵀ (H P Hᵀ + I)⁻¹ r of each pair of whitened rows, (M,).
 
@@ -119,7 +119,7 @@ def mahalanobis_squared(rows: FloatArray, pose_covariance: FloatArray) -> FloatA
     return squares
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def deletion_squares(
     rows: FloatArray, kept: BoolArray, correction: FloatArray, updated: FloatArray
 ) -> FloatArray:

@@ -9,7 +9,6 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.estimation.information import symmetrize
 from vergence.geometry import so3_exp, so3_left_jacobian
 
 
@@ -27,7 +26,7 @@ def predict_pose(T_world_target: FloatArray, velocity: FloatArray, dt: float) ->
     return T
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def predict_covariance(
     P: FloatArray, velocity: FloatArray, dt: float, density: FloatArray
 ) -> FloatArray:
@@ -43,32 +42,38 @@ def predict_covariance(
         density: of linear and angular acceleration, (2,), m²/s³ and rad²/s³.
     """
     E = so3_exp(velocity[3:] * dt)
-    J = so3_left_jacobian(velocity[3:] * dt)
+    B = so3_left_jacobian(velocity[3:] * dt)
     FP = P.copy()
-    for j in range(12):
-        for i in range(3):
-            FP[i, j] += dt * P[6 + i, j]
     for i in range(3):
+        e0, e1, e2 = E[i, 0], E[i, 1], E[i, 2]
+        b0, b1, b2 = dt * B[i, 0], dt * B[i, 1], dt * B[i, 2]
         for j in range(12):
-            FP[3 + i, j] = 0.0
-        for k in range(3):
-            for j in range(12):
-                FP[3 + i, j] += E[i, k] * P[3 + k, j] + dt * J[i, k] * P[9 + k, j]
-    predicted = FP.copy()
+            FP[i, j] += dt * P[6 + i, j]
+            FP[3 + i, j] = (
+                e0 * P[3, j]
+                + e1 * P[4, j]
+                + e2 * P[5, j]
+                + b0 * P[9, j]
+                + b1 * P[10, j]
+                + b2 * P[11, j]
+            )
+    predicted = FP.copy()  # times Fᵀ: the columns as the rows before, one triangle of them
     for i in range(12):
-        for j in range(3):
-            predicted[i, j] += dt * FP[i, 6 + j]
-            value = 0.0
-            for k in range(3):
-                value += E[j, k] * FP[i, 3 + k] + dt * J[j, k] * FP[i, 9 + k]
-            predicted[i, 3 + j] = value
+        row = FP[i]
+        for j in range(min(i + 1, 3)):
+            predicted[i, j] += dt * row[6 + j]
+            predicted[j, i] = predicted[i, j]
+        for j in range(min(i - 2, 3)):
+            rotation = E[j, 0] * row[3] + E[j, 1] * row[4] + E[j, 2] * row[5]
+            rate = B[j, 0] * row[9] + B[j, 1] * row[10] + B[j, 2] * row[11]
+            predicted[i, 3 + j] = predicted[3 + j, i] = rotation + dt * rate
     for i in range(6):
         d = density[i // 3]
         predicted[i, i] += d * dt * dt * dt / 3.0
         predicted[i, 6 + i] += d * dt * dt / 2.0
-        predicted[6 + i, i] += d * dt * dt / 2.0
+        predicted[6 + i, i] = predicted[i, 6 + i]
         predicted[6 + i, 6 + i] += d * dt
-    return symmetrize(predicted)
+    return predicted
 
 
 @njit(cache=True)
