@@ -7,7 +7,6 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 
-
 Vector = tuple[float, float, float]
 
 
@@ -20,7 +19,7 @@ class Chain(NamedTuple):
 
     rotation: FloatArray  # (n + 1, 3, 3)
     position: FloatArray  # (n + 1, 3) m
-    sliding: BoolArray  # (n,) True where a joint slides
+    sliding: BoolArray | FloatArray  # (n,) true (or 1) where a joint slides
 
 
 class ChainState(NamedTuple):

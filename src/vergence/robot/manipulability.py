@@ -75,7 +75,7 @@ def joint_limit_penalty(
             return 0.0, gradient
         gradient[i] = (above - below) / (below * above)  # (log pᵢ)'
         product *= below * above / (span * span)
-    rest = np.exp(-k * product)
+    rest = float(np.exp(-k * product))
     for i in range(n):
         gradient[i] *= rest * k * product
     return 1.0 - rest, gradient
@@ -103,7 +103,7 @@ def per_joint_limit_penalty(
         rest = np.exp(-k * p)
         term[i] = 1.0 - rest
         slope[i] = k * rest * (q_max[i] + q_min[i] - 2.0 * q[i]) / (span * span)
-    P = np.prod(term)
+    P = float(np.prod(term))
     for i in range(n):
         gradient[i] = P * slope[i] / term[i]
     return P, gradient

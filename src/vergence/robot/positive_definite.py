@@ -19,7 +19,7 @@ def invert_spd(A: FloatArray) -> tuple[FloatArray, float]:
     finite; det A is then the product of the pivots as they were, at least 0.
     """
     inverse = A.copy()
-    trace = 1e-300
+    trace = 1e-280
     for i in range(6):
         trace += A[i, i]
     determinant = 1.0
