@@ -1,6 +1,14 @@
 """Control: the laws, how a camera twist becomes joint rates, and the guard behind them."""
 
 from vergence.control.command import JointCommand
+from vergence.control.conditioning import (
+    CameraDirections,
+    Resolvability,
+    camera_directions,
+    gain_matrix,
+    has_full_rank,
+    resolvability,
+)
 from vergence.control.guard import Guard, guarded_step, stoppable_speed
 from vergence.control.inner import InnerLaw
 from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
@@ -24,6 +32,12 @@ from vergence.control.tracking_kernels import (
 )
 
 __all__ = [
+    "CameraDirections",
+    "Resolvability",
+    "camera_directions",
+    "gain_matrix",
+    "has_full_rank",
+    "resolvability",
     "Guard",
     "InnerLaw",
     "JointCommand",
