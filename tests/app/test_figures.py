@@ -7,21 +7,22 @@ import pytest
 
 from vergence.app.figures import (
     Panels,
+    camera_figure,
     error_figure,
     estimate_figure,
     joints_figure,
     mark_events,
     measures_figure,
-    motion_figure,
     paths_figure,
     svg,
+    target_figure,
     twist_figure,
 )
 from vergence.app.figures.arm import normalized
 from vergence.geometry import se3_exp
 from vergence.runtime.recording import ArmInfo, Event, Recording, TargetTrace
 
-FIGURES = ["error", "paths", "joints", "twist", "measures", "motion"]
+FIGURES = ["error", "paths", "joints", "twist", "measures", "camera", "target"]
 
 
 def figure(name: str, recording: Recording) -> Panels:
@@ -32,7 +33,8 @@ def figure(name: str, recording: Recording) -> Panels:
         "joints": lambda: joints_figure(recording.info.arms["puma"], arm),
         "twist": lambda: twist_figure(arm),
         "measures": lambda: measures_figure(arm),
-        "motion": lambda: motion_figure(camera, recording.target),
+        "camera": lambda: camera_figure(camera),
+        "target": lambda: target_figure(camera, recording.target),
     }[name]()
     assert made is not None
     return made
@@ -139,7 +141,8 @@ def test_nothing_known_gives_no_figure(recording: Recording) -> None:
     )
     assert error_figure(blind) is None
     assert paths_figure(recording.info.cameras["wrist"], blind) is None
-    assert motion_figure(blind, None) is None
+    assert camera_figure(blind) is None
+    assert target_figure(replace(blind, T_world_target=blind.T_world_camera), None) is None
     assert twist_figure(still) is None
     assert measures_figure(still) is None
 

@@ -32,12 +32,12 @@ def test_the_page_holds_all_it_shows(page: str) -> None:
 def test_the_page_tells_the_outcome_and_every_part(page: str) -> None:
     for word in ("made-up", "completed", "the target was followed to the end", "Summary"):
         assert word in page
-    for heading in ("Camera wrist", "Arm puma", "Events", "Cell file"):
+    for heading in ("Camera wrist", "Target", "Arm puma", "Events", "Cell file"):
         assert f"<h2>{heading}</h2>" in page
     assert "the residual is too large" in page
     assert "data:video/webm" in page
-    assert page.count("data:image/jpeg") == 4
-    assert page.count("data:image/svg+xml") == 6
+    assert page.count('<img src="data:image/jpeg') == 4
+    assert page.count("data:image/svg+xml") == 7
 
 
 def test_every_picture_says_what_it_shows(page: str) -> None:
@@ -64,7 +64,7 @@ def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:
 def test_units_are_read_off_names(recording: Recording) -> None:
     named = replace(recording, summary={"reaction_ms": 12.345, "far_m": 2.0, "law": "optimal"})
     rows = {row.name: (row.value, row.unit) for row in run_rows(named)}
-    assert rows["reaction"] == ("12.35", "ms")
+    assert rows["reaction"] == ("12.3", "ms")
     assert rows["far"] == ("2", "m")
     assert rows["law"] == ("optimal", "")
 

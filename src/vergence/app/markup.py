@@ -43,12 +43,12 @@ def picture(data: bytes, kind: str, caption: str) -> str:
     )
 
 
-def film(data: bytes | None) -> str:
-    """Return a player; empty without a film."""
+def film(data: bytes | None, poster: bytes) -> str:
+    """Return a player that shows a JPEG until it plays; empty without a film."""
     if data is None:
         return ""
-    source = data_url(data, "video/webm")
-    return f'<video controls muted loop playsinline src="{source}"></video>'
+    still, source = data_url(poster, "image/jpeg"), data_url(data, "video/webm")
+    return f'<video controls muted loop playsinline poster="{still}" src="{source}"></video>'
 
 
 def table(title: str, rows: Sequence[Row]) -> str:

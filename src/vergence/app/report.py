@@ -6,13 +6,14 @@ from pathlib import Path
 from vergence.app import markup
 from vergence.app.figures import (
     Panels,
+    camera_figure,
     error_figure,
     estimate_figure,
     joints_figure,
     mark_events,
     measures_figure,
-    motion_figure,
     paths_figure,
+    target_figure,
     twist_figure,
 )
 from vergence.app.pictures import film, key_frames
@@ -51,6 +52,7 @@ def make_report(recording: Recording) -> str:
         _header(recording),
         _summary(recording),
         *(_camera(recording, name) for name in recording.cameras),
+        _target(recording),
         *(_arm(recording, name) for name in recording.arms),
         _events(recording),
         _cell(recording),
@@ -94,16 +96,7 @@ def _camera(recording: Recording, name: str) -> str:
             paths_figure(size, trace),
             f"The features' ways through the picture, {size.width} × {size.height} px.",
         ),
-        _figure(
-            recording,
-            motion_figure(trace, recording.target),
-            "How target and camera moved through the world since the first picture.",
-        ),
-        _figure(
-            recording,
-            estimate_figure(trace, recording.target),
-            "How far the filter's target is from the true one.",
-        ),
+        _figure(recording, camera_figure(trace), "How the camera moved since the first picture."),
     )
 
 
@@ -114,7 +107,25 @@ def _pictures(recording: Recording, camera: str) -> str:
     stills = "".join(
         markup.picture(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
     )
-    return f'{markup.film(film(recording, camera))}{_MARKS}<div class="frames">{stills}</div>'
+    player = markup.film(film(recording, camera), poster=frames[0].jpeg)
+    return f'{player}{_MARKS}<div class="frames">{stills}</div>'
+
+
+def _target(recording: Recording) -> str:
+    """Return what is known of the target, from the camera that the task is about."""
+    trace = recording.cameras.get(recording.info.task_camera)
+    if trace is None:
+        return ""
+    moved = target_figure(trace, recording.target)
+    return markup.section(
+        "Target",
+        _figure(recording, moved, "How the target moved since the first picture."),
+        _figure(
+            recording,
+            estimate_figure(trace, recording.target),
+            "How far the filter's target is from the true one.",
+        ),
+    )
 
 
 def _arm(recording: Recording, name: str) -> str:

@@ -92,6 +92,7 @@ _DERIVED = {  # what the rows of cameras and arms say as well, from the recordin
 _UNITS = {
     "_m_s": "m/s",
     "_rad_s": "rad/s",
+    "_factor": "×",
     "_px": "px",
     "_ms": "ms",
     "_us": "µs",
@@ -106,5 +107,5 @@ def _summary_row(name: str, value: float | str) -> Row:
     """Read the unit off a name's end, as our names have it."""
     ending = next((end for end in _UNITS if name.endswith(end)), "")
     words = name.removesuffix(ending).replace("_", " ")
-    shown = value if isinstance(value, str) else f"{value:.4g}"
+    shown = value if isinstance(value, str) else f"{value:.3g}"
     return Row(words, shown, _UNITS.get(ending, ""))

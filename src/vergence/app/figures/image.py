@@ -22,7 +22,7 @@ def error_figure(trace: CameraTrace) -> Panels | None:
         "from the desired point (px)": trace.error_px,
         "from the true point (px)": trace.drift_px,
     }
-    shown = {label: values for label, values in known.items() if np.isfinite(values).any()}
+    shown = {label: values for label, values in known.items() if np.nansum(values) > 0.0}
     if not shown:
         return None
     out = panels(len(shown))
@@ -42,10 +42,13 @@ def paths_figure(camera: Camera, trace: CameraTrace) -> Panels | None:
     axes = out.axes[0]
     _picture_frame(axes, camera)
     paths = np.where(trace.found[..., None], trace.points_px, np.nan)
+    few = paths.shape[1] <= _MANY
     for index in range(paths.shape[1]):
-        _path(axes, paths[:, index], index)
+        label = f"feature {index}" if few else None
+        axes.plot(paths[:, index, 0], paths[:, index, 1], label=label, **curve(index))
     for points, marker, label, style in _ends(trace, paths):
-        axes.plot(points[:, 0], points[:, 1], marker, label=label, **style)
+        if len(points):
+            axes.plot(points[:, 0], points[:, 1], marker, label=label, **style)
     axes.set_ylabel("v (px)")
     legend(axes)
     return out
@@ -74,11 +77,6 @@ def _picture_frame(axes: "Axes", camera: Camera) -> None:
     axes.set_xlim(-0.5 - margin, width - 0.5 + margin)
     axes.set_ylim(height - 0.5 + margin, -0.5 - margin)
     axes.set_aspect("equal")
-
-
-def _path(axes: "Axes", path: FloatArray, index: int) -> None:
-    label = f"feature {index}" if index < _MANY else None
-    axes.plot(path[:, 0], path[:, 1], label=label, **curve(index))
 
 
 def _ends(

@@ -8,25 +8,38 @@ from vergence.drawing import curve, legend
 from vergence.runtime.recording import CameraTrace, TargetTrace
 
 
-def motion_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
-    """Draw target and camera from where they began; the filter's belief of the target dotted."""
-    known = np.isfinite(trace.T_world_camera[:, 0, 0])
+def target_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
+    """Draw how the target moved from where it was first, as it did and as a filter believed."""
+    known = np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
         return None
-    out = panels(2)
-    time = trace.time[known]
-    places = [pose[known, :3, 3] for pose in (trace.T_world_target, trace.T_world_camera)]
-    for axes, place, name in zip(out.axes, places, ("target", "camera"), strict=True):
-        moved = place - place[0]
-        for index, axis in enumerate("xyz"):
-            axes.plot(time, moved[:, index], label=axis, **curve(index))
-        axes.set_ylabel(f"{name} moved by\n(m, world axes)")
+    out = panels(1)
+    axes = out.axes[0]
+    place = trace.T_world_target[known, :3, 3]
+    for index, axis in enumerate("xyz"):
+        axes.plot(trace.time[known], place[:, index] - place[0, index], label=axis, **curve(index))
     if estimate is not None:
-        believed = estimate.T_world_target[:, :3, 3] - places[0][0]
+        believed = estimate.T_world_target[:, :3, 3] - place[0]
         for index, axis in enumerate("xyz"):
             style = {**curve(index), "linestyle": ":", "linewidth": 2.0}
-            out.axes[0].plot(estimate.time, believed[:, index], label=f"{axis} estimated", **style)
-    legend(out.axes[0])
+            axes.plot(estimate.time, believed[:, index], label=f"{axis} estimated", **style)
+    axes.set_ylabel("target moved by\n(m, world axes)")
+    legend(axes)
+    return out
+
+
+def camera_figure(trace: CameraTrace) -> Panels | None:
+    """Draw how a camera moved from where it was first; nothing if it did not."""
+    known = np.isfinite(trace.T_world_camera[:, 0, 0])
+    place = trace.T_world_camera[known, :3, 3]
+    if (place == place[:1]).all():
+        return None
+    out = panels(1)
+    axes = out.axes[0]
+    for index, axis in enumerate("xyz"):
+        axes.plot(trace.time[known], place[:, index] - place[0, index], label=axis, **curve(index))
+    axes.set_ylabel("camera moved by\n(m, world axes)")
+    legend(axes)
     return out
 
 
