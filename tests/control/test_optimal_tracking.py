@@ -1,0 +1,229 @@
+"""The optimal tracking law minimises what it says it does."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from servo_scene import CAMERA, PERIOD, SQUARE, START, in_view, observed, puma, seen
+
+from vergence.control import (
+    OptimalTrackingLaw,
+    TrackingGains,
+    image_model,
+    optimal_tracking_tick,
+    pack_setup,
+    packed_tick,
+    packed_twist,
+    tracking_displacement,
+    unpack_tick,
+)
+from vergence.errors import InputError, ShapeError
+from vergence.features import interaction_matrix_points
+from vergence.outcome import OutcomeKind
+from vergence.planning import Reference
+from vergence.robot import Arm, JointState, manipulability
+
+ARM = puma()
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+FOUR = ("x", "y", "rx", "ry")
+
+
+def gains_of(axes=AXES, avoiding=(), Q=2e-6, R=10.0, S=0.0, avoidance_max=1.0) -> TrackingGains:
+    controlled = np.array([float(axis in axes) for axis in AXES])
+    acting = np.array([float(axis in avoiding) for axis in AXES])
+    return TrackingGains(Q, np.full(6, R), S, controlled, acting, avoidance_max, PERIOD)
+
+
+def drawn_features(rng: np.random.Generator, count: int) -> np.ndarray:
+    here = rng.uniform(-0.2, 0.2, (count, 2))
+    return np.column_stack(
+        (here, here + rng.uniform(-0.05, 0.05, (count, 2)), rng.uniform(0.5, 2.0, count))
+    )
+
+
+def joints_at(q: np.ndarray) -> JointState:
+    return JointState(0.0, q, np.zeros(len(q)))
+
+
+@pytest.mark.parametrize("axes", [("x", "y"), FOUR, ("z", "rz"), AXES])
+@pytest.mark.parametrize("count", [1, 2, 4, 9])
+def test_it_is_the_minimum_of_the_objective(count: int, axes) -> None:
+    rng = np.random.default_rng([26, count])
+    error, B = image_model(drawn_features(rng, count), CAMERA.focal_px)
+    gains = gains_of(axes)
+    chosen = [AXES.index(axis) for axis in axes]
+
+    def objective(u: np.ndarray) -> float:
+        left = error + B[:, chosen] @ u
+        return gains.Q * left @ left + u @ (gains.R[chosen] * u)
+
+    found = minimize(objective, np.zeros(len(chosen)), method="BFGS", options={"gtol": 1e-9})
+    u = tracking_displacement(error, B, gains, 1.0, np.zeros(6))
+    np.testing.assert_allclose(u[chosen], found.x, atol=1e-6)
+    rest = [i for i in range(6) if i not in chosen]
+    np.testing.assert_array_equal(u[rest], 0.0)
+
+
+def test_with_avoidance_it_is_the_minimum_with_the_measure_linearised() -> None:
+    rng = np.random.default_rng(27)
+    error, B = image_model(drawn_features(rng, 1), CAMERA.focal_px)
+    w, gradient = 0.02, rng.normal(size=6)
+    gains = gains_of(FOUR, ("x", "y"), S=1e-3)
+    chosen, acting = [0, 1, 3, 4], np.array([1.0, 1.0, 0.0, 0.0])
+
+    def objective(u: np.ndarray) -> float:
+        left = error + B[:, chosen] @ u
+        # S/w' to first order: -S/w'² ∇w'·u, with ∇_u = T ∂w'/∂x.
+        measure = 1 / w - PERIOD / w**2 * (acting * gradient[chosen]) @ u
+        return gains.Q * left @ left + u @ (gains.R[chosen] * u) + gains.S * measure
+
+    found = minimize(objective, np.zeros(4), method="BFGS", options={"gtol": 1e-9})
+    u = tracking_displacement(error, B, gains, w, gradient)
+    np.testing.assert_allclose(u[chosen], found.x, atol=1e-5)
+
+
+@pytest.mark.parametrize("w", [1e-2, 1e-6, 1e-100, 0.0])
+def test_avoidance_stays_bounded_as_the_measure_vanishes(w: float) -> None:
+    rng = np.random.default_rng(28)
+    error, B = image_model(drawn_features(rng, 1), CAMERA.focal_px)
+    plain = tracking_displacement(error, B, gains_of(FOUR), w, np.ones(6))
+    gains = gains_of(FOUR, ("x", "y"), S=1.0, avoidance_max=0.01)
+    with_avoidance = tracking_displacement(error, B, gains, w, np.ones(6))
+    assert np.isfinite(with_avoidance).all()
+    assert np.linalg.norm(with_avoidance - plain) <= 0.01 * (1 + 1e-9)
+
+
+def test_the_model_is_the_interaction_matrix_in_pixels() -> None:
+    features = drawn_features(np.random.default_rng(29), 3)
+    error, B = image_model(features, CAMERA.focal_px)
+    L = interaction_matrix_points(features[:, :2].copy(), features[:, 4].copy())
+    np.testing.assert_allclose(B, L * np.tile(CAMERA.focal_px, 3)[:, None])
+    expected = CAMERA.to_pixels(features[:, :2]) - CAMERA.to_pixels(features[:, 2:4])
+    np.testing.assert_allclose(error, expected.ravel(), atol=1e-9)
+
+
+def test_two_axes_are_four_with_turning_made_dear() -> None:
+    error, B = image_model(drawn_features(np.random.default_rng(30), 1), CAMERA.focal_px)
+    two = tracking_displacement(error, B, gains_of(("x", "y")), 1.0, np.zeros(6))
+    dear = gains_of(FOUR)._replace(R=np.array([10.0, 10.0, 10.0, 1e9, 1e9, 10.0]))
+    four = tracking_displacement(error, B, dear, 1.0, np.zeros(6))
+    np.testing.assert_allclose(four, two, atol=1e-6 * np.linalg.norm(two))
+
+
+def test_no_features_ask_for_no_motion() -> None:
+    error, B = image_model(np.empty((0, 5)), CAMERA.focal_px)
+    u = tracking_displacement(error, B, gains_of(), 1.0, np.zeros(6))
+    np.testing.assert_array_equal(u, 0.0)
+
+
+@pytest.mark.parametrize("per_joint", [False, True])
+@pytest.mark.parametrize("S", [0.0, 1e-3])
+def test_packing_changes_nothing(S: float, per_joint: bool) -> None:
+    law = OptimalTrackingLaw(
+        ARM,
+        CAMERA,
+        np.ones(4),
+        avoidance_axes=("x", "y"),
+        S=S,
+        penalty="per_joint" if per_joint else "product",
+        penalty_k=50.0 if per_joint else 1e5,
+    )
+    features = drawn_features(np.random.default_rng(31), 4)
+    plain = optimal_tracking_tick(law.setup, START, features)
+    weights, joints = pack_setup(law.setup)
+    result, v_camera = np.empty(16), np.empty(6)
+    packed_tick(weights, joints, START, features, result)
+    for found, expected in zip(unpack_tick(result), plain, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    packed_twist(weights, features, v_camera)
+    if S == 0.0:
+        np.testing.assert_array_equal(v_camera, plain.v_camera)
+
+
+def test_the_tick_is_its_parts_put_together() -> None:
+    law = OptimalTrackingLaw(ARM, CAMERA, np.ones(4), axes=FOUR, avoidance_axes=("x", "y"), S=1e-3)
+    features = drawn_features(np.random.default_rng(32), 4)
+    tick = optimal_tracking_tick(law.setup, START, features)
+    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, 1e5, False, law.singular_below)
+    error, B = image_model(features, CAMERA.focal_px)
+    u = tracking_displacement(error, B, law.setup.gains, m.value, m.gradient_camera)
+    np.testing.assert_allclose(tick.v_camera, u / PERIOD, rtol=1e-9, atol=1e-12)
+    wanted = m.J_inverse @ tick.v_camera
+    np.testing.assert_allclose(tick.rates, tick.scale * wanted, rtol=1e-9, atol=1e-12)
+    assert (tick.w, tick.penalty) == (m.value, m.penalty)
+    assert tick.sigma == m.smallest_singular_value
+
+
+def test_a_feature_that_was_not_found_has_no_say() -> None:
+    world = in_view(ARM, START, SQUARE)
+    desired, depth = seen(ARM, START, world)
+    points = desired + (12.0, -7.0)
+    found = np.array([True, False, True, True])
+    law = OptimalTrackingLaw(ARM, CAMERA, depth, R=1e-2)
+    spoilt = points.copy()
+    spoilt[1] = np.nan
+    masked = law.command(observed(spoilt, found), Reference(0.0, desired), joints_at(START))
+    three = OptimalTrackingLaw(ARM, CAMERA, depth[found], R=1e-2).command(
+        observed(points[found]), Reference(0.0, desired[found]), joints_at(START)
+    )
+    assert np.isfinite(masked.velocity).all()
+    np.testing.assert_array_equal(masked.velocity, three.velocity)
+
+
+def test_depth_comes_from_the_reference_where_it_knows_it() -> None:
+    world = in_view(ARM, START, SQUARE, 1.3)
+    desired, depth = seen(ARM, START, world)
+    points = desired + (12.0, -7.0)
+    guessing = OptimalTrackingLaw(ARM, CAMERA, np.full(4, 0.2))
+    knowing = OptimalTrackingLaw(ARM, CAMERA, depth)
+    told = guessing.command(
+        observed(points), Reference(0.0, desired, depth_m=depth), joints_at(START)
+    )
+    known = knowing.command(observed(points), Reference(0.0, desired), joints_at(START))
+    np.testing.assert_array_equal(told.velocity, known.velocity)
+
+
+def test_near_a_singularity_the_law_gives_up_with_a_reason() -> None:
+    q = START.copy()
+    q[4] = np.deg2rad(0.05)
+    desired, depth = seen(ARM, q, in_view(ARM, q, SQUARE))
+    law = OptimalTrackingLaw(ARM, CAMERA, depth)
+    command = law.command(observed(desired + 5.0), Reference(0.0, desired), joints_at(q))
+    assert command.fault is not None
+    kind, reason = command.fault
+    assert kind is OutcomeKind.SINGULARITY
+    assert "singular value" in reason
+    assert np.isfinite(command.velocity).all()
+
+
+def test_rates_never_pass_their_limits_and_the_command_says_when_they_were_cut() -> None:
+    desired, depth = seen(ARM, START, in_view(ARM, START, SQUARE))
+    law = OptimalTrackingLaw(ARM, CAMERA, depth, Q=1.0, R=1e-6)
+    command = law.command(observed(desired + 200.0), Reference(0.0, desired), joints_at(START))
+    assert (abs(command.velocity) <= ARM.rate_max * (1 + 1e-12)).all()
+    assert command.active == ("joint rates",)
+    calm = law.command(observed(desired), Reference(0.0, desired), joints_at(START))
+    assert calm.active == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"axes": ("x", "yaw")}, "axes"),
+        ({"axes": ("x", "y"), "avoidance_axes": ("z",)}, "avoidance_axes"),
+        ({"Q": 0.0}, "Q, R, S"),
+        ({"R": [1.0, 1.0, 0.0, 1.0, 1.0, 1.0]}, "Q, R, S"),
+        ({"S": -1.0}, "Q, R, S"),
+        ({"depth_m": [1.0, 0.0]}, "depth_m"),
+    ],
+)
+def test_gains_that_make_no_sense_are_refused(changes, key: str) -> None:
+    arm: Arm = ARM
+    depth = changes.pop("depth_m", [1.0])
+    with pytest.raises(InputError) as caught:
+        OptimalTrackingLaw(arm, CAMERA, depth, **changes)
+    assert caught.value.key == key
+
+
+def test_depths_are_one_row() -> None:
+    with pytest.raises(ShapeError, match="depth_m"):
+        OptimalTrackingLaw(ARM, CAMERA, np.ones((2, 2)))
