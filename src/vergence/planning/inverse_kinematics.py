@@ -92,7 +92,7 @@ def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _full_turns(arm: Arm, q: FloatArray, low: FloatArray, high: FloatArray) -> list[FloatArray]:
     """Return q and q with single joints turned by whole turns inside the limits."""
     result = [q]
-    for i in np.flatnonzero(~arm.chain.sliding):
+    for i in np.flatnonzero(np.logical_not(arm.chain.sliding)):
         for turn in (-2 * np.pi, 2 * np.pi):
             shifted = q.copy()
             shifted[i] += turn

@@ -1,0 +1,101 @@
+"""A path in time: what the law should reach, at any instant."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.planning.path import Path
+from vergence.planning.reference import Reference
+from vergence.planning.timing import TimeLaw, fastest_law, pace
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+MARGIN = 0.98  # of the limits: what lies between the places where they are checked
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """C² splines of image points, depths and joints over one place σ, and σ's time law.
+
+    [Mezouar2001] section 4; the splines are cubic and interpolate the waypoints.
+    """
+
+    path: Path
+    law: TimeLaw
+    _image: "CubicSpline"  # of (N, 2) px
+    _depth: "CubicSpline"  # of (N,) m
+    _joints: "CubicSpline"  # of (n,)
+
+    @classmethod
+    def of(cls, path: Path, camera_speed: float = 0.5) -> Self:
+        """Time a path as fast as the arm's limits and the camera's speed allow.
+
+        Args:
+            path: from a planner.
+            camera_speed: m/s; turning counts with the distance of the object as its lever.
+        """
+        from scipy.interpolate import CubicSpline
+
+        path = _at_least_four(path)
+        sigma = pace(path, camera_speed)
+        image, depth, joints = (
+            CubicSpline(sigma, values) for values in (path.points_px, path.depth_m, path.q)
+        )
+        arm, places = path.problem.arm, np.linspace(0.0, 1.0, 8 * len(sigma))
+        law = fastest_law(
+            joints(places, 1), joints(places, 2), MARGIN * arm.rate_max,
+            MARGIN**2 * arm.acceleration_max,
+        )  # fmt: skip
+        shortest = _way(path) / camera_speed / (1.0 - law.ramp)
+        return cls(path, TimeLaw(max(law.duration, shortest), law.ramp), image, depth, joints)
+
+    @property
+    def duration(self) -> float:
+        """Time from rest to rest, s."""
+        return self.law.duration
+
+    def reference(self, time: float) -> Reference:
+        """Return s*, ds*/dt and depths at a time since the start, s; afterwards the goal."""
+        sigma, speed, _ = self.law.at(time)
+        return Reference(
+            time=time,
+            points_px=self._image(sigma),
+            velocity_px=self._image(sigma, 1) * speed,
+            depth_m=self._depth(sigma),
+        )
+
+    def image_acceleration(self, time: float) -> FloatArray:
+        """Return d²s*/dt², (N, 2), px/s²; continuous in time."""
+        sigma, speed, force = self.law.at(time)
+        result: FloatArray = self._image(sigma, 2) * speed**2 + self._image(sigma, 1) * force
+        return result
+
+    def joints(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return joint positions, rates and accelerations at a time, each (n,)."""
+        sigma, speed, force = self.law.at(time)
+        slope = self._joints(sigma, 1)
+        return (
+            self._joints(sigma),
+            slope * speed,
+            self._joints(sigma, 2) * speed**2 + slope * force,
+        )
+
+
+def _way(path: Path) -> float:
+    """Return the length of the camera's way, m, turning weighed with the object's distance."""
+    from vergence.geometry import se3_distance
+
+    poses, lever = path.T_world_camera, float(path.depth_m.mean())
+    return float(sum(se3_distance(poses[k], poses[k + 1], lever) for k in range(len(poses) - 1)))
+
+
+def _at_least_four(path: Path) -> Path:
+    """Return a path with waypoints enough for a cubic spline; a goal at the start has but one."""
+    if len(path.q) >= 4:
+        return path
+    at = np.linspace(0, len(path.q) - 1, 4)
+    q = np.column_stack([np.interp(at, np.arange(len(path.q)), joint) for joint in path.q.T])
+    return Path.through(path.problem, q, path.planner)
