@@ -27,27 +27,20 @@ class Consistency:
     square: float = 0.0  # Σ w NIS
     freedom: float = 0.0  # Σ w n
     spread: float = 0.0  # Σ w² n
+    holds: bool = True  # whether the NIS is no larger than chance allows, one time in a thousand
 
     def add(self, square: float, freedom: int, fading: float) -> Self:
         """Return the sums with the NIS of one more picture, of `freedom` numbers."""
-        return type(self)(
-            fading * self.square + square,
-            fading * self.freedom + freedom,
-            fading * fading * self.spread + freedom,
-        )
+        total = fading * self.square + square
+        mean = fading * self.freedom + freedom
+        spread = fading * fading * self.spread + freedom
+        unit = spread / mean
+        return type(self)(total, mean, spread, total <= unit * chi_square_quantile(mean / unit))
 
     @property
     def ratio(self) -> float:
         """NIS over its expectation: about 1 for an honest filter, above if it is overconfident."""
         return self.square / self.freedom if self.freedom > 0.0 else 1.0
-
-    @property
-    def holds(self) -> bool:
-        """Whether the innovations are no larger than chance allows, one time in a thousand."""
-        if self.freedom <= 0.0:
-            return True
-        unit = self.spread / self.freedom
-        return self.square <= unit * chi_square_quantile(self.freedom / unit)
 
     @property
     def scale(self) -> float:

@@ -38,7 +38,9 @@ class FilterHistory(Generic[B]):
 
     def at(self, time: float) -> B:
         """Return the belief predicted to a time from the pictures up to that time."""
-        place = bisect_right(self.entries, time, key=lambda entry: entry.view.time)
+        place = len(self.entries)
+        if place and time < self.entries[-1].view.time:
+            place = bisect_right(self.entries, time, key=lambda entry: entry.view.time)
         return self.filter.predict(self._before(place), time)
 
     def add(self, view: View) -> tuple["FilterHistory[B]", Update]:

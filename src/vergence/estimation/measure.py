@@ -7,7 +7,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera import Frame
-from vergence.estimation.visibility import Sight, SightArray
+from vergence.estimation.visibility import SightArray
 from vergence.features import ImagePoints
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
@@ -16,14 +16,14 @@ CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
 # find(frame) -> all features of the target wherever they are in the picture, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
-UNSEEN = {
-    Sight.VISIBLE: "not chosen",
-    Sight.BEHIND: "behind the camera",
-    Sight.OUTSIDE: "outside the picture",
-    Sight.TURNED_AWAY: "turned away",
-    Sight.HIDDEN: "hidden by the target itself",
-    Sight.BLOCKED: "something in the way",
-}
+UNSEEN = (  # a reason for each `Sight`
+    "not chosen",
+    "behind the camera",
+    "outside the picture",
+    "turned away",
+    "hidden by the target itself",
+    "something in the way",
+)
 
 
 class Measure(Protocol):
@@ -49,6 +49,13 @@ class Measure(Protocol):
         ...
 
 
+def no_points(camera: str, time: float) -> ImagePoints:
+    """Return the image points of a picture in which nothing was measured."""
+    return ImagePoints(
+        camera, time, np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0, dtype=np.bool_), ()
+    )
+
+
 def spread_out(
     found: ImagePoints,
     features: IntArray,
@@ -71,12 +78,14 @@ def spread_out(
         widest_px: half the widest window.
     """
     places = expected_px.copy()
-    covariance = np.tile(np.eye(2) * widest_px**2, (len(places), 1, 1))
-    reasons = [UNSEEN[Sight(value)] for value in sight]
-    mask = np.zeros(len(places), dtype=np.bool_)
-    mask[kept] = True
-    for k, m in enumerate(features):
-        reasons[m] = found.reasons[k] or ("" if mask[m] else "disagrees with the pose")
-    places[kept] = found.points_px[np.isin(features, kept)]
-    covariance[kept] = found.covariance_px[np.isin(features, kept)]
-    return ImagePoints(found.camera, found.time, places, covariance, mask, tuple(reasons))
+    covariance = np.zeros((len(places), 2, 2))
+    covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
+    reasons = [UNSEEN[value] for value in sight.tolist()]
+    seen = np.zeros(len(places), dtype=np.bool_)
+    seen[kept] = True
+    agreeing = seen[features]
+    for m, agrees, reason in zip(features.tolist(), agreeing.tolist(), found.reasons, strict=True):
+        reasons[m] = reason or ("" if agrees else "disagrees with the pose")
+    places[features[agreeing]] = found.points_px[agreeing]
+    covariance[features[agreeing]] = found.covariance_px[agreeing]
+    return ImagePoints(found.camera, found.time, places, covariance, seen, tuple(reasons))

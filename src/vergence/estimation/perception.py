@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Frame
 from vergence.estimation.history import FilterHistory
-from vergence.estimation.measure import CameraPose, Find, Joints, Measure, spread_out
+from vergence.estimation.measure import CameraPose, Find, Joints, Measure, no_points, spread_out
 from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import HEIGHT, WIDTH, CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
@@ -52,6 +52,9 @@ class _Picture(NamedTuple):
     T_world_camera: FloatArray  # (4, 4)
     T_camera_world: FloatArray  # (4, 4)
     T_world_target: FloatArray  # (4, 4) predicted for the exposure
+    covariance: FloatArray  # (12, 12) of that prediction
+    doubt: float  # share of the last points that disagreed
+    certain: bool  # whether the filter is consistent
 
 
 class PosePerception(Generic[B]):
@@ -136,8 +139,9 @@ class PosePerception(Generic[B]):
         points, views = [], []
         for n, picture in enumerate(pictures):
             view, seen = self._look(picture, chosen[n], visibility, n)
-            views.append(view)
             points.append(seen)
+            if view is not None:
+                views.append(view)
         time = pictures[-1].frame.time
         self._judge(time, views, [picture.frame for picture in pictures])
         return Observation(time, tuple(points), None if self._lost else self.belief.state())
@@ -145,12 +149,16 @@ class PosePerception(Generic[B]):
     def _expect(self, frame: Frame) -> _Picture:
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
         belief = self._history.belief if self._lost else self._history.at(frame.time)
+        doubt = belief.disagreeing
         return _Picture(
             frame,
             self._rig.numbers[frame.camera],
             T_world_camera,
             se3_inverse(T_world_camera),
             belief.T_world_target,
+            belief.honest_covariance,
+            doubt,
+            belief.consistency.holds and doubt < DOUBT,
         )
 
     def _see(self, pictures: list[_Picture]) -> Visibility:
@@ -176,8 +184,6 @@ class PosePerception(Generic[B]):
             return visibility.visible
         none = np.zeros(len(self._shape.points), dtype=np.bool_)
         numbers = [p.number for p in pictures]
-        newest = self._history.at(pictures[-1].frame.time)
-        certain = newest.consistency.holds and newest.disagreeing < DOUBT
         chosen = self._selection.choose(
             Candidates(
                 visibility.visible,
@@ -187,10 +193,10 @@ class PosePerception(Generic[B]):
                 np.array([p.T_camera_world for p in pictures]),
                 self._noise[numbers],
                 self._diagonal[numbers],
-                np.ascontiguousarray(newest.honest_covariance[:6, :6]),
+                np.ascontiguousarray(pictures[-1].covariance[:6, :6]),
                 np.array([self._held.get(p.frame.camera, none) for p in pictures]),
             ),
-            self._settings.budget if certain else self._settings.budget_in_doubt,
+            self._settings.budget if pictures[-1].certain else self._settings.budget_in_doubt,
         )
         for picture, mask in zip(pictures, chosen, strict=True):
             self._held[picture.frame.camera] = mask
@@ -198,42 +204,41 @@ class PosePerception(Generic[B]):
 
     def _look(
         self, picture: _Picture, chosen: BoolArray, visibility: Visibility, n: int
-    ) -> tuple[View, ImagePoints]:
+    ) -> tuple[View | None, ImagePoints]:
         """Measure inside windows, correct the pose, and say what became of every feature."""
         features = np.flatnonzero(chosen)
-        expected = visibility.points_px[n]
-        camera = self._rig.cameras[picture.number]
-        half = self._half_sizes(picture, features)
+        expected, sight = visibility.points_px[n], visibility.sight[n]
+        widest = self._windows.most_px
+        if not len(features):  # not even the picture is touched
+            nothing = no_points(picture.frame.camera, picture.frame.time)
+            return None, spread_out(nothing, features, features, expected, sight, widest)
         found = self._measure(
             picture.frame,
             features,
             expected[features],
-            half,
+            self._half_sizes(picture, features),
             se3_compose(picture.T_camera_world, picture.T_world_target),
         )
+        camera = self._rig.cameras[picture.number]
         view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
         kept = view.features
         if not self._lost:
             self._history, update = self._history.add(view)
             if update.verdict in USED:
                 kept = view.features[update.kept]
-        seen = spread_out(
-            found, features, kept, expected, visibility.sight[n], self._windows.most_px
-        )
-        return view, seen
+        return view, spread_out(found, features, kept, expected, sight, widest)
 
     def _half_sizes(self, picture: _Picture, features: IntArray) -> FloatArray:
         if self._lost:
             return np.full((len(features), 2), self._windows.most_px)
-        belief = self._history.at(picture.frame.time)
         spread = innovation_spread(
             picture.T_world_target,
             picture.T_camera_world,
             self._shape.points[features],
-            belief.honest_covariance,
+            picture.covariance,
         )
         camera, noise = self._rig.cameras[picture.number], self._rig.noise_px[picture.number]
-        scale = 1.0 + self._settings.doubt_widens * belief.disagreeing
+        scale = 1.0 + self._settings.doubt_widens * picture.doubt
         return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
 
     def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:

@@ -158,11 +158,15 @@ class PoseFilter:
         density = np.array(
             [scale * self.acceleration_density, scale * self.angular_acceleration_density]
         )
-        return replace(
-            belief,
-            time=time,
-            T_world_target=predict_pose(belief.T_world_target, belief.velocity, dt),
-            covariance=predict_covariance(belief.covariance, belief.velocity, abs(dt), density),
+        return Belief(
+            time,
+            predict_pose(belief.T_world_target, belief.velocity, dt),
+            belief.velocity,
+            predict_covariance(belief.covariance, belief.velocity, abs(dt), density),
+            belief.consistency,
+            belief.seen,
+            belief.doubts,
+            belief.disagreeing,
         )
 
     def update(self, belief: Belief, view: View) -> Update:
@@ -171,10 +175,10 @@ class PoseFilter:
         if view.size == 0:
             return unused(belief, view, Verdict.EMPTY)
         found = self._correct(belief, belief.covariance, view, belief.consistency.scale)
-        belief = replace(belief, disagreeing=fading_share(belief.disagreeing, found.kept))
+        disagreeing = fading_share(belief.disagreeing, found.kept)
         if 2 * np.count_nonzero(found.kept) >= view.size:
-            return self._used(belief, found, Verdict.USED)
-        return self._overruled(belief, view, found)
+            return self._used(belief, found, Verdict.USED, disagreeing)
+        return self._overruled(replace(belief, disagreeing=disagreeing), view, found)
 
     def _correct(
         self, belief: Belief, covariance: FloatArray, view: View, scale: float
@@ -192,7 +196,12 @@ class PoseFilter:
         return corrected
 
     def _used(
-        self, belief: Belief, found: Correction, verdict: Verdict, enlarged: float = 1.0
+        self,
+        belief: Belief,
+        found: Correction,
+        verdict: Verdict,
+        disagreeing: float,
+        enlarged: float = 1.0,
     ) -> Update:
         freedom = 2 * int(np.count_nonzero(found.kept))
         # One picture counts as if its points were at the gate at most, to be forgotten in time.
@@ -204,7 +213,7 @@ class PoseFilter:
             found.covariance,
             belief.consistency.add(square, freedom, self.fading),
             seen=belief.time,
-            disagreeing=belief.disagreeing,
+            disagreeing=disagreeing,
         )
         return Update(after, verdict, found.kept, found.squares)
 
@@ -216,7 +225,7 @@ class PoseFilter:
             enlarged = max(1.0, median / MEDIAN)
             found = self._correct(belief, enlarged * belief.covariance, view, 1.0)
             if np.count_nonzero(found.kept) >= needed:
-                update = self._used(belief, found, Verdict.RECOVERED, enlarged)
+                update = self._used(belief, found, Verdict.RECOVERED, belief.disagreeing, enlarged)
                 return update._replace(squares=first.squares)
         if belief.disagreeing > 0.5:
             belief = replace(belief, covariance=GROWTH * belief.covariance)

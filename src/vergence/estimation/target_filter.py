@@ -114,7 +114,7 @@ def fading_share(share: float, kept: BoolArray, fading: float = 0.93) -> float:
         fading: weight of the past for each point; 0.93 looks back over some thirty points.
     """
     weight = fading ** len(kept)
-    return weight * share + (1.0 - weight) * (1.0 - float(np.mean(kept)))
+    return weight * share + (1.0 - weight) * (1.0 - np.count_nonzero(kept) / len(kept))
 
 
 def require_covariance(covariance: FloatArray, source: str) -> None:

@@ -51,15 +51,43 @@ def view_of(
         features = np.arange(len(image_points.points_px))
     usable = usable_points(image_points.points_px, image_points.covariance_px, image_points.found)
     chosen = features[usable]
+    measured, covariance = pinhole_coordinates(
+        image_points.points_px[usable],
+        image_points.covariance_px[usable],
+        (camera.fx, camera.fy, camera.cx, camera.cy),
+    )
+    if camera.distorted:
+        measured = camera.normalize(image_points.points_px[usable])
     return View(
         image_points.camera,
         image_points.time,
         se3_inverse(T_world_camera),
         chosen,
         target_points[chosen],
-        camera.normalize(image_points.points_px[usable]),
-        camera.normalize_covariance(image_points.covariance_px[usable]),
+        measured,
+        covariance,
     )
+
+
+@njit(cache=True)
+def pinhole_coordinates(
+    points_px: FloatArray, covariance_px: FloatArray, lens: tuple[float, float, float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return normalized coordinates (M, 2) and covariances (M, 2, 2) without distortion.
+
+    Args:
+        points_px: (M, 2).
+        covariance_px: (M, 2, 2), px².
+        lens: fx, fy, cx, cy, px.
+    """
+    fx, fy, cx, cy = lens
+    points, covariance = np.empty_like(points_px), np.empty_like(covariance_px)
+    for n in range(len(points_px)):
+        points[n, 0], points[n, 1] = (points_px[n, 0] - cx) / fx, (points_px[n, 1] - cy) / fy
+        covariance[n, 0, 0] = covariance_px[n, 0, 0] / (fx * fx)
+        covariance[n, 1, 1] = covariance_px[n, 1, 1] / (fy * fy)
+        covariance[n, 0, 1] = covariance[n, 1, 0] = covariance_px[n, 1, 0] / (fx * fy)
+    return points, covariance
 
 
 @njit(cache=True)

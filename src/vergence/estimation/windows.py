@@ -38,6 +38,20 @@ def innovation_spread(
     return spread
 
 
+@njit(cache=True)
+def window_sizes(
+    spread: FloatArray, focal_px: FloatArray, noise_px: float, scale: float, rule: FloatArray
+) -> FloatArray:
+    """Return half the sizes (M, 2) of windows; `rule` is (deviations, border, least, most)."""
+    sizes = np.empty_like(spread)
+    for n in range(len(spread)):
+        for i in range(2):
+            deviation = np.sqrt((spread[n, i] * focal_px[i]) ** 2 + noise_px**2)
+            half = scale * (rule[1] + rule[0] * deviation)
+            sizes[n, i] = min(max(half, rule[2]), rule[3])
+    return sizes
+
+
 @dataclass(frozen=True, slots=True)
 class WindowRule:
     """How large a window is: half = border + deviations · √(H P Hᵀ + noise²), within bounds.
@@ -66,7 +80,11 @@ class WindowRule:
             noise_px: expected standard deviation of a measured point.
             scale: of the whole window, above 1 for a filter in doubt.
         """
-        deviation = np.sqrt((spread * focal_px) ** 2 + noise_px**2)
-        half = scale * (self.border_px + self.deviations * deviation)
-        sizes: FloatArray = np.clip(half, self.least_px, self.most_px)
+        sizes: FloatArray = window_sizes(
+            spread,
+            focal_px,
+            noise_px,
+            scale,
+            np.array((self.deviations, self.border_px, self.least_px, self.most_px)),
+        )
         return sizes
