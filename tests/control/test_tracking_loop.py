@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from servo_scene import CAMERA, SQUARE, START, in_view, puma, seen, servo
+from servo_scene import CAMERA, START, in_view, puma, seen, servo
 
 from vergence.control import OptimalTrackingLaw, tracking_kernels
 from vergence.geometry import se3_distance
@@ -51,7 +51,7 @@ def test_one_feature_is_brought_home_along_the_controlled_axes(axes) -> None:
 def test_with_the_printed_sign_of_the_first_entry_two_axes_lose_the_feature() -> None:
     """[Nelson1995] eq. (13) prints +f/(Z s_x); (4) and nature say minus."""
     world = in_view(ARM, START, ONE)
-    desired, depth = seen(ARM, START, world)
+    _, depth = seen(ARM, START, world)
     features = np.array([[0.02, 0.0, 0.0, 0.0, depth[0]]])
     error, B = tracking_kernels.image_model(features, CAMERA.focal_px)
     gains = OptimalTrackingLaw(ARM, CAMERA, depth, axes=("x", "y")).gains
