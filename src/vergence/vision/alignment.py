@@ -17,17 +17,28 @@ from vergence.vision.pyramid import Patch, load_window
 PATCH_PX = 24  # side of the patch that is aligned
 AREA_PX = 64  # side of the part of the image that it is looked for in
 FREE, RIGID = 0, 1  # whether the affine matrix may change
+WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
-CONVERGED_PX = 0.03  # a step; what is left after it is a tenth
+CONVERGED_PX = 0.02  # a step; what is left after it is a tenth
 NOISE_GREY = 4.0  # grey levels; scales the prior on the affine matrix, nothing else
 FORM_DEVIATION = 0.05  # how far the affine matrix strays from what is expected
+
+
+def _root_weights() -> Patch:
+    """Square roots of Gaussian weights of the patch: its rim often belongs to something else."""
+    reach = np.arange(PATCH_PX) - (PATCH_PX / 2 - 0.5)
+    line = np.exp(-(reach**2) / (4 * WEIGHT_PX**2))
+    return np.outer(line, line).ravel().astype(np.float32)
+
+
+ROOT_WEIGHTS = _root_weights()  # (n,)
 
 
 class AlignmentTemplate(NamedTuple):
     """A patch of a picture and all that an alignment to it needs."""
 
-    jacobian: Patch  # (8, n) by x, y, a11, a12, a21, a22, gain, bias; n = 24 × 24
+    jacobian: Patch  # (8, n) by x, y, a11, …, a22, gain, bias; n = 24 × 24; weighted
     inverse: FloatArray  # (2, 8, 8) inverse of JᵀJ + prior; and with a rigid affine matrix
     facts: FloatArray  # (4,) feature point less patch centre x and y, px; mean; sum of squares
 
@@ -47,7 +58,7 @@ class Resampling(NamedTuple):
     """Memory that an alignment writes to."""
 
     area: Patch  # (64, 64) the part of the image that is resampled
-    sample: Patch  # (n,) the resampled patch, less the template's mean
+    sample: Patch  # (n,) the resampled patch, less the template's mean; weighted
     weight_x: Patch  # (24,)
     weight_y: Patch  # (24,)
     corner: NDArray[np.int32]  # (24,) flat index of the upper left of four pixels
@@ -77,18 +88,19 @@ def fill_template(
     window = np.empty((side + 2, side + 2), np.float32)
     load_window(image, anchor_x, anchor_y, window)
     offset_x, offset_y = x - (anchor_x - 0.5), y - (anchor_y - 0.5)
-    mean = np.mean(window[1:-1, 1:-1])
+    mean = np.sum(window[1:-1, 1:-1].copy().reshape(side * side) * ROOT_WEIGHTS**2)
+    mean /= np.sum(ROOT_WEIGHTS**2)
     half, J = np.float32(0.5), out.jacobian
     for i in range(side):
         v = np.float32(i - (side / 2 - 0.5) - offset_y)
         for j in range(side):
             u, k = np.float32(j - (side / 2 - 0.5) - offset_x), i * side + j
-            value = window[i + 1, j + 1] - mean
-            by_x = half * (window[i + 1, j + 2] - window[i + 1, j])
-            by_y = half * (window[i + 2, j + 1] - window[i, j + 1])
+            root = ROOT_WEIGHTS[k]
+            by_x = root * half * (window[i + 1, j + 2] - window[i + 1, j])
+            by_y = root * half * (window[i + 2, j + 1] - window[i, j + 1])
             J[0, k], J[1, k] = by_x, by_y
             J[2, k], J[3, k], J[4, k], J[5, k] = by_x * u, by_x * v, by_y * u, by_y * v
-            J[6, k], J[7, k] = value, 1.0
+            J[6, k], J[7, k] = root * (window[i + 1, j + 1] - mean), root
     squares = np.sum(J[6].astype(np.float64) ** 2)
     out.facts[0], out.facts[1], out.facts[2], out.facts[3] = offset_x, offset_y, mean, squares
     normal = J.astype(np.float64) @ J.astype(np.float64).T
@@ -136,7 +148,8 @@ def resample(
             k = np.uint64(index[j])
             top = flat[k] + weight_x[j] * (flat[k + one] - flat[k])
             below = flat[k + line] + weight_x[j] * (flat[k + line + one] - flat[k + line])
-            work.sample[i * side + j] = top + weight_y[j] * (below - top) - mean
+            value = top + weight_y[j] * (below - top) - mean
+            work.sample[i * side + j] = ROOT_WEIGHTS[i * side + j] * value
 
 
 @njit(cache=True, fastmath=True)
@@ -214,11 +227,11 @@ def align(
 @njit(cache=True)
 def agreement(template: AlignmentTemplate, work: Resampling) -> tuple[float, float]:
     """Correlation, and root mean square residual less gain and bias, of the last resampling."""
-    sample, n = work.sample, work.sample.size
-    mean = product(template.jacobian[7], sample) / n
-    own = max(product(sample, sample) - n * mean * mean, 1e-6)
+    sample, total = work.sample, product(ROOT_WEIGHTS, ROOT_WEIGHTS)
+    mean = product(ROOT_WEIGHTS, sample) / total
+    own = max(product(sample, sample) - total * mean * mean, 1e-6)
     # the template's values have no mean
     joint, other = product(template.jacobian[6], sample), max(template.facts[3], 1e-6)
     correlation = joint / np.sqrt(own * other)
-    residual = np.sqrt(max(own - joint * joint / other, 0.0) / (n - UNKNOWNS))
+    residual = np.sqrt(max(own - joint * joint / other, 0.0) / (total - UNKNOWNS))
     return float(correlation), float(residual)

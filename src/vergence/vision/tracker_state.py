@@ -29,6 +29,7 @@ from vergence.vision.alignment import (
 )
 from vergence.vision.pyramid import Patch, anchor_of, load_window
 from vergence.vision.ssd import (
+    FULL_REACH,
     RANGE_PX,
     TEMPLATE_SIZE,
     WORKSPACE_SIZE,
@@ -46,6 +47,8 @@ LOST_SHIFT_PX = 2.5  # search and alignment must agree within this
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
 FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
+CONSENSUS = 3  # points found that say where the others may have gone
+LOOK_AGAIN_PX = 6.0  # if they moved this far at least
 FLOOR_PX = 0.02  # standard deviation that no alignment beats: interpolation, quantised grey levels
 
 FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE = range(7)
@@ -219,11 +222,42 @@ def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
 
 @njit(cache=True)
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
-    """Find point k, expected at out[PLACE], in an image; returns the verdict."""
+    """Find point k, expected at out[PLACE], in an image; returns the verdict.
+
+    Where the best window of the search turns out not to be the point, the place where it was
+    expected and the other minima of the coarse level are tried too.
+    """
     height, width = image.shape
-    if not (-RANGE_PX <= out[0] < width + RANGE_PX and -RANGE_PX <= out[1] < height + RANGE_PX):
+    x, y = out[0], out[1]
+    if not (-RANGE_PX <= x < width + RANGE_PX and -RANGE_PX <= y < height + RANGE_PX):
         return LEFT
-    x, y = find_window(image, out[0], out[1], k, state)
+    offset_x, offset_y = state.places[k, 6], state.places[k, 7]
+    anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
+    work = make_workspace(state.memory[:WORKSPACE_SIZE])
+    dx, dy, _ = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    start_x, start_y = anchor_x - 0.5 + offset_x, anchor_y - 0.5 + offset_y
+    verdict = settle(image, start_x + dx, start_y + dy, k, state, out)
+    if verdict == FOUND:
+        return FOUND
+    answer = out.copy()
+    if settle(image, x, y, k, state, out) == FOUND:
+        return FOUND
+    for other in work.candidates:
+        tried = np.hypot(other[0] - dx, other[1] - dy) <= FULL_REACH
+        if tried or not np.isfinite(other[2]):
+            continue
+        if settle(image, start_x + other[0], start_y + other[1], k, state, out) == FOUND:
+            return FOUND
+    out[:] = answer
+    return verdict
+
+
+@njit(cache=True)
+def settle(
+    image: ImageArray, x: float, y: float, k: int, state: TrackerState, out: FloatArray
+) -> int:
+    """Align point k from a start; if that is the point, take it over into out and the state."""
+    height, width = image.shape
     work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
     corner_x, corner_y = anchor_of(x) - AREA_PX // 2, anchor_of(y) - AREA_PX // 2
     load_window(image, anchor_of(x), anchor_of(y), work.area)
@@ -256,18 +290,6 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
 
 
 @njit(cache=True)
-def find_window(
-    image: ImageArray, x: float, y: float, k: int, state: TrackerState
-) -> tuple[float, float]:
-    """Where the pyramid search finds point k that is expected at (x, y)."""
-    offset_x, offset_y = state.places[k, 6], state.places[k, 7]
-    anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
-    work = make_workspace(state.memory[:WORKSPACE_SIZE])
-    dx, dy, _ = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
-    return anchor_x - 0.5 + offset_x + dx, anchor_y - 0.5 + offset_y + dy
-
-
-@njit(cache=True)
 def place_covariance(
     state: TrackerState, k: int, key: int, A: FloatArray, found: Alignment
 ) -> FloatArray:
@@ -289,14 +311,38 @@ def place_covariance(
 @njit(cache=True)
 def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) -> bool:
     """Find all points, each expected at answers[k, PLACE]; whether all were found."""
-    complete = True
+    expected, lost = answers[:, :2].copy(), 0
     for k in range(len(answers)):
         out = answers[k]
         out[RESIDUAL], out[CORRELATION], out[DETAIL] = np.nan, np.nan, np.nan
         verdict = track_point(image, k, state, out) if state.keys[k, 0] > 0 else NO_TEMPLATE
         out[VERDICT] = verdict
-        if verdict != FOUND:
+        lost += verdict != FOUND
+    if 0 < lost <= len(answers) - CONSENSUS:
+        look_again(image, state, expected, answers)
+    complete = True
+    for out in answers:
+        if out[VERDICT] != FOUND:
             complete = False
             out[2], out[5] = RANGE_PX * RANGE_PX / 3.0, RANGE_PX * RANGE_PX / 3.0
             out[3], out[4] = 0.0, 0.0
     return complete
+
+
+@njit(cache=True)
+def look_again(
+    image: ImageArray, state: TrackerState, expected: FloatArray, answers: FloatArray
+) -> None:
+    """Search the points not found once more, where the others' median motion takes them."""
+    found = answers[:, VERDICT] == FOUND
+    moved = answers[:, :2] - expected
+    dx, dy = np.median(moved[found, 0]), np.median(moved[found, 1])
+    if dx * dx + dy * dy < LOOK_AGAIN_PX * LOOK_AGAIN_PX:
+        return
+    for k in range(len(answers)):
+        if not found[k] and state.keys[k, 0] > 0:
+            before = answers[k].copy()
+            answers[k, 0], answers[k, 1] = expected[k, 0] + dx, expected[k, 1] + dy
+            answers[k, VERDICT] = track_point(image, k, state, answers[k])
+            if answers[k, VERDICT] != FOUND:
+                answers[k] = before
