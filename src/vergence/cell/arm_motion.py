@@ -7,9 +7,10 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.cell.cell import Cell
-from vergence.cell.schema import JointMotion, PoseMotion, Waypoints
+from vergence.cell.schema import JointMotion
+from vergence.cell.waypoints import through_poses, through_waypoints
 from vergence.errors import InputError
-from vergence.geometry import rpy_to_matrix, se3, se3_compose, se3_inverse, se3_log
+from vergence.geometry import se3_compose, se3_inverse, se3_log
 from vergence.robot import Arm, Chain, forward_kinematics, jacobian
 
 _NEWTON_STEPS = 8
@@ -50,7 +51,7 @@ def arm_trajectory(cell: Cell, name: str, arm: Arm, start: FloatArray) -> JointT
     if isinstance(motion, JointMotion):
         position = _through_joints(motion, arm, start, times, source, key)
     else:
-        poses = _poses(motion, arm.forward_kinematics(start), times)
+        poses = through_poses(motion, arm.forward_kinematics(start), times)
         position, reached = trace_poses(arm.chain, start, poses)
         if reached < len(poses):
             given = f"a way that at {reached * dt:.2f} s leads out of reach"
@@ -58,22 +59,6 @@ def arm_trajectory(cell: Cell, name: str, arm: Arm, start: FloatArray) -> JointT
     trajectory = JointTrajectory(position, np.gradient(position, dt, axis=0))
     _check_limits(trajectory, arm, dt, source, key)
     return trajectory
-
-
-def smooth_step(share: FloatArray) -> FloatArray:
-    """Return 10 s³ - 15 s⁴ + 6 s⁵: from rest to rest with the least jerk, s from 0 to 1."""
-    s = np.clip(share, 0.0, 1.0)
-    result: FloatArray = s**3 * (10.0 + s * (6.0 * s - 15.0))
-    return result
-
-
-def through_waypoints(motion: Waypoints, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Return the way through values (W, …) of the way-points at times (K,): (K, …)."""
-    knots = np.array(motion.times_s) / motion.speed
-    leg = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
-    share = smooth_step((times - knots[leg]) / (knots[leg + 1] - knots[leg]))
-    way: FloatArray = values[leg] + share[:, None] * (values[leg + 1] - values[leg])
-    return way
 
 
 def _through_joints(
@@ -85,15 +70,6 @@ def _through_joints(
         raise InputError(source, f"{key}.offsets_deg", f"{offsets.shape[1]} values", allowed)
     offsets *= np.where(arm.chain.sliding, 1.0, np.pi / 180)
     return start + through_waypoints(motion, offsets, times)
-
-
-def _poses(motion: PoseMotion, T_start: FloatArray, times: FloatArray) -> FloatArray:
-    """Return T_world_tip at times (K,), (K, 4, 4)."""
-    roll_pitch_yaw = np.deg2rad(motion.rotations_rpy_deg)
-    way = through_waypoints(
-        motion, np.hstack((np.array(motion.positions_m), roll_pitch_yaw[:, ::-1])), times
-    )
-    return np.array([T_start @ se3(rpy_to_matrix(row[3:]), row[:3]) for row in way])
 
 
 def _check_limits(trajectory: JointTrajectory, arm: Arm, dt: float, source: str, key: str) -> None:

@@ -8,11 +8,14 @@ from vergence.arrays import FloatArray
 from vergence.cell.schema import (
     CircleMotion,
     LineMotion,
+    Motion,
     Placement,
+    PoseMotion,
     RandomMotion,
     StepMotion,
     StillMotion,
 )
+from vergence.cell.waypoints import through_poses
 from vergence.geometry import rpy_to_matrix, se3
 
 TargetPose = Callable[[float], FloatArray]  # time in s to T_world_target (4, 4)
@@ -30,11 +33,7 @@ def placement_pose(placement: Placement) -> FloatArray:
     return pose
 
 
-def target_pose(
-    start: Placement,
-    motion: StillMotion | LineMotion | CircleMotion | StepMotion | RandomMotion,
-    seed: int,
-) -> TargetPose:
+def target_pose(start: Placement, motion: Motion, seed: int) -> TargetPose:
     """Return the pose of the target as a function of time.
 
     Args:
@@ -42,8 +41,10 @@ def target_pose(
         motion: how it moves from there.
         seed: of the random motion.
     """
-    offset = _offset(motion, seed)
     T_start = placement_pose(start)
+    if isinstance(motion, PoseMotion):
+        return lambda time: through_poses(motion, T_start, np.array([time]))[0]
+    offset = _offset(motion, seed)
 
     def pose(time: float) -> FloatArray:
         position, rpy = offset(time)

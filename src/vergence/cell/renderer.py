@@ -61,12 +61,15 @@ class CameraRenderer:
         shape = (camera.height + _NOISE_POOL, camera.width + _NOISE_POOL)
         self._noise = rng.normal(0, noise_grey, shape).astype(np.int16) if noise_grey else None
 
-    def take(self, data: Any) -> ImageArray:
-        """Return the picture (height, width) of the world as it stands."""
+    def take(self, data: Any, blind: bool = False) -> ImageArray:
+        """Return the picture (height, width) of the world as it stands, black if blind."""
         import cv2
 
-        self._renderer.update_scene(data, self._name)
-        grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
+        if blind:
+            grey = np.zeros((self._renderer.height, self._renderer.width), dtype=np.uint8)
+        else:
+            self._renderer.update_scene(data, self._name)
+            grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
         if self._noise is not None:
             # A fresh window of one pool: drawing normal deviates would cost more than the picture.
             row, column = self._rng.integers(0, _NOISE_POOL, 2)

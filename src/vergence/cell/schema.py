@@ -56,7 +56,7 @@ class JointMotion(Waypoints):
 
 
 class PoseMotion(Waypoints):
-    """The arm moves its last body, or the target it carries, relative to where that starts.
+    """An arm moves its last body, or the target it carries; or a target moves by itself.
 
     A way-point is the pose in the frame that the body or target had at the start.
     """
@@ -94,6 +94,7 @@ class CameraTable(Placement):
     rate_hz: Positive = 30.0
     latency_frames: Annotated[int, Field(ge=0)] = 0  # from exposure until the picture arrives
     noise_grey: Annotated[float, Field(ge=0)] = 1.0  # standard deviation, of 255
+    blind_s: tuple[tuple[float, float], ...] = ()  # from when to when its pictures are black
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":
@@ -146,7 +147,7 @@ class RandomMotion(Table):
 
 
 Motion = Annotated[
-    StillMotion | LineMotion | CircleMotion | StepMotion | RandomMotion,
+    StillMotion | LineMotion | CircleMotion | StepMotion | RandomMotion | PoseMotion,
     Field(discriminator="kind"),
 ]
 
@@ -209,7 +210,7 @@ class PerceptionTable(Table):
     budget: Annotated[int, Field(ge=3)] = 16  # features measured a tick, over all cameras
     noise_px: Positive = 0.5  # expected of a measured point; drawn where there are no images
     believed_noise_px: Positive | None = None  # in place of what each measurement says of itself
-    outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches, without images
+    outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches made on purpose
     occlusion: bool = True  # whether arms and fixtures in the way are predicted
     start_error_m: Annotated[float, Field(ge=0)] = 0.01  # how well the first pose is known
     start_error_deg: Annotated[float, Field(ge=0)] = 2.0
@@ -237,7 +238,7 @@ class PositionBasedTable(Table):
     """The target's pose and a wanted relative pose make the hand's trajectory."""
 
     kind: Literal["position_based"]
-    filter_hz: Positive = 3.0  # natural frequency of the second-order interpolating filter
+    filter_hz: Positive = 5.0  # natural frequency of the second-order interpolating filter
     damping: Positive = 1.0  # of that filter
     feed_forward: bool = True  # the target's velocity goes through to the hand
     prediction: bool = True  # the target's pose is predicted from the exposure to now

@@ -167,11 +167,12 @@ class SimulatedDriver:
         return int(picture * self.inner_rate_hz / rate_hz + 1e-9)
 
     def _frame(self, camera: str) -> Frame:
-        image = self._renderers[camera].take(self.world.data) if self._renderers else None
+        blind = any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
+        image = self._renderers[camera].take(self.world.data, blind) if self._renderers else None
         joints = {name: self.world.joint_position(name) for name in self.arms}
-        return Frame(camera, self.time, image, joints, self._truth(camera))
+        return Frame(camera, self.time, image, joints, self._truth(camera, blind))
 
-    def _truth(self, camera: str) -> FrameTruth:
+    def _truth(self, camera: str, blind: bool) -> FrameTruth:
         T_world_target = self.world.target_pose()
         T_world_camera = self.world.camera_pose(camera)
         T_camera_target = se3_inverse(T_world_camera) @ T_world_target
@@ -181,8 +182,8 @@ class SimulatedDriver:
         in_front = depth > 1e-3
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = intrinsics.project(points[in_front])
-        visible = in_front.copy()
-        visible[in_front] = intrinsics.contains(points_px[in_front])
+        visible = in_front & np.bool_(not blind)
+        visible[in_front] &= intrinsics.contains(points_px[in_front])
         in_sight = np.flatnonzero(visible)
         if len(in_sight):
             points_world = transform_points(T_world_target, self._features[in_sight])

@@ -70,7 +70,7 @@ class PositionBasedLaw:
         arm: Arm,
         period: float,
         *,
-        filter_hz: float = 3.0,
+        filter_hz: float = 5.0,
         damping: float = 1.0,
         feed_forward: bool = True,
         prediction: bool = True,

@@ -1,6 +1,7 @@
 """How the corners of a target are measured: in images, or from what a simulated camera knows."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,13 +21,18 @@ class CornerWindows:
     Args:
         model: the target's geometry; feature j is its corner j.
         cameras: by name.
+        systematic_px: standard deviation of what the scatter along an edge does not show, such as
+            steps of unsmoothed edges and light from the next face; added to what it shows.
     """
 
-    def __init__(self, model: "ObjectModel", cameras: Mapping[str, Camera]) -> None:
+    def __init__(
+        self, model: "ObjectModel", cameras: Mapping[str, Camera], systematic_px: float = 0.25
+    ) -> None:
         from vergence.vision.known_object.corner_extractor import CornerExtractor
 
         self._extractor = CornerExtractor(model)
         self._cameras = cameras
+        self._systematic = np.eye(2) * systematic_px**2
 
     def __call__(
         self,
@@ -43,23 +49,24 @@ class CornerWindows:
         found = self._extractor.measure(
             frame.image, self._cameras[frame.camera], T_camera_target, features, half_px
         )
-        return ImagePoints(frame.camera, frame.time, *found)
+        covariance = found.covariance_px + self._systematic
+        return ImagePoints(
+            frame.camera, frame.time, found.points_px, covariance, found.found, found.reasons
+        )
 
 
 class ExactWindows:
-    """Takes corners from the truth of a simulated camera, with noise and wrong matches.
+    """Takes corners from the truth of a simulated camera, with noise.
 
-    A point outside its window is not found, as in an image. A wrong match lies anywhere in its
-    window.
+    A point outside its window is not found, as in an image.
 
     Args:
         noise_px: standard deviation of the noise on each coordinate.
         rng: draws the noise.
-        outliers: share of wrong matches.
     """
 
-    def __init__(self, noise_px: float, rng: np.random.Generator, outliers: float = 0.0) -> None:
-        self._noise_px, self._rng, self._outliers = noise_px, rng, outliers
+    def __init__(self, noise_px: float, rng: np.random.Generator) -> None:
+        self._noise_px, self._rng = noise_px, rng
 
     def __call__(
         self,
@@ -75,10 +82,7 @@ class ExactWindows:
         if not count:
             return _no_points(frame)
         measured = truth.points_px[features] + self._rng.normal(0.0, self._noise_px, (count, 2))
-        wrong = self._rng.random(count) < self._outliers
-        anywhere = points_px + self._rng.uniform(-1.0, 1.0, (count, 2)) * half_px
-        measured = np.where(wrong[:, None], anywhere, measured)
-        visible = truth.visible[features] | wrong
+        visible = truth.visible[features]
         found = visible & (np.abs(measured - points_px) <= half_px).all(axis=1)
         reasons = tuple(
             "" if ok else "outside its window" if seen else "not in sight"
@@ -87,6 +91,25 @@ class ExactWindows:
         covariance = np.tile(np.eye(2) * self._noise_px**2, (count, 1, 1))
         places = np.where(found[:, None], measured, points_px)
         return ImagePoints(frame.camera, frame.time, places, covariance, found, reasons)
+
+
+def with_outliers(measure: Measure, share: float, rng: np.random.Generator) -> Measure:
+    """Return a measure that puts a share of the points it finds anywhere in their windows."""
+
+    def mistaken(
+        frame: Frame,
+        features: IntArray,
+        points_px: FloatArray,
+        half_px: FloatArray,
+        T_camera_target: FloatArray,
+    ) -> ImagePoints:
+        seen = measure(frame, features, points_px, half_px, T_camera_target)
+        wrong = rng.random(len(features)) < share
+        anywhere = points_px + rng.uniform(-1.0, 1.0, points_px.shape) * half_px
+        places = np.where((wrong & seen.found)[:, None], anywhere, seen.points_px)
+        return replace(seen, points_px=places)
+
+    return mistaken
 
 
 def with_noise(measure: Measure, noise_px: float) -> Measure:
@@ -101,9 +124,7 @@ def with_noise(measure: Measure, noise_px: float) -> Measure:
     ) -> ImagePoints:
         seen = measure(frame, features, points_px, half_px, T_camera_target)
         covariance = np.tile(np.eye(2) * noise_px**2, (len(features), 1, 1))
-        return ImagePoints(
-            seen.camera, seen.time, seen.points_px, covariance, seen.found, seen.reasons
-        )
+        return replace(seen, covariance_px=covariance)
 
     return claimed
 

@@ -25,7 +25,12 @@ from vergence.estimation import (
 from vergence.features import Observation
 from vergence.geometry import se3, so3_exp
 from vergence.robot import forward_kinematics
-from vergence.runtime.assembly.measure import CornerWindows, ExactWindows, with_noise
+from vergence.runtime.assembly.measure import (
+    CornerWindows,
+    ExactWindows,
+    with_noise,
+    with_outliers,
+)
 
 if TYPE_CHECKING:
     from vergence.vision.known_object.object_model import ObjectModel
@@ -70,7 +75,9 @@ def follow_pose(
         measure = CornerWindows(model, driver.cameras)
     else:
         rng = np.random.default_rng([cell.seed, 3])
-        measure = ExactWindows(table.noise_px, rng, table.outliers)
+        measure = ExactWindows(table.noise_px, rng)
+    if table.outliers:
+        measure = with_outliers(measure, table.outliers, np.random.default_rng([cell.seed, 5]))
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
     parts: dict[str, Any] = {
