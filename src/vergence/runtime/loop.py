@@ -60,8 +60,11 @@ class Loop:
         self._listeners = listeners
         self._patience = patience or Patience()
         dt = 1.0 / driver.inner_rate_hz
-        joints = driver.read().joints
-        self._guards = {n: Guard(a, joints[n].position, dt) for n, a in driver.arms.items()}
+        self._first = driver.read()
+        self._guards = {
+            name: Guard(arm, self._first.joints[name].position, dt)
+            for name, arm in driver.arms.items()
+        }
         self._still = np.zeros(driver.arms[arm].joint_count)
         self._inner_tick = 0
         self._last_picture = self._last_seen = 0.0
@@ -82,9 +85,8 @@ class Loop:
         return outcome
 
     def _run(self, duration_s: float) -> Outcome:
-        outer_tick = 0
+        outer_tick, sample = 0, self._first
         while True:
-            sample = self._driver.read()
             if sample.time >= duration_s:
                 reason = f"ran for {duration_s:g} s with the target in view"
                 return Outcome(OutcomeKind.COMPLETED, reason, sample.time)
@@ -98,6 +100,7 @@ class Loop:
                 joints = " and ".join(limited)
                 reason = f"{joints} at the end of its range, driven against it"
                 return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
+            sample = self._driver.read()
 
     @property
     def _now(self) -> float:

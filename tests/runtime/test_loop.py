@@ -1,0 +1,161 @@
+"""The loop keeps time, holds the arm when it cannot see, and ends with a reason."""
+
+import numpy as np
+import pytest
+from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, ScriptedLaw, flat_arm, looped
+
+from vergence.outcome import OutcomeKind
+from vergence.runtime import Patience
+
+
+def changes_within(velocities: np.ndarray, acceleration: float, dt: float) -> bool:
+    steps = np.diff(velocities, axis=0, prepend=np.zeros((1, velocities.shape[1])))
+    return bool((abs(steps) <= acceleration * dt * (1 + 1e-9)).all())
+
+
+@pytest.mark.parametrize(("inner", "outer"), [(500, 26), (500, 30), (500, 25), (1000, 60)])
+def test_outer_ticks_begin_where_whole_periods_of_the_camera_have_passed(inner, outer) -> None:
+    driver = ScriptedDriver(inner_rate_hz=inner, camera_rate_hz=outer)
+    looped(driver, rate_hz=outer).run(2.0)
+    turns = driver.reads
+    expected = [k * inner // outer for k in range(len(turns))]
+    assert turns == expected
+    assert len(turns) == 2 * outer + 1
+
+
+def test_it_completes_after_its_time_and_stops_the_arm() -> None:
+    driver = ScriptedDriver()
+    outcome = looped(driver).run(1.0)
+    assert outcome.kind is OutcomeKind.COMPLETED
+    assert outcome.time == pytest.approx(1.0, abs=1 / 30)
+    velocities = driver.velocities()
+    np.testing.assert_allclose(velocities[250], [0.3, -0.2])
+    np.testing.assert_array_equal(velocities[-1], 0.0)
+    assert changes_within(velocities, 8.0, 2e-3)
+
+
+def test_the_other_arms_hold_their_place() -> None:
+    driver = ScriptedDriver()
+    looped(driver).run(1.0)
+    np.testing.assert_array_equal(driver.positions("right"), 0.0)
+
+
+@pytest.mark.parametrize("frames", [0, 1, 2, 5])
+def test_the_law_sees_every_picture_once_as_late_as_it_came(frames: int) -> None:
+    driver = ScriptedDriver(camera_rate_hz=25, latency_s=frames / 25)
+    law, notes = ScriptedLaw(np.zeros(2)), Notes()
+    looped(driver, law=law, rate_hz=25, listeners=[notes]).run(2.0)
+    exposed = [observation.time for observation in law.asked]
+    np.testing.assert_allclose(exposed, np.arange(50 - frames) / 25)
+    for record in notes.ticks:
+        if record.time < frames / 25 - 1e-9:
+            assert record.observation is None
+            assert not record.commands
+        else:
+            assert record.time - record.observation.time == pytest.approx(frames / 25)
+    assert len(notes.ticks) == 50
+
+
+def test_without_pictures_it_keeps_on_for_its_patience_and_then_ends() -> None:
+    driver = ScriptedDriver(lose=lambda exposed: exposed > 0.5)
+    outcome = looped(driver, patience=Patience(image_s=0.3)).run(5.0)
+    assert outcome.kind is OutcomeKind.IMAGE_LATE
+    assert outcome.time == pytest.approx(0.5 + 0.3, abs=2 / 30)
+    assert "no picture for 0.3" in outcome.reason
+    np.testing.assert_array_equal(driver.velocities()[-1], 0.0)
+    assert changes_within(driver.velocities(), 8.0, 2e-3)
+
+
+def test_a_camera_that_never_delivers_never_moves_the_arm() -> None:
+    driver = ScriptedDriver(lose=lambda exposed: True)
+    outcome = looped(driver).run(5.0)
+    assert outcome.kind is OutcomeKind.IMAGE_LATE
+    np.testing.assert_array_equal(driver.positions(), 0.0)
+
+
+def test_single_dropped_pictures_do_not_end_a_run() -> None:
+    rng = np.random.default_rng(34)
+    driver = ScriptedDriver(lose=lambda exposed: rng.random() < 0.3)
+    assert looped(driver).run(3.0).kind is OutcomeKind.COMPLETED
+
+
+@pytest.mark.parametrize("reason", ["the image is empty", "left the image", "not finite"])
+def test_a_lost_target_is_waited_for_in_place_and_then_given_up_with_its_reason(reason) -> None:
+    driver, notes = ScriptedDriver(), Notes()
+    eyes = ScriptedEyes(hide=lambda exposed: reason if exposed > 1.0 else "")
+    loop = looped(driver, eyes, listeners=[notes], patience=Patience(target_s=0.4))
+    outcome = loop.run(5.0)
+    assert outcome.kind is OutcomeKind.TARGET_LOST
+    assert reason in outcome.reason
+    assert outcome.time == pytest.approx(1.4, abs=2 / 30)
+    braked = int(1.15 * 500)  # 0.3 rad/s at 8 rad/s² are gone in 0.04 s
+    np.testing.assert_array_equal(driver.velocities()[braked:], 0.0)
+    held = [record for record in notes.ticks if record.time > 1.1]
+    assert held
+    assert all(not record.commands for record in held)
+    assert notes.events[-1][1:] == ("target lost", outcome.reason)
+
+
+def test_a_target_that_comes_back_in_time_is_followed_on() -> None:
+    driver, law = ScriptedDriver(), ScriptedLaw(np.array([0.1, 0.0]))
+    eyes = ScriptedEyes(hide=lambda exposed: "hidden" if 0.5 < exposed < 0.65 else "")
+    assert looped(driver, eyes, law).run(2.0).kind is OutcomeKind.COMPLETED
+    velocities = driver.velocities()[:, 0]
+    assert velocities[int(0.62 * 500)] == 0.0
+    np.testing.assert_allclose(velocities[500:990], 0.1)
+
+
+def test_losing_one_feature_of_two_is_an_event_not_an_end() -> None:
+    notes = Notes()
+    eyes = ScriptedEyes(hide_one=lambda exposed: "covered" if 0.5 < exposed < 0.8 else "")
+    outcome = looped(ScriptedDriver(), eyes, listeners=[notes]).run(1.5)
+    assert outcome.kind is OutcomeKind.COMPLETED
+    names = [name for _, name, _ in notes.events]
+    assert names == ["feature lost", "feature found"]
+    assert "covered" in notes.events[0][2]
+
+
+def test_a_joint_driven_against_its_limit_ends_the_run_by_name() -> None:
+    driver = ScriptedDriver(arms={"left": flat_arm(reach=0.2)})
+    outcome = looped(driver, law=ScriptedLaw(np.array([0.0, 1.0]))).run(5.0)
+    assert outcome.kind is OutcomeKind.JOINT_LIMIT
+    assert "joint2" in outcome.reason
+    assert "joint1" not in outcome.reason
+    positions = driver.positions()
+    assert positions.max() <= 0.2
+    assert positions[-1, 1] == pytest.approx(0.2, abs=1e-3)
+    assert changes_within(driver.velocities(), 8.0, 2e-3)
+
+
+def test_a_fault_of_the_law_is_the_outcome() -> None:
+    fault = (OutcomeKind.SINGULARITY, "the elbow is straight")
+    law = ScriptedLaw(np.ones(2), fault=lambda count: fault if count == 10 else None)
+    driver = ScriptedDriver()
+    outcome = looped(driver, law=law).run(5.0)
+    assert (outcome.kind, outcome.reason) == fault
+    assert len(law.asked) == 10
+    np.testing.assert_array_equal(driver.velocities()[-1], 0.0)
+
+
+@pytest.mark.parametrize("tick", [0, 1, 333, 800])
+def test_ctrl_c_stops_the_arm_within_its_acceleration(tick: int) -> None:
+    driver = ScriptedDriver(interrupt_at=tick)
+    outcome = looped(driver, law=ScriptedLaw(np.array([0.4, -0.4]))).run(5.0)
+    assert outcome.kind is OutcomeKind.STOPPED
+    assert outcome.time == pytest.approx(tick / 500)
+    velocities = driver.velocities()
+    if len(velocities):
+        np.testing.assert_array_equal(velocities[-1], 0.0)
+        # The set-point that was on its way when the key was hit is lost: one step may be double.
+        assert changes_within(velocities, 2 * 8.0, 2e-3)
+        assert np.sum(abs(np.diff(velocities, axis=0)) > 8.0 * 2e-3 * (1 + 1e-9)) <= 2
+
+
+@pytest.mark.parametrize("rates", [[np.nan, 0.1], [np.inf, -np.inf], [1e9, -1e9]])
+def test_whatever_the_law_says_the_joints_stay_within_their_limits(rates) -> None:
+    driver = ScriptedDriver()
+    looped(driver, law=ScriptedLaw(np.array(rates))).run(2.0)
+    assert np.isfinite(driver.positions()).all()
+    assert (abs(driver.positions()) <= 1.0).all()
+    assert (abs(driver.velocities()) <= 2.0).all()
+    assert changes_within(driver.velocities(), 8.0, 2e-3)
