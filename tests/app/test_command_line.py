@@ -107,6 +107,16 @@ def test_a_mistake_is_one_message_and_exit_code_two(
     assert written.out == ""
 
 
+def test_a_folder_that_cannot_be_written_is_a_mistake(
+    command: Command, capsys: object, tmp_path: Path
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    assert command(*QUICK_RUN, "--out", "taken") == 2
+    written = capsys.readouterr().err
+    assert "taken" in written
+    assert "Traceback" not in written
+
+
 def test_an_interrupted_run_leaves_a_recording_and_says_where(
     command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:

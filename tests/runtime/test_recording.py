@@ -241,6 +241,12 @@ def test_nothing_is_recorded_after_the_end(tmp_path: Path, records: list[TickRec
     assert Recording.open(tmp_path).outcome == DONE
 
 
+def test_a_new_run_leaves_nothing_of_the_old(tmp_path: Path, records: list[TickRecord]) -> None:
+    whole(tmp_path, records)
+    recorder_with(tmp_path, records[:3])
+    assert not (tmp_path / "summary.json").exists()
+
+
 def test_a_run_that_never_ticked_is_readable(tmp_path: Path) -> None:
     recorder_with(tmp_path, []).close(DONE, {})
     recording = Recording.open(tmp_path)

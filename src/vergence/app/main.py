@@ -48,7 +48,7 @@ def main() -> None:
     """Run the command line; a mistake of the user is one message and exit code 2."""
     try:
         app()
-    except VergenceError as error:
+    except (VergenceError, OSError) as error:  # such as a folder that cannot be written
         warn(f"vergence: {error}")
         sys.exit(BAD_INPUT)
 

@@ -1,4 +1,21 @@
-"""The recording of a run: written tick by tick as MCAP, read back as arrays."""
+"""The recording of a run: written tick by tick as MCAP, read back as arrays.
+
+Topics of a recording, X being an arm or a camera; times are seconds since the start of the run:
+
+| topic | type | holds |
+|---|---|---|
+| `/arm/X/state` | JSON | joints, rates, command, camera twist, manipulability, penalty |
+| `/arm/X/joints` | foxglove.JointStates | joints under their names |
+| `/camera/X/features` | JSON | points with covariance, desired and true points, true poses |
+| `/camera/X/image` | foxglove.CompressedImage | every n-th picture, JPEG |
+| `/camera/X/annotations` | foxglove.ImageAnnotations | tracked, lost, desired and true points |
+| `/camera/X/calibration` | foxglove.CameraCalibration | intrinsic parameters, once |
+| `/target` | JSON | pose, velocity and covariance as a filter believes them |
+| `/tf` | foxglove.FrameTransforms | camera, target and target estimate in the world |
+| `/events` | foxglove.Log | what happened once |
+
+Two metadata records frame them: `vergence` (version, cell file, limits, cameras, seed), `outcome`.
+"""
 
 from vergence.runtime.recording.listener import Listener
 from vergence.runtime.recording.recorder import Recorder

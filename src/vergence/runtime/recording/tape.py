@@ -41,6 +41,7 @@ class Tape:
         self._flushed = 0.0
         self.now = 0.0  # s, of the last thing recorded
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / SUMMARY).unlink(missing_ok=True)  # of an earlier run
         (folder / CELL).write_text(info.text, encoding="utf-8")
         self._file = McapFile(folder / RECORDING)
         self._introduce()
