@@ -101,10 +101,14 @@ def main() -> None:
         look = {**curve(index), "linewidth": 2.4, "zorder": 9 - index}
         right.plot(trace["time"], along, label=labels[name], **look)
         if not outcome.succeeded:
-            right.plot(trace["time"][-1], along[-1], "X", color=look["color"], markersize=9, zorder=9)
+            right.plot(
+                trace["time"][-1], along[-1], "X", color=look["color"], markersize=9, zorder=9
+            )
     order = np.arange(len(runs))[::-1]
     handles, texts = right.get_legend_handles_labels()
-    right.legend([handles[i] for i in order], [texts[i] for i in order], frameon=False, fontsize=8.5)
+    right.legend(
+        [handles[i] for i in order], [texts[i] for i in order], frameon=False, fontsize=8.5
+    )
     right.set_title("how far the object is tracked", fontsize=9)
     right.set_xlabel("time (s)")
     right.set_ylabel("object translation (m)")
