@@ -29,8 +29,7 @@ def frozen(
     array = np.array(values, dtype=np.float64, order="C")
     if shape is not None:
         wrong = array.ndim != len(shape) or any(
-            want is not None and have != want
-            for have, want in zip(array.shape, shape, strict=True)
+            want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
         )
         if wrong:
             raise ShapeError(name, array.shape, shape)

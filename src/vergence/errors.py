@@ -11,9 +11,7 @@ class VergenceError(Exception):
 class ShapeError(VergenceError, ValueError):
     """An array of the wrong shape."""
 
-    def __init__(
-        self, name: str, given: tuple[int, ...], allowed: tuple[int | None, ...]
-    ) -> None:
+    def __init__(self, name: str, given: tuple[int, ...], allowed: tuple[int | None, ...]) -> None:
         self.name, self.given, self.allowed = name, given, allowed
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in allowed) + ")"
         super().__init__(f"{name} has shape {given}; it must have shape {wanted}")

@@ -87,11 +87,9 @@ class Camera:
         """Tell which pixels (N, 2) lie in the image, at least the margin from its border."""
         points_px = np.asarray(points_px)
         low = -0.5 + margin_px
-        inside = (points_px >= low) & (
-            points_px < np.array([self.width - 0.5, self.height - 0.5]) - margin_px
-        )
-        result: BoolArray = inside.all(axis=1)
-        return result
+        high = np.array([self.width - 0.5, self.height - 0.5]) - margin_px
+        inside: BoolArray = np.all((points_px >= low) & (points_px < high), axis=1)
+        return inside
 
     def _distort(self, normalized: FloatArray) -> FloatArray:
         x, y = normalized[:, 0], normalized[:, 1]
@@ -108,15 +106,14 @@ class Camera:
     def _undistort(self, distorted: FloatArray) -> FloatArray:
         # Newton on the distortion itself: three steps reach 1e-12 for ordinary lenses.
         points = distorted.copy()
-        step = 1e-6
         for _ in range(8):
             residual = self._distort(points) - distorted
-            along_x = (self._distort(points + (step, 0.0)) - self._distort(points - (step, 0.0))) / (
-                2 * step
-            )
-            along_y = (self._distort(points + (0.0, step)) - self._distort(points - (0.0, step))) / (
-                2 * step
-            )
-            jacobian = np.stack((along_x, along_y), axis=2)
+            jacobian = np.stack((self._slope(points, 0), self._slope(points, 1)), axis=2)
             points = points - np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
         return points
+
+    def _slope(self, points: FloatArray, axis: int) -> FloatArray:
+        """Return the distortion's derivative along one axis, (N, 2), by central differences."""
+        step = 1e-6 * np.eye(2)[axis]
+        slope: FloatArray = (self._distort(points + step) - self._distort(points - step)) / 2e-6
+        return slope

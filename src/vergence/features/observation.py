@@ -1,4 +1,4 @@
-"""What perception hands on: image points with covariance, and a target state where a filter runs."""
+"""What perception hands on: image points with covariance, and a target state from a filter."""
 
 from dataclasses import dataclass
 
