@@ -3,7 +3,7 @@ import pytest
 from estimation_scene import BOX, CAMERA, HAND, WALL, moving, pose_error, project, view
 
 from vergence.estimation.information import compress, joseph_update, keep_rows
-from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
+from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
 from vergence.estimation.motion import correct_pose, predict_covariance, predict_pose
 from vergence.geometry import se3_inverse
 
@@ -88,6 +88,25 @@ def test_update_matches_the_textbook(points):
     np.testing.assert_allclose(correction, K @ rows[:, 6], atol=1e-10)
     np.testing.assert_allclose(updated, P - K @ S @ K.T, atol=1e-10)
     assert square + rest == pytest.approx(rows[:, 6] @ np.linalg.solve(S, rows[:, 6]))
+
+
+def test_deletion_distance_is_what_leaving_a_point_out_saves():
+    rng = np.random.default_rng(12)
+    rows, P = rng.standard_normal((12, 7)), 4.0 * random_covariance(rng)
+    everything = np.ones(6, bool)
+
+    def innovation_squared(kept):
+        packed = keep_rows(rows, kept)
+        rest = compress(packed)
+        correction, updated, square = joseph_update(P, packed)
+        return square + rest, correction, updated
+
+    whole, correction, updated = innovation_squared(everything)
+    squares = deletion_squares(rows, everything, correction, updated)
+    for n in range(6):
+        kept = everything.copy()
+        kept[n] = False
+        assert squares[n] == pytest.approx(whole - innovation_squared(kept)[0], rel=1e-6)
 
 
 def test_covariance_stays_positive_through_hopeless_conditioning():

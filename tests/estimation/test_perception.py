@@ -8,6 +8,7 @@ from vergence.camera import Camera, Frame
 from vergence.estimation import (
     CameraRig,
     IndexSelection,
+    InformationSelection,
     PerceptionSettings,
     PoseFilter,
     PosePerception,
@@ -140,6 +141,17 @@ def test_four_features_over_all_cameras_are_enough():
     cell = Cell()
     worst, _ = follow(cell, cell.perception(settings=PerceptionSettings(budget=4)))
     assert worst[0] < 0.005
+
+
+def test_four_features_chosen_by_information_beat_those_chosen_by_spread():
+    worst = {}
+    for selection in (InformationSelection(), IndexSelection()):
+        cell = Cell(seed=1, noise_px=1.0)
+        settings = PerceptionSettings(budget=4)
+        worst[type(selection)], _ = follow(
+            cell, cell.perception(selection=selection, settings=settings), seconds=5.0
+        )
+    assert (worst[InformationSelection] < 0.7 * worst[IndexSelection]).all()
 
 
 def test_one_fifth_wrong_matches_do_no_harm():

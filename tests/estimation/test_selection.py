@@ -148,7 +148,7 @@ def test_indexes_of_a_regular_polygon_are_its_side_and_one():
     assert spatial_index(hexagon) == pytest.approx(1.0)
     assert angular_index(hexagon) == pytest.approx(1.0)
     assert angular_index(hexagon @ np.diag([1.0, 0.1])) < 0.7
-    assert spatial_index(hexagon[:1]) == angular_index(hexagon[:1]) == 0.0
+    assert spatial_index(hexagon[:1]) == angular_index(hexagon[:1]) == 1.0
 
 
 def test_exchange_reaches_a_spread_that_no_swap_improves():

@@ -3,6 +3,7 @@
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.exact_points import ExactPoints
+from vergence.estimation.extrapolation import extrapolate
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure
@@ -59,6 +60,7 @@ __all__ = [
     "Visibility",
     "WindowRule",
     "add_obstacles",
+    "extrapolate",
     "pose_from_points",
     "predict_visibility",
     "view_of",

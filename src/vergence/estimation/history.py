@@ -1,7 +1,7 @@
 """Late and out-of-order pictures: a short history that is replayed."""
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
 from vergence.estimation.target_filter import B, TargetFilter, Update, Verdict, unused
@@ -46,7 +46,7 @@ class FilterHistory(Generic[B]):
     def add(self, view: View) -> tuple["FilterHistory[B]", Update]:
         """Return the history with one more picture, and what was made of that picture."""
         key = (view.time, view.camera)
-        place = bisect_left(self.entries, key, key=lambda entry: entry.key)
+        place = self._place(key)
         if place < len(self.entries) and self.entries[place].key == key:
             return self, unused(self.belief, view, Verdict.REPEATED)
         if key <= self.closed or view.time < self.base.time:
@@ -58,13 +58,20 @@ class FilterHistory(Generic[B]):
             replayed.append(_Entry(entry.view, again.belief))
         return self._pruned(replayed), update
 
+    def _place(self, key: tuple[float, str]) -> int:
+        if not self.entries or key > self.entries[-1].key:
+            return len(self.entries)
+        return bisect_left(self.entries, key, key=lambda entry: entry.key)
+
     def _before(self, place: int) -> B:
         return self.entries[place - 1].after if place else self.base
 
     def _pruned(self, entries: list[_Entry[B]]) -> "FilterHistory[B]":
         oldest = entries[-1].view.time - self.horizon
-        first = bisect_left(entries, oldest, key=lambda entry: entry.view.time)
-        if not first:
-            return replace(self, entries=tuple(entries))
-        base = entries[first - 1]
-        return replace(self, base=base.after, entries=tuple(entries[first:]), closed=base.key)
+        first = 0
+        while entries[first].view.time < oldest:  # rarely more than once or twice
+            first += 1
+        base, closed = self.base, self.closed
+        if first:
+            base, closed = entries[first - 1].after, entries[first - 1].key
+        return FilterHistory(self.filter, base, self.horizon, tuple(entries[first:]), closed)

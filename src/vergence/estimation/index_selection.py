@@ -12,14 +12,15 @@ from vergence.estimation.selection import Candidates
 
 @njit(cache=True)
 def spatial_index(places: FloatArray) -> float:
-    """Return Q_s: the mean distance to the nearest other feature, in the unit of the places.
+    """Return Q_s: the mean distance to the nearest other feature.
 
     Args:
-        places: of the chosen features of one picture, (q, 2); 0 for fewer than two.
+        places: of the chosen features of one picture, (q, 2), in units of its diagonal. A feature
+            that is alone in its picture counts as one diagonal away.
     """
     count = len(places)
     if count < 2:
-        return 0.0
+        return 1.0
     total = 0.0
     for i in range(count):
         nearest = np.inf
@@ -38,11 +39,11 @@ def angular_index(places: FloatArray) -> float:
     1 if the features stand at equal angles; may be negative.
 
     Args:
-        places: of the chosen features of one picture, (q, 2); 0 for fewer than two.
+        places: of the chosen features of one picture, (q, 2); 1 for one alone.
     """
     count = len(places)
     if count < 2:
-        return 0.0
+        return 1.0
     x, y = places[:, 0].mean(), places[:, 1].mean()
     angles = np.sort(np.arctan2(places[:, 1] - y, places[:, 0] - x))
     total = 0.0
@@ -113,10 +114,10 @@ def exchange(
 class IndexSelection:
     """Choice by the spatial and angular index of [Lippiello2005]'s reference [10].
 
-    Features chosen last time are kept while they are visible, free places are filled in order, and
-    pairs are exchanged while that raises the quality by `margin` (hysteresis). How the indexes of
-    several cameras are joined is not in the text: here by the share of features each camera has,
-    with distances in units of the picture's diagonal.
+    Features chosen last time are kept while they are visible, free places are filled in turn from
+    each camera, and pairs are exchanged while that raises the quality by `margin` (hysteresis).
+    How the indexes of several cameras are joined is not in the text: here by the share of features
+    that each camera has, with distances in units of the picture's diagonal.
     """
 
     margin: float = 0.02
@@ -131,7 +132,8 @@ class IndexSelection:
         mask = np.zeros(candidates.visible.shape, dtype=np.bool_)
         cameras, features = np.nonzero(candidates.visible)
         held = candidates.held[cameras, features]
-        order = np.concatenate((np.flatnonzero(held), np.flatnonzero(~held)))
+        rank = np.cumsum(candidates.visible, axis=1)[cameras, features]
+        order = np.lexsort((cameras, rank, ~held))  # those held, then in turn from each camera
         chosen = order[: max(0, budget)]
         if len(chosen):
             diagonal = candidates.diagonal_px[cameras, None]

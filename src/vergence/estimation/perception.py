@@ -27,7 +27,7 @@ from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 
 DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
-USED = (Verdict.USED, Verdict.RECOVERED)
+JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ class PosePerception(Generic[B]):
         kept = view.features
         if not self._lost:
             self._history, update = self._history.add(view)
-            if update.verdict in USED:
+            if update.verdict in JUDGED:
                 kept = view.features[update.kept]
         return view, spread_out(found, features, kept, expected, sight, widest)
 

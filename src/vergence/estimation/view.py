@@ -49,21 +49,20 @@ def view_of(
     """
     if features is None:
         features = np.arange(len(image_points.points_px))
-    usable = usable_points(image_points.points_px, image_points.covariance_px, image_points.found)
-    chosen = features[usable]
-    measured, covariance = pinhole_coordinates(
-        image_points.points_px[usable],
-        image_points.covariance_px[usable],
-        (camera.fx, camera.fy, camera.cx, camera.cy),
-    )
+    places, spread = image_points.points_px, image_points.covariance_px
+    usable = usable_points(places, spread, image_points.found)
+    if not usable.all():
+        places, spread, features = places[usable], spread[usable], features[usable]
+    lens = (camera.fx, camera.fy, camera.cx, camera.cy)
+    measured, covariance = pinhole_coordinates(places, spread, lens)
     if camera.distorted:
-        measured = camera.normalize(image_points.points_px[usable])
+        measured = camera.normalize(places)
     return View(
         image_points.camera,
         image_points.time,
         se3_inverse(T_world_camera),
-        chosen,
-        target_points[chosen],
+        features,
+        target_points[features],
         measured,
         covariance,
     )
