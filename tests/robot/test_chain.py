@@ -141,6 +141,25 @@ def test_limits_the_wrong_way_round_are_refused_with_the_joint() -> None:
         Arm(("base", "elbow"), chain, np.ones(3), one, one, one)
 
 
+def test_a_range_the_wrong_way_round_is_no_joint_without_limits() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><compiler autolimits="true"/><worldbody><body><joint name="elbow" range="90 -90"/>'
+        '<geom size="0.1"/><camera name="eye"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(InputError, match="elbow") as caught:
+        Arm.from_mujoco(model, "eye")
+    assert caught.value.allowed == "lower below upper"
+
+
+def test_as_many_rate_limits_as_joints() -> None:
+    model = mujoco.MjModel.from_xml_string(random_arm(np.random.default_rng(35), 4))
+    arm = Arm.from_mujoco(model, "eye", rate_max=2.0, acceleration_max=np.arange(1.0, 5.0))
+    np.testing.assert_array_equal(arm.rate_max, 2.0)
+    np.testing.assert_array_equal(arm.acceleration_max, [1.0, 2.0, 3.0, 4.0])
+    with pytest.raises(InputError, match="one, or 4"):
+        Arm.from_mujoco(model, "eye", rate_max=np.ones(3))
+
+
 def test_a_wrong_number_of_joints_is_refused() -> None:
     arm = Arm.from_mujoco(
         mujoco.MjModel.from_xml_string(random_arm(np.random.default_rng(12), 4)), "eye"

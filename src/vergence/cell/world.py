@@ -159,13 +159,17 @@ class World:
 
     def _arm_to(self, name: str, tip: str, kind: str) -> Arm:
         table = self.cell.arms[name]
-        arm = Arm.from_mujoco(
-            self.model,
-            tip,
-            np.deg2rad(table.rate_max_deg_s),
-            np.deg2rad(table.acceleration_max_deg_s2),
-            kind,
-        )
+        rates, accelerations = table.rate_max_deg_s, table.acceleration_max_deg_s2
+        try:
+            arm = Arm.from_mujoco(
+                self.model, tip, np.deg2rad(rates), np.deg2rad(accelerations), kind
+            )
+        except InputError as error:
+            units = {"rate_max": "rate_max_deg_s", "acceleration_max": "acceleration_max_deg_s2"}
+            key, given = f"arms.{name}.model", f"{error.key} {error.given}"
+            if error.key in units:
+                key, given = f"arms.{name}.{units[error.key]}", str(error.given)
+            raise InputError(str(self.cell.path), key, given, error.allowed) from None
         names = tuple(joint.removeprefix(f"{name}/") for joint in arm.names)
         return Arm(names, arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)
 

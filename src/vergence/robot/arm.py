@@ -57,8 +57,8 @@ class Arm:
             kind: "camera", "site" or "body".
 
         Raises:
-            InputError: if there is no such tip, no joint carries it, or a joint has more than
-                one degree of freedom.
+            InputError: if there is no such tip, no joint carries it, a joint has more than one
+                degree of freedom, or limits are the wrong way round or too few.
         """
         from vergence.robot.mujoco_chain import read_chain
 
@@ -69,8 +69,8 @@ class Arm:
             chain,
             limits[:, 0],
             limits[:, 1],
-            np.broadcast_to(np.asarray(rate_max, dtype=np.float64), (n,)),
-            np.broadcast_to(np.asarray(acceleration_max, dtype=np.float64), (n,)),
+            _one_each(rate_max, n, "rate_max"),
+            _one_each(acceleration_max, n, "acceleration_max"),
         )
 
     @property
@@ -110,3 +110,10 @@ class Arm:
         if joint not in self.names:
             raise InputError("arm", "joint", joint, nearest(joint, self.names))
         return self.names.index(joint)
+
+
+def _one_each(values: float | FloatArray, n: int, name: str) -> FloatArray:
+    given = np.asarray(values, dtype=np.float64)
+    if given.shape not in ((), (n,)):
+        raise InputError("arm", name, f"{given.size} values", f"one, or {n}, one a joint")
+    return np.broadcast_to(given, (n,))

@@ -106,6 +106,11 @@ def _relative(
 
 
 def _limits(model: Any, joints: list[int]) -> FloatArray:
+    for joint in joints:
+        low, high = model.jnt_range[joint]
+        if low > high:  # MuJoCo would take such a joint for one without limits
+            key = f"range of {model.joint(joint).name}"
+            raise InputError("model", key, f"{low:g} … {high:g}", "lower below upper")
     limits = model.jnt_range[joints].copy()
     limits[~model.jnt_limited[joints].astype(bool)] = (-np.inf, np.inf)
     return np.asarray(limits, dtype=np.float64)
