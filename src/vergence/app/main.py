@@ -128,6 +128,48 @@ def reproduce(
     raise typer.Exit(command(paper, quick, out, as_json))
 
 
+@app.command(
+    epilog="Example: vergence track footage/ --model box.obj --fx 548 --start 0.02,0.1,0.5,0,180,0"
+)
+def track(
+    images: Annotated[str, typer.Argument(help="A folder of images, or a video.")],
+    model: Annotated[str, typer.Option(help="The object: an OBJ, STL or MJCF file.")],
+    start: Annotated[
+        str,
+        typer.Option(
+            help="The object's pose in the camera, in the first picture: "
+            "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file."
+        ),
+    ],
+    camera: Annotated[
+        Path | None, typer.Option(help="Intrinsics: a TOML, JSON or YAML file, ROS's too.")
+    ] = None,
+    fx: Annotated[float | None, typer.Option("--fx", help="Focal length, pixels.")] = None,
+    fy: Annotated[float | None, typer.Option("--fy", help="As --fx if absent.")] = None,
+    cx: Annotated[float | None, typer.Option("--cx", help="The middle if absent.")] = None,
+    cy: Annotated[float | None, typer.Option("--cy", help="The middle if absent.")] = None,
+    distortion: Annotated[str | None, typer.Option(help="k1,k2,p1,p2,k3; zero if absent.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Pictures a second.")] = None,
+    scale: Annotated[float, typer.Option(help="Metres in a unit of the model file.")] = 1.0,
+    contrast: Annotated[float, typer.Option(help="Least step of an edge, grey levels.")] = 5.0,
+    jolt: Annotated[float, typer.Option(help="Unforeseen motion, pixels a picture.")] = 3.0,
+    overlay: Annotated[
+        bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
+    ] = True,
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Follow a known object through footage: poses, covariances, an overlay film. No robot needed."""
+    from vergence.app.track import Request
+    from vergence.app.track import track as command
+
+    intrinsics = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
+    request = Request(
+        images, model, start, camera, intrinsics, distortion, rate, scale, contrast, jolt, overlay
+    )
+    raise typer.Exit(command(request, out, as_json))
+
+
 @app.command(epilog="Example: vergence bench control")
 def bench(
     names: Annotated[

@@ -9,9 +9,11 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation import Belief, PoseFilter, Verdict, view_of
 from vergence.features import ImagePoints
+from vergence.geometry import so3_log
 from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
 
 CAMERA = "camera"
+_SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
 
 
@@ -43,7 +45,8 @@ class FollowRule:
     """When a picture counts, and when the object is lost."""
 
     jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the picture, per frame
-    least_share: float = 0.5  # of the edges expected, to believe a picture
+    least_share: float = 0.55  # of the edges expected, to believe a picture
+    surprise_share: float = 0.2  # more of it, if the picture contradicts the prediction
     least_lines: int = 3  # edges found, to believe a picture
     patience: int = 12  # pictures in a row without the object, after which it is lost
     turn_max_rad: float = (
@@ -98,14 +101,11 @@ class ObjectFollower:
             InputError: if the image is not of the camera's size.
         """
         belief = self._filter.predict(self._belief, time)
-        seen = self._tracker.measure(
-            image,
-            self._camera,
-            belief.T_world_target,
-            belief.honest_covariance[:6, :6],
-            self._memory,
-        )
-        reason = self._doubt(seen)
+        seen, reason = self._look(image, belief, belief.T_world_target)
+        if reason and self._missed == 0:
+            # It may have stopped: look where it was, too.
+            again = self._look(image, belief, self._belief.T_world_target)
+            seen, reason = again if not again[1] else (seen, reason)
         if not reason:
             view = view_of(_points(seen, time), self._camera, np.eye(4), seen.points)
             update = self._filter.update(self._belief, view)
@@ -133,16 +133,26 @@ class ObjectFollower:
             seen.samples_found,
         )
 
-    def _doubt(self, seen: EdgeMeasurement) -> str:
-        """Say why a picture is not to be believed; empty if it is."""
+    def _look(
+        self, image: ImageArray, belief: Belief, T_camera_target: FloatArray
+    ) -> tuple[EdgeMeasurement, str]:
+        """Search around a pose; return what is seen, and why it is not to be believed."""
+        covariance = belief.honest_covariance[:6, :6]
+        seen = self._tracker.measure(image, self._camera, T_camera_target, covariance, self._memory)
+        return seen, self._doubt(belief, seen)
+
+    def _doubt(self, belief: Belief, seen: EdgeMeasurement) -> str:
+        """Say why a picture is not to be believed; empty if it is.
+
+        The more a picture surprises, the more of the object it has to show.
+        """
         rule = self._rule
         if not seen.expected:
             return "the object is outside the image"
-        if seen.share < rule.least_share:
-            return (
-                f"{seen.share:.0%} of the edges expected were found; "
-                f"{rule.least_share:.0%} are needed"
-            )
+        surprise = min(1.0, _surprise(belief, seen.T_camera_target) / _SURPRISING)
+        needed = rule.least_share + surprise * rule.surprise_share
+        if seen.share < needed:
+            return f"{seen.share:.0%} of the edges expected were found; {needed:.0%} are needed"
         if len(seen.points) < 2 * rule.least_lines:
             return f"{len(seen.points) // 2} edges were found; {rule.least_lines} are needed"
         return ""
@@ -158,6 +168,18 @@ class ObjectFollower:
                 f"{np.rad2deg(turn):.2g} degrees of standard deviation"
             )
         return ""
+
+
+def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:
+    """Return the Mahalanobis distance squared of a pose from what was predicted."""
+    turn = T_camera_target[:3, :3] @ belief.T_world_target[:3, :3].T
+    error = np.concatenate(
+        (
+            T_camera_target[:3, 3] - belief.T_world_target[:3, 3],
+            so3_log(np.ascontiguousarray(turn)),
+        )
+    )
+    return float(error @ np.linalg.solve(belief.honest_covariance[:6, :6], error))
 
 
 def _points(seen: EdgeMeasurement, time: float) -> ImagePoints:

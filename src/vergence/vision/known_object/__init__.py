@@ -1,0 +1,24 @@
+"""A known rigid object: its geometry, its corners in windows, its edges from picture to picture."""
+
+from vergence.vision.known_object.corner_extractor import (
+    CornerExtractor,
+    CornerMeasurements,
+    require_image,
+)
+from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
+from vergence.vision.known_object.loading import load_object_model, object_model_of
+from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.projection import lens_of
+
+__all__ = [
+    "CornerExtractor",
+    "CornerMeasurements",
+    "EdgeMeasurement",
+    "EdgeMemory",
+    "EdgeTracker",
+    "ObjectModel",
+    "lens_of",
+    "load_object_model",
+    "object_model_of",
+    "require_image",
+]

@@ -123,7 +123,7 @@ def _arm(
     v: float,
     direction: FloatArray,
 ) -> float:
-    """Fill the direction in the picture of an edge that starts at X; return its length, 0 if hidden.
+    """Fill the direction in the picture of an edge from X on; return its length, 0 if hidden.
 
     An edge that runs behind the camera is cut.
     """

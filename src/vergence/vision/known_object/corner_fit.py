@@ -15,6 +15,7 @@ NEAR_PX = 2.5  # closer to the corner the other edges disturb a profile
 LONGEST_PX = 30.0  # of an edge that is used, from the corner
 SAMPLES = 10  # profiles an edge
 STEPS = 3  # candidates a profile
+BLUR = 4  # samples by which a profile is longer than the search, to follow blurred edges
 FINE_REACH = 3  # of the second pass, px
 SLOPE_MAX = 0.3  # of a found edge against its prediction, first pass
 TOLERANCE_PX = 1.0  # of a step from the line it belongs to
@@ -124,15 +125,16 @@ def _fit_line(
     nu, nv = -dv, du
     places = np.empty((SAMPLES, STEPS))
     heights = np.empty((SAMPLES, STEPS))
+    widths = np.empty(STEPS)
     counts = np.zeros(SAMPLES, dtype=np.int64)
-    profile = np.empty(2 * (reach + MARGIN) + 1)
+    profile = np.empty(2 * (reach + MARGIN + BLUR) + 1)
     spacing = (length - NEAR_PX) / (SAMPLES - 1)
     inside, seen = 0, 0
     for i in range(SAMPLES):
         s = NEAR_PX + i * spacing
         if read_profile(image, corner[0] + s * du, corner[1] + s * dv, nu, nv, profile):
             inside += 1
-            counts[i] = find_steps(profile, reach, contrast, places[i], heights[i])
+            counts[i] = find_steps(profile, reach, contrast, places[i], heights[i], widths)
             seen += counts[i] > 0
     if inside < SUPPORT * SAMPLES:
         return OUTSIDE

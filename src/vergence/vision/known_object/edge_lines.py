@@ -10,11 +10,13 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.vision.known_object.edge_samples import EdgeSamples
+from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 from vergence.vision.known_object.pose_fit import PoseFit
+from vergence.vision.known_object.profiles import SHARP_WIDTH
 from vergence.vision.known_object.projection import pixel_rows
 
 LEAST_SAMPLES = 4
+BLUR_SHARE = 0.25  # of its width beyond a sharp edge's, by which a blurred edge may be wrong
 SLIDING_PX = 100.0  # standard deviation along an edge
 
 
@@ -23,6 +25,7 @@ def edge_points(
     fit: PoseFit,
     lens: FloatArray,
     samples: EdgeSamples,
+    steps: Steps,
     found: BoolArray,
     bias_px: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -32,6 +35,7 @@ def edge_points(
         fit: the pose fitted to the picture; only what the picture says is handed on, not the pose.
         lens: packed camera, (11,).
         samples: on the edges, those of one edge beside each other.
+        steps: across each of them.
         found: which of them found their edge, (N,).
         bias_px: standard deviation of what does not average out over an edge: model and lens.
     """
@@ -52,6 +56,7 @@ def edge_points(
             fit,
             lens,
             samples,
+            steps,
             found,
             pixels,
             first,
@@ -70,6 +75,7 @@ def _line(
     fit: PoseFit,
     lens: FloatArray,
     samples: EdgeSamples,
+    steps: Steps,
     found: BoolArray,
     pixels: FloatArray,
     first: int,
@@ -80,7 +86,7 @@ def _line(
     covariances: FloatArray,
 ) -> int:
     """Fill the two points of one edge, samples first … last - 1; return 2, or 0 if it has none."""
-    nu, nv = 0.0, 0.0
+    nu, nv, width = 0.0, 0.0, 0.0
     n, ss, so, sss, sso, soo = 0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last):
         nu += samples.normals[i, 0]
@@ -91,6 +97,7 @@ def _line(
         if found[i]:
             s = nv * (pixels[i, 0] - pixels[first, 0]) - nu * (pixels[i, 1] - pixels[first, 1])
             o = fit.residuals[i]
+            width += steps.widths[i, fit.chosen[i]]
             n += 1
             ss += s
             so += o
@@ -104,7 +111,8 @@ def _line(
         return 0
     slope = (sso - ss * so / n) / spread
     residual = max(soo - so * so / n - slope * slope * spread, 0.0) / (n - 2)
-    variance = 2.0 * max(residual, fit.spread_px**2) / n + bias_px**2
+    blur = BLUR_SHARE * max(width / n - SHARP_WIDTH, 0.0)
+    variance = 2.0 * max(residual, fit.spread_px**2) / n + bias_px**2 + blur**2
     rows = np.empty((2, 6))
     for k in range(2):
         wanted = middle + (2 * k - 1) * np.sqrt(spread / n)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
-from vergence.vision.known_object.profiles import MARGIN, find_steps, read_profile
+from vergence.vision.known_object.profiles import MARGIN, SHARP_WIDTH, find_steps, read_profile
 from vergence.vision.known_object.projection import (
     HEIGHT,
     WIDTH,
@@ -18,6 +18,7 @@ from vergence.vision.known_object.projection import (
 )
 
 TEMPLATE = 4  # samples on each side of an edge that are remembered
+BLUR = 9  # samples by which a profile is longer than the search, to follow blurred edges
 LEAST_COSINE = 0.08  # flatter faces make no edge to be told from its neighbour
 BORDER_PX = 3.0  # nearer to the border of the picture nothing is expected
 _ALONG = 1e-3  # of an edge's length, for its direction in the picture
@@ -39,6 +40,7 @@ class Steps(NamedTuple):
 
     offsets: FloatArray  # (N, K) along the normal, px
     weights: FloatArray  # (N, K) 0 … 1; 0 where there is none
+    widths: FloatArray  # (N, K) of the slope at half its height, px
     likeness: FloatArray  # (N, K) correlation with what is remembered, -1 … 1; NaN if nothing is
     looks: FloatArray  # (N, K, 2 TEMPLATE + 1) grey profile around each, mean 0, norm 1
     readable: BoolArray  # (N,) the profile lies within the picture
@@ -94,9 +96,7 @@ def sample_edges(
             pixels[count, 0], pixels[count, 1] = u, v
             normals[count, 0], normals[count, 1] = -(v1 - v) / length, (u1 - u) / length
             count += 1
-    return EdgeSamples(
-        edge[:count], place[:count], points[:count], pixels[:count], normals[:count]
-    )
+    return EdgeSamples(edge[:count], place[:count], points[:count], pixels[:count], normals[:count])
 
 
 @njit(cache=True)
@@ -125,18 +125,19 @@ def search_steps(
     likeness = np.full((count, candidates), np.nan)
     looks = np.zeros((count, candidates, 2 * TEMPLATE + 1))
     readable = np.zeros(count, dtype=np.bool_)
-    profile = np.empty(2 * (reach + MARGIN + TEMPLATE) + 1)
+    profile = np.empty(2 * (reach + MARGIN + BLUR) + 1)
     places, heights = np.empty(candidates), np.empty(candidates)
+    widths = np.zeros((count, candidates))
     for n in range(count):
         p, normal = samples.points_px[n], samples.normals[n]
         readable[n] = read_profile(image, p[0], p[1], normal[0], normal[1], profile)
         if not readable[n]:
             continue
         e, k = samples.edge[n], samples.place[n]
-        for j in range(find_steps(profile, reach, contrast, places, heights)):
+        for j in range(find_steps(profile, reach, contrast, places, heights, widths[n])):
             size = abs(heights[j])
             offsets[n, j] = places[j]
-            weights[n, j] = size / (size + _USUAL_HEIGHT)
+            weights[n, j] = size / (size + _USUAL_HEIGHT) * min(1.0, SHARP_WIDTH / widths[n, j])
             look_at(profile, places[j], looks[n, j])
             if known[e, k]:
                 match = 0.0
@@ -144,7 +145,7 @@ def search_steps(
                     match += templates[e, k, i] * looks[n, j, i]
                 likeness[n, j] = match
                 weights[n, j] *= 0.2 + 0.8 * max(match, 0.0) ** 2
-    return Steps(offsets, weights, likeness, looks, readable)
+    return Steps(offsets, weights, widths, likeness, looks, readable)
 
 
 @njit(cache=True)

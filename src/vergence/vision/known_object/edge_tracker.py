@@ -112,7 +112,7 @@ class EdgeTracker:
         """
         require_image(image, camera)
         lens = lens_of(camera)
-        prior = np.linalg.inv(pose_covariance)
+        prior = np.asarray(np.linalg.inv(pose_covariance), dtype=np.float64)
         samples = self._samples(T_camera_target, lens)
         reach = self._reach(T_camera_target, lens, samples, pose_covariance)
         steps = self._search(image, samples, reach, memory)
@@ -122,14 +122,16 @@ class EdgeTracker:
         steps = self._search(image, samples, _FINE_REACH_PX, memory)
         fit = fit_pose(fit.T, T_camera_target, prior, lens, samples, steps, 1.5, 0.6, 8)
         found = agreeing(fit, steps, self.likeness, 1.5)
-        points, places, covariances = edge_points(fit, lens, samples, found, self.bias_px)
+        expected, count = int(np.count_nonzero(steps.readable)), int(np.count_nonzero(found))
+        points, places, covariances = edge_points(fit, lens, samples, steps, found, self.bias_px)
         return EdgeMeasurement(
             points,
             places,
-            covariances,
+            # The less of the object is seen, the likelier some of it is something else.
+            covariances * (expected / max(count, 1)) ** 2,
             fit.T,
-            int(np.count_nonzero(steps.readable)),
-            int(np.count_nonzero(found)),
+            expected,
+            count,
             samples.points_px,
             found,
             fit,
@@ -157,7 +159,12 @@ class EdgeTracker:
     def _samples(self, T: FloatArray, lens: FloatArray) -> EdgeSamples:
         model = self.model
         samples: EdgeSamples = sample_edges(
-            np.ascontiguousarray(T), lens, model.edges, model.edge_normals, model.surface, self.places
+            np.ascontiguousarray(T),
+            lens,
+            model.edges,
+            model.edge_normals,
+            model.surface,
+            self.places,
         )
         return samples
 

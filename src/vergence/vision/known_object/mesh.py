@@ -51,7 +51,9 @@ def sharp_edges(
     start = np.flatnonzero(new)
     count = np.diff(np.append(start, len(pairs)))
     first = normals[owner[start]]
-    second = np.where((count > 1)[:, None], normals[owner[start + np.minimum(count, 2) - 1]], -first)
+    second = np.where(
+        (count > 1)[:, None], normals[owner[start + np.minimum(count, 2) - 1]], -first
+    )
     sharp = (count != 2) | (np.einsum("ij,ij->i", first, second) < np.cos(sharp_rad))
     return _straightened(vertices, pairs[start][sharp], np.stack((first, second), axis=1)[sharp])
 
@@ -115,4 +117,6 @@ def _turns(vertices: FloatArray, ends: IntArray, vertex: int, edges: list[int]) 
     """Tell whether two of the edges at a vertex differ in direction."""
     far = vertices[ends[edges].sum(axis=1) - vertex] - vertices[vertex]
     directions = far / np.linalg.norm(far, axis=1, keepdims=True)
-    return bool(np.linalg.norm(np.cross(directions[:, None], directions), axis=2).max() > CORNER_SINE)
+    return bool(
+        np.linalg.norm(np.cross(directions[:, None], directions), axis=2).max() > CORNER_SINE
+    )

@@ -77,7 +77,8 @@ def fit_pose(
         for i in range(6):
             for k in range(i):
                 A[k, i] = A[i, k]
-        T = _moved(T, np.linalg.solve(A, b))
+        step = np.linalg.solve(A, b)
+        T = _moved(T, step)  # type: ignore[arg-type]
         tolerance *= shrink
     tolerance /= shrink
     for n in range(len(samples.edge)):
@@ -124,9 +125,7 @@ def _difference(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
     turn = np.eye(4)
     for i in range(3):
         for j in range(3):
-            turn[i, j] = (
-                T_a[i, 0] * T_b[j, 0] + T_a[i, 1] * T_b[j, 1] + T_a[i, 2] * T_b[j, 2]
-            )
+            turn[i, j] = T_a[i, 0] * T_b[j, 0] + T_a[i, 1] * T_b[j, 1] + T_a[i, 2] * T_b[j, 2]
     difference[3:] = so3_log(turn)
     return difference
 

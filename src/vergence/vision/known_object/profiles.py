@@ -6,6 +6,9 @@ from numba import njit
 from vergence.arrays import FloatArray, ImageArray
 
 MARGIN = 3  # samples of a profile beyond the range that is searched
+SHARP_WIDTH = 3.0  # px, of the slope of a sharp edge as the mask sees it
+BLURRED_WIDTH = 5.0  # px, from which on the middle of the slope is the better place
+SAME_PX = 0.75  # steps nearer than this are one
 
 
 @njit(cache=True)
@@ -46,16 +49,27 @@ def read_profile(
 
 @njit(cache=True)
 def find_steps(
-    profile: FloatArray, reach: int, contrast: float, offsets: FloatArray, heights: FloatArray
+    profile: FloatArray,
+    reach: int,
+    contrast: float,
+    offsets: FloatArray,
+    heights: FloatArray,
+    widths: FloatArray,
 ) -> int:
     """Find the steps of a profile: local maxima of |slope|, to a fraction of a pixel.
 
+    A blurred edge is a ramp whose slope has no one maximum; its middle is where the edge is. So
+    each maximum is followed to where the slope has fallen to half, on both sides.
+
     Args:
         profile: grey values a pixel apart, odd in number.
-        reach: how far from its middle to look, px; the profile goes `MARGIN` further.
+        reach: how far from its middle to look, px; the profile goes `MARGIN` further at least,
+            and as much further as ramps shall be followed.
         contrast: least height of a step, grey values.
         offsets: is filled with the places, px from the middle, the highest steps first.
         heights: is filled with their signed heights, grey values.
+        widths: is filled with the widths of their slopes at half their height, px; a sharp edge has
+            about `SHARP_WIDTH`.
 
     Returns:
         How many were found, at most the length of `offsets`.
@@ -68,11 +82,30 @@ def find_steps(
         after = _height(profile, middle + k + 1)
         size = abs(here)
         if size >= contrast and size > abs(before) and size >= abs(after):
+            low = _half_way(profile, middle + k, -1, here) - middle
+            high = _half_way(profile, middle + k, 1, here) - middle
+            width = high - low
             curve = abs(before) + abs(after) - 2.0 * size
-            shift = 0.5 * (abs(before) - abs(after)) / curve if curve < 0.0 else 0.0
-            count = _insert(offsets, heights, count, k + shift, here)
+            place = k + (0.5 * (abs(before) - abs(after)) / curve if curve < 0.0 else 0.0)
+            if width > BLURRED_WIDTH:
+                place = 0.5 * (low + high)
+            count = _insert(offsets, heights, widths, count, place, here, width)
         before, here = here, after
     return count
+
+
+@njit(cache=True)
+def _half_way(profile: FloatArray, k: int, side: int, height: float) -> float:
+    """Return where, to one side of sample k, the slope has fallen to half of its height there."""
+    before = 1.0
+    place = k
+    while 2 <= place + side < len(profile) - 2:
+        place += side
+        share = _height(profile, place) / height
+        if share < 0.5:
+            return place - side + side * (before - 0.5) / (before - share)
+        before = share
+    return float(place)
 
 
 @njit(cache=True)
@@ -86,15 +119,24 @@ def _height(profile: FloatArray, k: int) -> float:
 
 @njit(cache=True)
 def _insert(
-    offsets: FloatArray, heights: FloatArray, count: int, offset: float, height: float
+    offsets: FloatArray,
+    heights: FloatArray,
+    widths: FloatArray,
+    count: int,
+    offset: float,
+    height: float,
+    width: float,
 ) -> int:
-    """Keep the highest steps in order; return how many there are now."""
+    """Keep the highest steps in order, of those at one place the first; return the new count."""
+    for k in range(count):
+        if abs(offsets[k] - offset) < SAME_PX:
+            return count
     place = min(count, len(offsets))
     while place > 0 and abs(heights[place - 1]) < abs(height):
         place -= 1
     if place == len(offsets):
         return count
     for k in range(min(count, len(offsets) - 1), place, -1):
-        offsets[k], heights[k] = offsets[k - 1], heights[k - 1]
-    offsets[place], heights[place] = offset, height
+        offsets[k], heights[k], widths[k] = offsets[k - 1], heights[k - 1], widths[k - 1]
+    offsets[place], heights[place], widths[place] = offset, height, width
     return min(count + 1, len(offsets))

@@ -1,0 +1,253 @@
+"""`vergence track`: the pose of a known object in footage, picture by picture."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.outcome import Outcome, OutcomeKind
+
+if TYPE_CHECKING:
+    from vergence.app.tracking.follower import ObjectFollower, Step
+    from vergence.app.tracking.footage import Footage, Picture
+    from vergence.camera import Camera
+    from vergence.vision.known_object import ObjectModel
+
+_KEY_FRAMES = 6  # spread over the footage
+_MOST_KEY_FRAMES = 24  # with those where the sighting changes
+
+
+class Request(NamedTuple):
+    """What the command line asks for."""
+
+    images: str
+    model: str
+    start: str
+    camera: Path | None
+    intrinsics: Mapping[str, float | None]  # fx, fy, cx, cy
+    distortion: str | None
+    rate_hz: float | None
+    scale: float
+    contrast: float
+    jolt_px: float
+    overlay: bool
+
+
+class Tracked(NamedTuple):
+    """How it went."""
+
+    outcome: Outcome
+    pictures: int
+    seen: int
+    last: "Step"
+    deviation_max_m: float  # largest standard deviation of the position while seen
+    deviation_max_rad: float
+    median_ms: float  # a picture, drawing and files left out
+
+
+def track(request: Request, out: Path | None, as_json: bool) -> int:
+    """Follow an object through footage into a run folder; return the exit code."""
+    from vergence.app.tracking.footage import open_footage
+    from vergence.vision.known_object import load_object_model
+
+    model = load_object_model(request.model, request.scale)
+    footage = open_footage(request.images, request.rate_hz)
+    pictures = footage.pictures()
+    first = next(pictures)
+    camera = _camera(request, first)
+    follower = _follower(request, model, camera, footage)
+    folder = out or new_folder(f"track-{Path(request.images).stem or 'footage'}")
+    folder.mkdir(parents=True, exist_ok=True)
+    run = _Run(folder, footage, model, camera, follower, request.overlay)
+    tracked = run.through(first, pictures)
+    files = run.files()
+    if as_json:
+        emit(_answer(request, tracked, files, folder))
+    else:
+        _tell(tracked, files, folder)
+    return SUCCESS if tracked.outcome.succeeded else FAILURE
+
+
+def _camera(request: Request, first: "Picture") -> "Camera":
+    from vergence.app.tracking.intrinsics import camera_of_file, camera_of_options
+    from vergence.errors import InputError
+
+    height, width = first.image.shape
+    if request.camera is None:
+        return camera_of_options(request.intrinsics, request.distortion, width, height)
+    for key, value in (*request.intrinsics.items(), ("distortion", request.distortion)):
+        if value is not None:
+            raise InputError("vergence track", f"--{key}", value, "either --camera or intrinsics")
+    return camera_of_file(request.camera, width, height)
+
+
+def _follower(
+    request: Request, model: "ObjectModel", camera: "Camera", footage: "Footage"
+) -> "ObjectFollower":
+    from vergence.app.tracking.follower import FollowRule, ObjectFollower
+    from vergence.app.tracking.start import starting_pose
+    from vergence.errors import InputError
+    from vergence.vision.known_object import EdgeTracker
+
+    for key, value in (("--contrast", request.contrast), ("--jolt", request.jolt_px)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError("vergence track", key, value, "a number above zero")
+    start = starting_pose(request.start, camera)
+    tracker = EdgeTracker(model, contrast=request.contrast)
+    rule = FollowRule(jolt_px=request.jolt_px)
+    return ObjectFollower(tracker, camera, start, 0.0, 1.0 / footage.rate_hz, rule)
+
+
+class _Run:
+    """One pass through footage, with everything it writes."""
+
+    def __init__(
+        self,
+        folder: Path,
+        footage: "Footage",
+        model: "ObjectModel",
+        camera: "Camera",
+        follower: "ObjectFollower",
+        overlay: bool,
+    ) -> None:
+        from vergence.app.tracking.film import Film
+        from vergence.app.tracking.results import PoseFiles
+
+        self._folder, self._footage, self._overlay = folder, footage, overlay
+        self._model, self._camera, self._follower = model, camera, follower
+        self._poses = PoseFiles(folder)
+        self._film = Film(folder / "overlay.webm", footage.rate_hz)
+        self._key_frames: list[Path] = []
+
+    def files(self) -> dict[str, Any]:
+        """Return what was written."""
+        return {
+            "poses": self._poses.table,
+            "poses_with_covariance": self._poses.lines,
+            "overlay": self._film.path if self._film.written else None,
+            "key_frames": self._key_frames,
+        }
+
+    def through(self, first: "Picture", rest: Any) -> Tracked:
+        """Follow the object to the end of the footage, or until it is lost."""
+        from itertools import chain
+
+        from vergence.app.progress import bar
+        from vergence.app.tracking.follower import Sighting
+
+        steps: list[Step] = []
+        took: list[float] = []
+        progress = bar("{task.completed} / {task.total}")
+        task = progress.add_task("track", total=self._footage.count or None)
+        with progress, self._poses as poses, self._film:
+            for number, picture in enumerate(chain((first,), rest)):
+                began = perf_counter()
+                step = self._follower.follow(picture.image, picture.time)
+                took.append(perf_counter() - began)
+                poses.add(Path(picture.name).name, step)
+                self._draw(number, picture, step, steps[-1] if steps else None)
+                steps.append(step)
+                progress.update(task, completed=number + 1)
+                if step.sighting is Sighting.LOST:
+                    break
+            self._key_frame(len(steps) - 1, picture, steps[-1])
+        return _summary(steps, took)
+
+    def _draw(self, number: int, picture: "Picture", step: "Step", before: "Step | None") -> None:
+        from vergence.app.tracking.drawing import draw_step
+
+        if self._overlay:
+            self._film.add(draw_step(picture.image, step, self._model, self._camera))
+        spacing = max(1, (self._footage.count or 600) // _KEY_FRAMES)
+        changed = before is not None and before.sighting is not step.sighting
+        if number % spacing == 0 or changed:
+            self._key_frame(number, picture, step)
+
+    def _key_frame(self, number: int, picture: "Picture", step: "Step") -> None:
+        import cv2
+
+        from vergence.app.tracking.drawing import draw_step
+
+        path = self._folder / f"frame-{number:06d}.jpg"
+        if not self._overlay or path in self._key_frames:
+            return
+        if len(self._key_frames) < _MOST_KEY_FRAMES:
+            canvas = draw_step(picture.image, step, self._model, self._camera)
+            path.write_bytes(bytes(cv2.imencode(".jpg", canvas)[1]))
+            self._key_frames.append(path)
+
+
+def _summary(steps: "list[Step]", took: list[float]) -> Tracked:
+    from vergence.app.tracking.follower import Sighting
+
+    seen = [step for step in steps if step.sighting is Sighting.SEEN]
+    deviations = np.array([np.sqrt(np.diag(step.covariance)[:6]) for step in seen])
+    widest = deviations.max(axis=0) if seen else np.full(6, np.nan)
+    return Tracked(
+        _outcome(steps),
+        len(steps),
+        len(seen),
+        steps[-1],
+        float(widest[:3].max()),
+        float(widest[3:].max()),
+        float(np.median(took)) * 1e3,
+    )
+
+
+def _outcome(steps: "list[Step]") -> Outcome:
+    """Say how it ended: whatever the last picture does not show is not held."""
+    from vergence.app.tracking.follower import Sighting
+
+    last = steps[-1]
+    if last.sighting is Sighting.SEEN:
+        held = sum(step.sighting is Sighting.SEEN for step in steps)
+        reason = f"the object was seen in {held} of {len(steps)} pictures, the last among them"
+        return Outcome(OutcomeKind.COMPLETED, reason, last.time)
+    reason = f"not seen at the end: {last.reason}"
+    if last.sighting is Sighting.LOST:
+        before = [step.time for step in steps if step.sighting is Sighting.SEEN]
+        since = f"last seen at {before[-1]:.2f} s" if before else "never seen"
+        reason = f"{since}; {last.reason}"
+    return Outcome(OutcomeKind.TARGET_LOST, reason, last.time)
+
+
+def _answer(
+    request: Request, tracked: Tracked, files: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    from vergence.app.tracking.results import pose_record
+
+    outcome = tracked.outcome
+    return {
+        "command": "track",
+        "images": request.images,
+        "model": request.model,
+        "outcome": {
+            "kind": outcome.kind.value,
+            "reason": outcome.reason,
+            "time": outcome.time,
+        },
+        "pictures": tracked.pictures,
+        "seen": tracked.seen,
+        "position_deviation_max_m": tracked.deviation_max_m,
+        "rotation_deviation_max_deg": float(np.rad2deg(tracked.deviation_max_rad)),
+        "median_ms": tracked.median_ms,
+        "last": pose_record(tracked.last),
+        "run": folder,
+        **files,
+    }
+
+
+def _tell(tracked: Tracked, files: Mapping[str, Any], folder: Path) -> None:
+    say(str(tracked.outcome))
+    say(
+        f"  seen in {tracked.seen} of {tracked.pictures} pictures · standard deviation up to "
+        f"{1e3 * tracked.deviation_max_m:.2g} mm, {np.rad2deg(tracked.deviation_max_rad):.2g}° · "
+        f"{tracked.median_ms:.1f} ms a picture"
+    )
+    say(f"  poses    {files['poses']}  (with covariances: {files['poses_with_covariance'].name})")
+    if files["overlay"]:
+        say(f"  overlay  {files['overlay']}")
+    say(f"  folder   {folder}")

@@ -1,0 +1,80 @@
+"""Draws a followed object into its picture."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence.app.overlay import DESIRED, FOUND, LOST
+from vergence.app.tracking.follower import Sighting, Step
+from vergence.arrays import FloatArray, ImageArray
+from vergence.camera import Camera
+from vergence.vision.known_object import ObjectModel, lens_of
+from vergence.vision.known_object.edge_samples import sample_edges
+
+_SHIFT = 4  # fractional bits of a place
+_PLACES = 60  # along an edge: where it comes out from behind something
+_AXES = ((0, 0, 230), (0, 180, 0), (230, 80, 0))  # x red, y green, z blue
+_COLORS = {Sighting.SEEN: FOUND, Sighting.PREDICTED: DESIRED, Sighting.LOST: LOST}
+
+
+def draw_step(
+    image: ImageArray, step: Step, model: ObjectModel, camera: Camera
+) -> NDArray[np.uint8]:
+    """Return the picture in colour with the object's visible edges and axes over it.
+
+    Args:
+        image: (height, width) grey.
+        step: what was made of it.
+        model: the object.
+        camera: the camera's model.
+
+    Returns:
+        (height, width, 3) blue, green, red.
+    """
+    import cv2
+
+    canvas = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    T = np.ascontiguousarray(step.T_camera_target)
+    if T[2, 3] > 0.0:
+        _edges(canvas, T, model, camera, _COLORS[step.sighting])
+        _axes(canvas, T, 0.25 * model.size, camera)
+    for place, found in zip(step.samples_px, step.samples_found, strict=True):
+        if not found:
+            cv2.circle(canvas, _fixed(place), 1 << _SHIFT, LOST, -1, cv2.LINE_AA, _SHIFT)
+    words = f"{step.time:.2f} s  {step.sighting.value}  {step.share:.0%}"
+    cv2.rectangle(canvas, (0, 0), (10 + 9 * len(words), 24), (0, 0, 0), -1)
+    cv2.putText(canvas, words, (8, 17), 0, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+    return canvas
+
+
+def _edges(
+    canvas: NDArray[np.uint8],
+    T: FloatArray,
+    model: ObjectModel,
+    camera: Camera,
+    color: tuple[int, ...],
+) -> None:
+    import cv2
+
+    seen = sample_edges(T, lens_of(camera), model.edges, model.edge_normals, model.surface, _PLACES)
+    along = (np.diff(seen.edge) == 0) & (np.diff(seen.place) == 1)
+    for n in np.flatnonzero(along):
+        ends = _fixed(seen.points_px[n]), _fixed(seen.points_px[n + 1])
+        cv2.line(canvas, *ends, color, 1, cv2.LINE_AA, _SHIFT)
+
+
+def _axes(canvas: NDArray[np.uint8], T: FloatArray, length: float, camera: Camera) -> None:
+    import cv2
+
+    points = T[:3, 3] + np.vstack((np.zeros(3), length * T[:3, :3].T))
+    if not (points[:, 2] > 0.0).all():
+        return
+    pixels = camera.project(points)
+    if not (np.abs(pixels) < 1e4).all():
+        return
+    for end, color in zip(pixels[1:], _AXES, strict=True):
+        cv2.line(canvas, _fixed(pixels[0]), _fixed(end), color, 2, cv2.LINE_AA, _SHIFT)
+
+
+def _fixed(point: FloatArray) -> tuple[int, int]:
+    u, v = (round(float(value) * 2**_SHIFT) for value in point)
+    return u, v
