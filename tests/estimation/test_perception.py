@@ -5,6 +5,7 @@ import pytest
 from estimation_scene import CAMERA, look_at, moving, pose_error
 
 from vergence.camera import Camera, Frame
+from vergence.errors import InputError
 from vergence.estimation import (
     CameraRig,
     IndexSelection,
@@ -267,6 +268,13 @@ def test_pictures_of_unknown_cameras_do_not_concern_it():
     assert perception.observe((cell.frame("hand", 0.1),)) is None
     assert perception.observe(()) is None
     assert perception.observe((cell.frame("wall", 0.1),)) is not None
+
+
+def test_picture_of_another_size_than_calibrated_is_refused():
+    cell = Cell()
+    frame = replace(cell.frame("wall", 0.1), image=np.zeros((480, 640), np.uint8))
+    with pytest.raises(InputError, match=r"640 x 480.*768 x 576"):
+        cell.perception().observe((frame,))
 
 
 def test_repeated_picture_changes_nothing():

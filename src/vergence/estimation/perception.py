@@ -8,6 +8,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Frame
+from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure, no_points, spread_out
 from vergence.estimation.recovery import NoPose, pose_from_points
@@ -127,6 +128,9 @@ class PosePerception(Generic[B]):
         """Return what the pictures show and where the target is, or None without a picture.
 
         Pictures of cameras that are not in the rig do not concern it.
+
+        Raises:
+            InputError: if a picture has not the size that its camera's model is for.
         """
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
@@ -147,6 +151,7 @@ class PosePerception(Generic[B]):
         return Observation(time, tuple(points), None if self._lost else self.belief.state())
 
     def _expect(self, frame: Frame) -> _Picture:
+        require_size(frame, self._rig)
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
         belief = self._history.belief if self._lost else self._history.at(frame.time)
         doubt = belief.disagreeing
@@ -273,3 +278,14 @@ class PosePerception(Generic[B]):
         camera = self._rig.cameras[self._rig.numbers[frame.camera]]
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
         return view_of(points, camera, T_world_camera, self._shape.points)
+
+
+def require_size(frame: Frame, rig: CameraRig) -> None:
+    """Raise InputError if a picture has not the size that its camera's model is for."""
+    if frame.image is None:
+        return
+    camera = rig.cameras[rig.numbers[frame.camera]]
+    height, width = frame.image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        given, allowed = f"{width} x {height}", f"{camera.width} x {camera.height}, as calibrated"
+        raise InputError(f"camera {frame.camera}", "picture", given, allowed)
