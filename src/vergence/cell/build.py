@@ -9,8 +9,10 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
+from vergence.cell.locate import locate_model
 from vergence.cell.motion import placement_pose
 from vergence.cell.schema import ArmTable, CameraTable, Placement
+from vergence.cell.urdf import read_urdf
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion
 from vergence.robot import Arm
@@ -56,7 +58,7 @@ def assemble(cell: Cell) -> Any:
     width = max(table.resolution[0] for table in cell.cameras.values())
     height = max(table.resolution[1] for table in cell.cameras.values())
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-    room = cell.resolve(cell.scene.model) if cell.scene.model else _ROOM
+    room = cell.scene.model or _ROOM
     spec.attach(_read(cell, "scene.model", room), frame=spec.worldbody.add_frame(), prefix="scene/")
     for light in spec.lights:
         light.diffuse = light.diffuse * cell.scene.light
@@ -71,7 +73,7 @@ def assemble(cell: Cell) -> Any:
 
 def _add_target(spec: Any, cell: Cell) -> None:
     """Attach the target to the arm that carries it, else to a body that is moved about."""
-    model = _read(cell, "target.model", cell.resolve(cell.target.model))
+    model = _read(cell, "target.model", cell.target.model)
     arm = cell.target.carried_by
     if arm is None:
         holder = spec.worldbody.add_body(name="target", mocap=True)
@@ -83,9 +85,12 @@ def _add_target(spec: Any, cell: Cell) -> None:
     spec.attach(model, frame=holder.add_frame(), prefix="target/")
 
 
-def _read(cell: Cell, key: str, path: Path) -> Any:
+def _read(cell: Cell, key: str, model: Path, last_body: str | None = None) -> Any:
+    path = locate_model(model, cell.path.parent, str(cell.path), key)
     if not path.is_file():
         raise InputError(str(cell.path), key, path, "an MJCF or URDF file that exists")
+    if path.suffix.lower() == ".urdf":
+        return read_urdf(path, last_body)
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
@@ -104,7 +109,7 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
 
     The arm's weight is compensated, as a robot's own controller does.
     """
-    model = _read(cell, f"arms.{name}.model", cell.resolve(table.model))
+    model = _read(cell, f"arms.{name}.model", table.model, table.body)
     for key in list(model.keys):
         model.delete(key)
     bodies = {body.name: body for body in model.bodies}
@@ -148,9 +153,10 @@ def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
     # MuJoCo wants a sensor of some size: one metre a pixel keeps its numbers equal to ours.
     element.sensor_size = [camera.width, camera.height]
     element.focal_pixel = [camera.fx, camera.fy]
+    # Its principal offset counts leftwards and upwards: seen by where a rendered disc falls.
     element.principal_pixel = [
-        camera.cx - (camera.width - 1) / 2,
-        camera.cy - (camera.height - 1) / 2,
+        (camera.width - 1) / 2 - camera.cx,
+        (camera.height - 1) / 2 - camera.cy,
     ]
 
 

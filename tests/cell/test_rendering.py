@@ -1,0 +1,119 @@
+"""A rendered picture shows things where the camera says they project: pixel centres at integers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vergence.cell import Cell, SimulatedDriver, load_cell
+
+MODEL = """<mujoco><worldbody><body name="spot">
+  <geom type="{kind}" size="{size}" rgba="1 1 1 1" contype="0" conaffinity="0"/>
+</body></worldbody></mujoco>"""
+ARM = """<mujoco><worldbody><body name="hand"><joint name="turn" axis="0 0 1" range="-90 90"/>
+  <geom size="0.01" mass="1" pos="0 0 2" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
+# A black room: nothing but the spot sends light to the camera.
+ROOM = """<mujoco><worldbody>
+  <light directional="true" dir="0 0 -1" diffuse="0 0 0" ambient="1 1 1" specular="0 0 0"/>
+</worldbody></mujoco>"""
+CELL = """
+name = "spot"
+duration_s = 1.0
+[scene]
+model = "room.xml"
+[arms.hand]
+model = "arm.xml"
+body = "hand"
+start_deg = [0.0]
+[cameras.eye]
+arm = "hand"
+position_m = [0.0, 0.0, 1.0]
+rotation_rpy_deg = [180.0, 0.0, {turn}]
+resolution = [{width}, {height}]
+focal_px = [{fx}, {fy}]
+principal_px = [{cx}, {cy}]
+noise_grey = 0.0
+[target]
+model = "spot.xml"
+position_m = [{x}, {y}, 0.0]
+features = [[0.0, 0.0, 0.0]]
+[task]
+arm = "hand"
+camera = "eye"
+[law]
+kind = "optimal_tracking"
+"""
+LENSES = {
+    "central": {"width": 640, "height": 480, "fx": 700, "fy": 700, "cx": 319.5, "cy": 239.5},
+    "off the middle": {
+        "width": 640,
+        "height": 480,
+        "fx": 700,
+        "fy": 620,
+        "cx": 250.25,
+        "cy": 300.5,
+    },
+    "odd size": {"width": 333, "height": 251, "fx": 400, "fy": 480, "cx": 190.0, "cy": 101.75},
+}
+
+
+def spot_cell(folder: Path, geom: dict[str, str], **values: float) -> Cell:
+    (folder / "spot.xml").write_text(MODEL.format(**geom))
+    (folder / "arm.xml").write_text(ARM)
+    (folder / "room.xml").write_text(ROOM)
+    (folder / "cell.toml").write_text(CELL.format(**values))
+    return load_cell(folder)
+
+
+def picture(cell: Cell) -> tuple[np.ndarray, np.ndarray]:
+    """The first picture as float, and where the spot's middle truly projects."""
+    driver = SimulatedDriver(cell)
+    try:
+        frame = driver.first_frame("eye")
+        assert frame.image is not None
+        assert frame.truth is not None
+        return frame.image.astype(np.float64), frame.truth.points_px[0]
+    finally:
+        driver.close()
+
+
+def centroid(image: np.ndarray) -> np.ndarray:
+    weight = image - image.min()
+    assert weight.sum() > 0
+    v, u = np.mgrid[: image.shape[0], : image.shape[1]]
+    return np.array([(weight * u).sum(), (weight * v).sum()]) / weight.sum()
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_a_disc_is_drawn_around_the_place_it_projects_to(tmp_path: Path, lens: str) -> None:
+    rng = np.random.default_rng(36)
+    disc = {"kind": "cylinder", "size": "0.02 0.0001"}
+    gaps = []
+    for x, y in rng.uniform(-0.1, 0.1, (5, 2)):
+        cell = spot_cell(tmp_path, disc, turn=0.0, x=x, y=y, **LENSES[lens])
+        image, true_px = picture(cell)
+        gaps.append(centroid(image) - true_px)
+    assert np.abs(gaps).max() < 0.1
+
+
+@pytest.mark.parametrize("turn", [30.0, 90.0, -135.0])
+def test_a_turned_camera_turns_the_picture_with_it(tmp_path: Path, turn: float) -> None:
+    disc = {"kind": "cylinder", "size": "0.02 0.0001"}
+    cell = spot_cell(tmp_path, disc, turn=turn, x=0.08, y=-0.05, **LENSES["off the middle"])
+    image, true_px = picture(cell)
+    np.testing.assert_allclose(centroid(image), true_px, atol=0.1)
+
+
+def test_edges_of_a_box_fall_between_the_right_pixels(tmp_path: Path) -> None:
+    box = {"kind": "box", "size": "0.05 0.04 0.0001"}
+    lens = LENSES["central"]
+    cell = spot_cell(tmp_path, box, turn=0.0, x=0.0, y=0.0, **lens)
+    image, middle = picture(cell)
+    bright = image > image.max() / 2
+    rows, columns = np.flatnonzero(bright.any(axis=1)), np.flatnonzero(bright.any(axis=0))
+    half = np.array([0.05, 0.04]) * 700 / (1.0 - 0.0001)
+    # Pixel k covers k - 0.5 to k + 0.5: it is bright where its centre lies in the box.
+    assert columns[0] == np.ceil(middle[0] - half[0])
+    assert columns[-1] == np.floor(middle[0] + half[0])
+    assert rows[0] == np.ceil(middle[1] - half[1])
+    assert rows[-1] == np.floor(middle[1] + half[1])
