@@ -1,6 +1,5 @@
 """From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -58,11 +57,9 @@ def _run(
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
     for listener in everyone:
         listener.begin(info)
-    began = time.perf_counter()
     outcome = loop.run(cell.duration_s)
     values = dict(summary.values)
     values["duration_s"] = outcome.time
-    values["real_time_factor"] = outcome.time / max(time.perf_counter() - began, 1e-9)
     for listener in everyone:
         listener.close(outcome, values)
     return RunResult(outcome, values)

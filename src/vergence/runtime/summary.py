@@ -1,9 +1,12 @@
 """The few numbers that say how a run went."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from time import perf_counter
 
 import numpy as np
 
+from vergence.arrays import FloatArray
+from vergence.features import ImagePoints
 from vergence.outcome import Outcome
 from vergence.runtime.recording import RunInfo, TickRecord
 
@@ -11,42 +14,43 @@ from vergence.runtime.recording import RunInfo, TickRecord
 class Summary:
     """Listens to a run and keeps the extremes; memory does not grow with the run.
 
+    The real-time factor is counted from the first picture that was worked on: by then every kernel
+    has been compiled.
+
     Args:
         camera: name of the task's camera.
     """
 
     def __init__(self, camera: str) -> None:
         self._camera = camera
-        self.values: dict[str, float] = {}
         self._start_manipulability = float("nan")
+        self._first: tuple[float, float] | None = None  # time in the run and on the wall, s
+        self.values: dict[str, float] = {}
 
     def begin(self, info: RunInfo) -> None:
         """Nothing to prepare."""
 
     def tick(self, record: TickRecord) -> None:
         """Take this tick's extremes into account."""
-        values = self.values
+        if record.observation is None:
+            return
+        self._keep_pace(record.time)
         for command in record.commands.values():
             if np.isnan(self._start_manipulability):
                 self._start_manipulability = command.manipulability
             ratio = command.manipulability / self._start_manipulability
-            _keep(values, "min_manipulability_ratio", ratio, min)
-            _keep(values, "min_penalty", command.penalty, min)
-        if record.observation is None or record.reference is None:
-            return
+            self._keep("min_manipulability_ratio", ratio, min)
+            self._keep("min_penalty", command.penalty, min)
         view = record.observation.views[-1]
-        desired = record.reference.points_px
-        if desired is not None and view.found.any():
-            error = _distance(view.points_px[view.found], desired[view.found])
-            values["final_error_px"] = error
-            _keep(values, "max_error_px", error, max)
+        if record.reference is not None and record.reference.points_px is not None:
+            error = _farthest(view, record.reference.points_px)
+            if not np.isnan(error):
+                self.values["final_error_px"] = error
+            self._keep("max_error_px", error, max)
         for frame in record.sample.frames:
-            if frame.truth is None or frame.camera != self._camera or frame.time != view.time:
-                continue
-            known = view.found & frame.truth.visible
-            if known.any():
-                drift = _distance(view.points_px[known], frame.truth.points_px[known])
-                _keep(values, "max_drift_px", drift, max)
+            is_view = frame.camera == self._camera and frame.time == view.time
+            if is_view and frame.truth is not None:
+                self._keep("max_drift_px", _farthest(view, frame.truth.points_px), max)
 
     def event(self, time: float, name: str, text: str) -> None:
         """Events are for those who draw them."""
@@ -54,12 +58,19 @@ class Summary:
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Nothing to let go of."""
 
+    def _keep_pace(self, time: float) -> None:
+        now = perf_counter()
+        if self._first is None:
+            self._first = (time, now)
+        elif now > self._first[1]:
+            self.values["real_time_factor"] = (time - self._first[0]) / (now - self._first[1])
 
-def _distance(a: "np.ndarray[tuple[int, int], np.dtype[np.float64]]", b: object) -> float:
-    return float(np.max(np.linalg.norm(a - np.asarray(b), axis=1)))
+    def _keep(self, key: str, value: float, better: Callable[[float, float], float]) -> None:
+        if not np.isnan(value):
+            self.values[key] = better(self.values.get(key, value), value)
 
 
-def _keep(values: dict[str, float], key: str, value: float, better: object) -> None:
-    assert callable(better)
-    if not np.isnan(value):
-        values[key] = better(values[key], value) if key in values else value
+def _farthest(view: ImagePoints, points_px: FloatArray) -> float:
+    """Return how far the farthest found point is from where it should be, px; NaN if none is."""
+    distance = np.linalg.norm(view.points_px - points_px, axis=1)[view.found]
+    return float(np.nanmax(distance)) if np.isfinite(distance).any() else float("nan")
