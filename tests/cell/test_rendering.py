@@ -11,7 +11,8 @@ MODEL = """<mujoco><worldbody><body name="spot">
   <geom type="{kind}" size="{size}" rgba="1 1 1 1" contype="0" conaffinity="0"/>
 </body></worldbody></mujoco>"""
 ARM = """<mujoco><worldbody><body name="hand"><joint name="turn" axis="0 0 1" range="-90 90"/>
-  <geom size="0.01" mass="1" pos="0 0 2" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
+  <geom size="0.01" mass="1" pos="0 0 2" contype="0" conaffinity="0"/></body>
+</worldbody></mujoco>"""
 # A black room: nothing but the spot sends light to the camera.
 ROOM = """<mujoco><worldbody>
   <light directional="true" dir="0 0 -1" diffuse="0 0 0" ambient="1 1 1" specular="0 0 0"/>
