@@ -53,18 +53,21 @@ def halve(window: Patch, out: Patch) -> None:
 
 
 @njit(cache=True, fastmath=True)
-def average_rows(rows: ImageArray, start: int, out: Patch) -> None:
-    """Average 4 × 4 pixels of four rows into each entry of out, from a column on."""
-    first, second = rows[0, start:], rows[1, start:]
-    third, fourth = rows[2, start:], rows[3, start:]
-    scale = np.float32(1.0 / 16.0)
+def average_rows(rows: ImageArray, start: int, total: NDArray[np.uint16], out: Patch) -> None:
+    """Average 4 × 4 pixels of four rows into each entry of out, from a column on.
+
+    First down, then along: both loops become vector code. total is memory for four times out.
+    """
+    first, second, third, fourth = rows[0], rows[1], rows[2], rows[3]
+    begin, four, scale = np.uint64(start), np.uint64(4), np.float32(1.0 / 16.0)
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for j in range(np.uint64(4 * out.size)):
+        k = begin + j
+        total[j] = np.uint16(first[k] + second[k] + third[k] + fourth[k])
     for j in range(np.uint64(out.size)):
-        total = np.int32(0)
-        for k in range(np.uint64(4)):
-            m = np.uint64(4) * j + k
-            total += np.int32(first[m]) + np.int32(second[m])
-            total += np.int32(third[m]) + np.int32(fourth[m])
-        out[j] = scale * np.float32(total)
+        k = four * j
+        block = np.uint32(total[k] + total[k + one] + total[k + two] + total[k + three])
+        out[j] = scale * np.float32(np.int32(block))
 
 
 @njit(cache=True)
@@ -74,9 +77,10 @@ def load_quarter(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) ->
     rows, columns = out.shape
     top, left = anchor_y - 2 * rows, anchor_x - 2 * columns
     inside = left >= 0 and left + 4 * columns <= width
+    total = np.empty(4 * columns, np.uint16)
     if inside and top >= 0 and top + 4 * rows <= height:
         for i in range(rows):
-            average_rows(image[top + 4 * i : top + 4 * i + 4], left, out[i])
+            average_rows(image[top + 4 * i : top + 4 * i + 4], left, total, out[i])
         return
     part = np.empty((4, 4 * columns), np.uint8)
     for i in range(rows):
@@ -84,4 +88,4 @@ def load_quarter(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) ->
             source = image[min(max(top + 4 * i + k, 0), height - 1)]
             for j in range(4 * columns):
                 part[k, j] = source[min(max(left + j, 0), width - 1)]
-        average_rows(part, 0, out[i])
+        average_rows(part, 0, total, out[i])

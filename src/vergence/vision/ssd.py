@@ -186,15 +186,14 @@ def coarse_scores(
     ssd_surface_8(work.coarse, 4, template.coarse, POSITIONS, work.strip, work.surface)
     ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
     middle = POSITIONS // 2
-    cost = DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse)
-    wide, share = work.wide_surface, WIDE_SHARE / 4.0
+    cost = np.float32(DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse))
+    wide, share = work.wide_surface, np.float32(WIDE_SHARE / 4.0)
     for i in range(POSITIONS):
-        above, below = wide[i // 2], wide[(i + 1) // 2]
+        above, below, row = wide[i >> 1], wide[(i + 1) >> 1], work.surface[i]
         for j in range(POSITIONS):
-            left, right = j // 2, (j + 1) // 2
-            around = above[left] + above[right] + below[left] + below[right]
-            distance = (i - middle) ** 2 + (j - middle) ** 2
-            work.surface[i, j] += np.float32(share * around + cost * distance)
+            around = above[j >> 1] + above[(j + 1) >> 1] + below[j >> 1] + below[(j + 1) >> 1]
+            distance = np.float32((i - middle) ** 2 + (j - middle) ** 2)
+            row[j] += share * around + cost * distance
 
 
 @njit(cache=True)

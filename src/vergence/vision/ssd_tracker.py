@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, ImageArray, frozen
 from vergence.vision.image import grey_image
 from vergence.vision.tracker_state import (
+    AT_BORDER,
     COLUMNS,
     CONTRAST,
     CORRELATION,
@@ -33,6 +34,7 @@ from vergence.vision.tracks import Tracks, nothing_found
 _REASONS = {
     FOUND: "",
     LEFT: "left the image",
+    AT_BORDER: "left the image: no match {:.0f} px from its border",
     NO_MATCH: f"no match: correlation {{:.2f}}, below {LOST_CORRELATION}",
     DISAGREES: f"no match: alignment {{:.1f}} px from the search, above {LOST_SHIFT_PX}",
     DEFORMED: f"no match: stretched by {{:.2f}} since the last image, above {LOST_STRETCH}",

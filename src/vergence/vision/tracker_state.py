@@ -46,12 +46,13 @@ LOST_CORRELATION = 0.7
 LOST_SHIFT_PX = 2.5  # search and alignment must agree within this
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
+AT_BORDER_PX = 20.0  # a point lost when expected so near the border has probably left
 FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
 CONSENSUS = 3  # points found that say where the others may have gone
 LOOK_AGAIN_PX = 6.0  # if they moved this far at least
 FLOOR_PX = 0.02  # standard deviation that no alignment beats: interpolation, quantised grey levels
 
-FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE = range(7)
+FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(8)
 
 
 class TrackerState(NamedTuple):
@@ -249,6 +250,10 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
         if settle(image, start_x + other[0], start_y + other[1], k, state, out) == FOUND:
             return FOUND
     out[:] = answer
+    border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
+    if border < AT_BORDER_PX:
+        out[DETAIL] = max(border, 0.0)
+        return AT_BORDER
     return verdict
 
 
