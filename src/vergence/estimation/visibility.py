@@ -34,6 +34,9 @@ class Sight(IntEnum):
     BLOCKED = 5  # behind something else
 
 
+VISIBLE, BEHIND, OUTSIDE, TURNED_AWAY, HIDDEN = (int(s) for s in list(Sight)[:5])  # for kernels
+
+
 class Visibility(NamedTuple):
     """What every camera is expected to see of every feature."""
 
@@ -48,7 +51,7 @@ class Visibility(NamedTuple):
         return seen
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_of: float) -> bool:
     """Tell whether a triangle (3, 3) cuts the segment from origin to point before its end.
 
@@ -77,7 +80,7 @@ def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_
     return hit
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def faces_camera(
     origin: FloatArray, point: FloatArray, normals: FloatArray, count: int, least_cosine: float
 ) -> bool:
@@ -92,7 +95,7 @@ def faces_camera(
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def see(
     T_camera_target: FloatArray,
     lenses: FloatArray,
@@ -121,37 +124,62 @@ def see(
     sight = np.empty((cameras, features), dtype=np.uint8)
     places = np.empty((cameras, features, 2))
     depth = np.empty((cameras, features))
+    heights = plane_heights(triangles, points)
     for c in range(cameras):
         eye = se3_inverse(T_camera_target[c])[:3, 3].copy()
+        eye_heights = plane_heights(triangles, eye.reshape(1, 3))[0]
         seen = transform_points(T_camera_target[c], points)
         for m in range(features):
             z = seen[m, 2]
             depth[c, m] = z
             if not z > 0.0:
                 places[c, m] = np.nan
-                sight[c, m] = 1
+                sight[c, m] = BEHIND
                 continue
             u, v, one_to_one = lens_pixel(lenses[c], seen[m, 0] / z, seen[m, 1] / z)
             places[c, m, 0], places[c, m, 1] = u, v
             if not (one_to_one and in_picture(lenses[c], u, v, margin_px)):
-                sight[c, m] = 2
+                sight[c, m] = OUTSIDE
             elif not faces_camera(eye, points[m], normals[m], face_counts[m], least_cosine):
-                sight[c, m] = 3
-            elif _hidden(eye, points[m], triangles, touching):
-                sight[c, m] = 4
+                sight[c, m] = TURNED_AWAY
+            elif _hidden(eye, points[m], triangles, eye_heights, heights[m], touching):
+                sight[c, m] = HIDDEN
             else:
-                sight[c, m] = 0
+                sight[c, m] = VISIBLE
     return sight, places, depth
 
 
-@njit(cache=True)
-def _hidden(eye: FloatArray, point: FloatArray, triangles: FloatArray, touching: float) -> bool:
-    distance = 0.0
-    for i in range(3):
-        distance += (eye[i] - point[i]) ** 2
-    short_of = touching / np.sqrt(distance)
-    for n in range(len(triangles)):  # noqa: SIM110 (a kernel knows no generators)
-        if ray_hits(eye, point, triangles[n], short_of):
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def plane_heights(triangles: FloatArray, points: FloatArray) -> FloatArray:
+    """Return how high points (N, 3) lie over the planes of triangles (F, 3, 3), (N, F), scaled."""
+    heights = np.empty((len(points), len(triangles)))
+    for f in range(len(triangles)):
+        a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        fx, fy, fz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+        for n in range(len(points)):
+            p = points[n]
+            heights[n, f] = nx * (p[0] - a[0]) + ny * (p[1] - a[1]) + nz * (p[2] - a[2])
+    return heights
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _hidden(
+    eye: FloatArray,
+    point: FloatArray,
+    triangles: FloatArray,
+    eye_heights: FloatArray,
+    heights: FloatArray,
+    touching: float,
+) -> bool:
+    """Tell whether a triangle stands between; most have both ends on one side of their plane."""
+    x, y, z = eye[0] - point[0], eye[1] - point[1], eye[2] - point[2]
+    short_of = touching / np.sqrt(x * x + y * y + z * z)
+    for n in range(len(triangles)):
+        e, h = eye_heights[n], heights[n]
+        crossed = e * h < 0.0 and abs(h) > short_of * (abs(e) + abs(h))
+        if crossed and ray_hits(eye, point, triangles[n], short_of):
             return True
     return False
 
