@@ -159,7 +159,7 @@ def track(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Follow a known object through footage: poses, covariances, an overlay film. No robot needed."""
+    """Follow a known object through footage: poses, covariances, an overlay film."""
     from vergence.app.track import Request
     from vergence.app.track import track as command
 

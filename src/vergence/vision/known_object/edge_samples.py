@@ -100,6 +100,44 @@ def sample_edges(
 
 
 @njit(cache=True)
+def without_doubles(samples: EdgeSamples, apart_px: float) -> EdgeSamples:
+    """Leave out the places that another edge runs beside, for one would be taken for the other.
+
+    So it is where a face is seen at a grazing angle. If that would leave less than half of the
+    places, all of them stay.
+
+    Args:
+        samples: on the edges.
+        apart_px: how far to the side another edge has to be.
+    """
+    count = len(samples.edge)
+    alone = np.ones(count, dtype=np.bool_)
+    for n in range(count):
+        p, normal = samples.points_px[n], samples.normals[n]
+        for m in range(count):
+            if samples.edge[m] == samples.edge[n]:
+                continue
+            du, dv = samples.points_px[m, 0] - p[0], samples.points_px[m, 1] - p[1]
+            if abs(du) > 1.5 * apart_px or abs(dv) > 1.5 * apart_px:
+                continue
+            across = abs(du * normal[0] + dv * normal[1])
+            along = abs(dv * normal[0] - du * normal[1])
+            parallel = normal[0] * samples.normals[m, 0] + normal[1] * samples.normals[m, 1]
+            if 0.5 < across < apart_px and along < apart_px and abs(parallel) > 0.9:
+                alone[n] = False
+                break
+    if 2 * np.count_nonzero(alone) < count:
+        return samples
+    return EdgeSamples(
+        samples.edge[alone],
+        samples.place[alone],
+        samples.points[alone],
+        samples.points_px[alone],
+        samples.normals[alone],
+    )
+
+
+@njit(cache=True)
 def search_steps(
     image: ImageArray,
     samples: EdgeSamples,

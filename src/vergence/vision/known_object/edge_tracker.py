@@ -17,12 +17,14 @@ from vergence.vision.known_object.edge_samples import (
     sample_edges,
     search_steps,
     vote_shift,
+    without_doubles,
 )
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.pose_fit import PoseFit, agreeing, fit_pose, shifted
 from vergence.vision.known_object.projection import lens_of, pixel_rows
 
 _FINE_REACH_PX = 5
+_DOUBLE_PX = 5.0  # edges nearer to each other are not told apart
 _MOST_SAMPLES = 800  # over all edges
 _LEARNED_PX = 1.0
 _REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
@@ -158,7 +160,7 @@ class EdgeTracker:
 
     def _samples(self, T: FloatArray, lens: FloatArray) -> EdgeSamples:
         model = self.model
-        samples: EdgeSamples = sample_edges(
+        samples = sample_edges(
             np.ascontiguousarray(T),
             lens,
             model.edges,
@@ -166,7 +168,8 @@ class EdgeTracker:
             model.surface,
             self.places,
         )
-        return samples
+        alone: EdgeSamples = without_doubles(samples, _DOUBLE_PX)
+        return alone
 
     def _search(
         self, image: ImageArray, samples: EdgeSamples, reach: int, memory: EdgeMemory
