@@ -186,14 +186,22 @@ def coarse_scores(
     ssd_surface_8(work.coarse, 4, template.coarse, POSITIONS, work.strip, work.surface)
     ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
     middle = POSITIONS // 2
-    cost = np.float32(DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse))
-    wide, share = work.wide_surface, np.float32(WIDE_SHARE / 4.0)
-    for i in range(POSITIONS):
-        above, below, row = wide[i >> 1], wide[(i + 1) >> 1], work.surface[i]
-        for j in range(POSITIONS):
-            around = above[j >> 1] + above[(j + 1) >> 1] + below[j >> 1] + below[(j + 1) >> 1]
-            distance = np.float32((i - middle) ** 2 + (j - middle) ** 2)
-            row[j] += share * around + cost * distance
+    cost = DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse)
+    add_surroundings(work.surface, work.wide_surface, np.float32(cost))
+
+
+@njit(cache=True, fastmath=True)
+def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
+    """Add the wide level's SSD, interpolated, and the cost of distance to the coarse level's."""
+    share, one = np.float32(WIDE_SHARE / 4.0), np.uint64(1)
+    for i in range(np.uint64(POSITIONS)):
+        above, below, row = wide[i >> one], wide[(i + one) >> one], surface[i]
+        away = np.float32(np.int32(i) - POSITIONS // 2)
+        for j in range(np.uint64(POSITIONS)):
+            left, right = j >> one, (j + one) >> one
+            aside = np.float32(np.int32(j) - POSITIONS // 2)
+            around = above[left] + above[right] + below[left] + below[right]
+            row[j] += share * around + cost * (away * away + aside * aside)
 
 
 @njit(cache=True)
