@@ -193,6 +193,22 @@ def test_lost_target_is_admitted_and_found_again():
     assert error(observation.target, slow)[0] < 0.003
 
 
+def test_lost_target_is_looked_for_where_it_was_seen_last():
+    # It stops in the dark; where it would be had it gone on is out of reach of the windows.
+    def stopping(time):
+        T = moving(0.0)
+        T[0, 3] += 0.25 * min(time, 1.05)
+        return T
+
+    cell = Cell(motion=stopping)
+    cell.dark = lambda camera, time: 1.0 < time < 2.5
+    perception = cell.perception()
+    for _, frames in cell.frames_until(3.0):
+        observation = perception.observe(frames)
+    assert perception.lost == ""
+    assert error(observation.target, stopping)[0] < 0.003
+
+
 def test_target_that_jumped_away_is_found_over_the_whole_picture():
     jump = np.array([0.25, -0.2, 0.1])
 

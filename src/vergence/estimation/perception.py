@@ -111,6 +111,7 @@ class PosePerception(Generic[B]):
         self._filter = target_filter
         self._history = FilterHistory(target_filter, start, self._settings.horizon)
         self._patience_from = start.time
+        self._last_seen = start
         self._held: dict[str, BoolArray] = {}
         self._lost = ""
 
@@ -153,7 +154,7 @@ class PosePerception(Generic[B]):
     def _expect(self, frame: Frame) -> _Picture:
         require_size(frame, self._rig)
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
-        belief = self._history.belief if self._lost else self._history.at(frame.time)
+        belief = self._last_seen if self._lost else self._history.at(frame.time)
         doubt = belief.disagreeing
         return _Picture(
             frame,
@@ -250,6 +251,8 @@ class PosePerception(Generic[B]):
         """Give a target up that contradicts too long; look for one that was given up."""
         belief = self._history.belief
         if not self._lost:
+            if belief.seen == belief.time:
+                self._last_seen = belief
             unseen = time - max(belief.seen, self._patience_from)
             if belief.doubts >= self._settings.lost_doubts:
                 self._lost = f"{belief.doubts} pictures in a row contradict the prediction"
