@@ -111,6 +111,8 @@ def constrained_rates(
         active[kind] += solution.active[i]
         given_up[kind] = max(given_up[kind], solution.given_up[i])
     rates = solution.x
+    for i in range(n):  # the solver's rounding must not pass a hard bound either
+        rates[i] = min(max(rates[i], rows.d[2 * i + 1]), -rows.d[2 * i])
     solved = solution.solved and bool(np.isfinite(rates).all())
     if not solved:
         rates = velocity - np.minimum(np.maximum(velocity, -limits[3] * period), limits[3] * period)

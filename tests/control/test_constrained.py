@@ -1,0 +1,188 @@
+"""The constrained law keeps its promises: joints always, view and singularities in order."""
+
+import numpy as np
+import pytest
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control.constrained import ConstrainedLaw
+from vergence.control.constraints import (
+    HARD,
+    JOINT_MARGIN,
+    KIND_NAMES,
+    SINGULARITY,
+    VIEW,
+    constraint_rows,
+)
+from vergence.control.image_based import ImageBased
+from vergence.errors import InputError
+from vergence.features import (
+    ImagePoints,
+    Observation,
+    interaction_matrix_points,
+)
+from vergence.planning import Reference
+from vergence.robot import JointState, yoshikawa_measure
+
+SQUARE = [[0.05, 0.05, 0.0], [-0.05, 0.05, 0.0], [-0.05, -0.05, 0.0], [0.05, -0.05, 0.0]]
+PERIOD = 1 / 30
+
+
+@pytest.fixture(scope="module")
+def scene():
+    driver = SimulatedDriver(load_cell("puma560").replace(target={"features": SQUARE}), False)
+    truth = driver.first_frame("wrist").truth
+    q = driver.read().joints["puma"].position
+    return driver.world.arm_to_camera("wrist"), driver.cameras["wrist"], truth, q
+
+
+def law_for(scene, **settings):
+    arm, camera, truth, _ = scene
+    return ConstrainedLaw(arm, camera, ImageBased(camera, gain=2.0), truth.depth_m, **settings)
+
+
+def observe(camera, points_px, time=0.0):
+    m = len(points_px)
+    covariance = np.zeros((m, 2, 2))
+    view = ImagePoints("wrist", time, points_px, covariance, np.ones(m, bool), ("",) * m)
+    return Observation(time, (view,))
+
+
+def project(arm, camera, q, points_world):
+    T = np.linalg.inv(arm.forward_kinematics(q))
+    return camera.project(points_world @ T[:3, :3].T + T[:3, 3])
+
+
+def closed_loop(scene, desired_px, ticks=240, q=None, **settings):
+    """Run the law on ideal joints; return joints (K, n), features (K, M, 2), what was active."""
+    arm, camera, truth, start = scene
+    q = start.copy() if q is None else q.copy()
+    corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    law = law_for(scene, **settings)
+    joints, features, active, rates = [], [], [], np.zeros(arm.joint_count)
+    for k in range(ticks):
+        time = k * PERIOD
+        points = project(arm, camera, q, corners)
+        command = law.command(
+            observe(camera, points, time), Reference(time, desired_px), JointState(time, q, rates)
+        )
+        excess = np.abs(command.velocity - rates) - arm.acceleration_max * PERIOD
+        assert excess.max() < 1e-9
+        rates = command.velocity
+        q = q + PERIOD * rates
+        joints.append(q)
+        features.append(points)
+        active.append(command.active)
+    return np.array(joints), np.array(features), active
+
+
+def test_a_goal_inside_every_limit_is_reached(scene):
+    wanted = scene[2].points_px + (60.0, -40.0)
+    _, features, _ = closed_loop(scene, wanted)
+    assert np.abs(features[-1] - wanted).max() < 0.1
+
+
+@pytest.mark.parametrize("depth_error", [0.3, 1.0, 3.0])
+def test_features_stay_in_view_although_the_goal_is_outside(scene, depth_error):
+    arm, camera, truth, q = scene
+    law_depth = truth.depth_m * depth_error
+    wanted = truth.points_px + (400.0, 0.0)
+    corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    law = ConstrainedLaw(
+        arm, camera, ImageBased(camera, 2.0), law_depth, depth_range=(0.3, 3.4), view_margin_px=10.0
+    )
+    rates = np.zeros(6)
+    for k in range(150):
+        time = k * PERIOD
+        points = project(arm, camera, q, corners)
+        assert camera.contains(points, 5.0).all()
+        rates = law.command(
+            observe(camera, points, time), Reference(time, wanted), JointState(time, q, rates)
+        ).velocity
+        q = q + PERIOD * rates
+    assert points[:, 0].max() > camera.width - 40
+
+
+def test_joint_limits_hold_where_the_goal_lies_beyond_them(scene):
+    arm, camera, truth, q = scene
+    rolled = q.copy()
+    rolled[5] = arm.q_max[5] + 0.8
+    corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    near = q.copy()
+    near[5] = arm.q_max[5] - 0.3
+    joints, _, active = closed_loop(scene, project(arm, camera, rolled, corners), q=near)
+    assert (joints <= arm.q_max + 1e-12).all()
+    assert (joints >= arm.q_min - 1e-12).all()
+    assert (np.abs(np.diff(joints, axis=0)) <= arm.rate_max * PERIOD + 1e-12).all()
+    assert any("joint margin" in names for names in active)
+
+
+def test_distance_from_a_singularity_is_kept(scene):
+    arm, camera, truth, q = scene
+    corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    straight = q.copy()
+    straight[4] = 0.0
+    lowest = 0.6 * yoshikawa_measure(arm.jacobian(q))
+    wanted = project(arm, camera, straight, corners)
+    joints, _, active = closed_loop(scene, wanted, manipulability_min=lowest)
+    measures = [yoshikawa_measure(arm.jacobian(row)) for row in joints]
+    assert min(measures) > 0.97 * lowest
+    assert any("singularity" in names for names in active)
+
+
+def test_a_start_outside_a_soft_limit_is_brought_back_smoothly(scene):
+    arm, _, truth, q = scene
+    outside = q.copy()
+    outside[4] = arm.q_min[4] + 0.005 * (arm.q_max[4] - arm.q_min[4])
+    joints, _, _ = closed_loop(scene, truth.points_px, q=outside, order=("joint margin", "view"))
+    inside = arm.q_min[4] + 0.03 * (arm.q_max[4] - arm.q_min[4])
+    assert joints[-1, 4] > inside - 0.01
+    still_outside = joints[:-1, 4] < inside
+    assert still_outside.any()
+    assert (np.diff(joints[:, 4])[still_outside] > 0).all()
+
+
+def test_a_conflict_names_what_was_given_up(scene):
+    _, camera, truth, q = scene
+    law = law_for(scene, view_margin_px=235.0, order=("singularity", "view"))
+    command = law.command(
+        observe(camera, truth.points_px), Reference(0.0, truth.points_px), JointState(0, q, 0 * q)
+    )
+    assert any(name.startswith("view given up by") for name in command.active)
+    assert np.isfinite(command.velocity).all()
+
+
+def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
+    arm, camera, truth, q = scene
+    law = law_for(scene, manipulability_min=1e-3)
+    settings = law._settings
+    points = camera.normalize(truth.points_px)
+    L = interaction_matrix_points(points, truth.depth_m)
+    J = arm.jacobian(q)
+    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    step = 1e-6 * np.eye(6)
+    slope = np.array(
+        [
+            (yoshikawa_measure(arm.jacobian(q + e)) - yoshikawa_measure(arm.jacobian(q - e))) / 2e-6
+            for e in step
+        ]
+    )
+    w = yoshikawa_measure(J)
+    rows = constraint_rows(
+        q, 0 * q, limits, PERIOD, L[:, :3].copy(), L[:, 3:].copy(), J, points, 0 * points, w, slope,
+        settings._replace(depth_low=1.0, depth_high=1.0),
+    )  # fmt: skip
+    corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    for i, e in enumerate(step):
+        moved = camera.normalize(project(arm, camera, q + e, corners))
+        back = camera.normalize(project(arm, camera, q - e, corners))
+        view = rows.C[rows.kind == VIEW, i].reshape(4, 2, 2, 2)
+        np.testing.assert_allclose(view[:, :, 0, 0], (moved - back) / 2e-6, atol=1e-6)
+        np.testing.assert_allclose(view[:, :, 1, 0], -(moved - back) / 2e-6, atol=1e-6)
+    np.testing.assert_array_equal(rows.C[rows.kind == SINGULARITY][0], slope)
+    assert set(rows.kind) == {HARD, JOINT_MARGIN, VIEW, SINGULARITY}
+
+
+def test_unknown_constraints_are_refused_with_the_nearest_name(scene):
+    with pytest.raises(InputError, match="did you mean view"):
+        law_for(scene, order=("vieww",))
+    assert len(KIND_NAMES) == 4
