@@ -125,6 +125,20 @@ def test_noise_is_per_frame_whatever_the_step():
     np.testing.assert_allclose(np.diag(once)[6:], [5e-6] * 3 + [2e-5] * 3)
 
 
+def test_start_at_the_pole_is_no_error():
+    pole = se3(rpy_to_matrix(np.array([0.2, np.pi / 2, 0.0])), np.zeros(3))
+    belief = RpyPoseFilter().start(0.0, pole, np.full(6, 0.1))
+    np.testing.assert_allclose(belief.T_world_target, pole, atol=1e-12)
+    assert np.isfinite(belief.covariance).all()
+
+
+def test_covariance_given_along_world_axes_comes_back():
+    root = np.random.default_rng(7).standard_normal((12, 12))
+    given = root @ root.T
+    belief = RpyPoseFilter().start(0.0, moving(0.6), np.full(6, 0.3), given)
+    np.testing.assert_allclose(belief.covariance, given, atol=1e-10)
+
+
 def test_bad_settings_are_refused():
     with pytest.raises(InputError, match="frame_period"):
         RpyPoseFilter(frame_period=0.0)

@@ -116,8 +116,8 @@ class RpyPoseFilter:
         rpy = matrix_to_rpy(pose)
         w = np.concatenate((pose[:3, 3], rpy, twist))
         if twist[3:].any():
-            w[9:] = np.linalg.solve(rpy_rates_to_omega(rpy), twist[3:])
-        to_state = np.linalg.inv(twist_jacobian(w))
+            w[9:] = np.linalg.pinv(rpy_rates_to_omega(rpy)) @ twist[3:]
+        to_state = np.linalg.pinv(twist_jacobian(w))  # singular at pitch ±90°, yet no error
         return RpyBelief(time, w, to_state @ covariance @ to_state.T)
 
     def predict(self, belief: RpyBelief, time: float) -> RpyBelief:
