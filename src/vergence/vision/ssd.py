@@ -27,7 +27,7 @@ MIDDLE_REACH = 3  # middle pixels searched around each of them
 FULL_REACH = 2  # pixels searched around the middle minimum
 WIDE_SHARE = 1.0  # weight of the surroundings against the coarse template
 DISTANCE_COST = 0.6  # at 32 px, in units of the template's variance
-WORTH_FOLLOWING = 3.0  # times the best sum so far: candidates followed to full resolution
+WORTH_FOLLOWING = 2.0  # times the best sum so far: candidates followed to full resolution
 
 SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None]
 
@@ -187,13 +187,13 @@ def coarse_scores(
     ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
     middle = POSITIONS // 2
     cost = DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse)
-    add_surroundings(work.surface, work.wide_surface, np.float32(cost))
+    add_surroundings(work.surface, work.wide_surface, float(cost))
 
 
 @njit(cache=True, fastmath=True)
 def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
     """Add the wide level's SSD, interpolated, and the cost of distance to the coarse level's."""
-    share, one = np.float32(WIDE_SHARE / 4.0), np.uint64(1)
+    share, one, cost32 = np.float32(WIDE_SHARE / 4.0), np.uint64(1), np.float32(cost)
     for i in range(np.uint64(POSITIONS)):
         above, below, row = wide[i >> one], wide[(i + one) >> one], surface[i]
         away = np.float32(np.int32(i) - POSITIONS // 2)
@@ -201,7 +201,7 @@ def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
             left, right = j >> one, (j + one) >> one
             aside = np.float32(np.int32(j) - POSITIONS // 2)
             around = above[left] + above[right] + below[left] + below[right]
-            row[j] += share * around + cost * (away * away + aside * aside)
+            row[j] += share * around + cost32 * (away * away + aside * aside)
 
 
 @njit(cache=True)
