@@ -18,7 +18,12 @@ from vergence.robot import (
     transmissibility_measure,
     yoshikawa_measure,
 )
-from vergence.robot.positive_definite import invert_spd, outer_square
+from vergence.robot.positive_definite import (
+    factor_spd,
+    invert_spd,
+    outer_square,
+    solve_factored,
+)
 
 STEP = 1e-6
 K = {True: 50.0, False: 1e5}  # steepness of the penalty: per joint, as a product
@@ -239,13 +244,18 @@ def test_the_inverse_is_damped_only_below_its_threshold() -> None:
 
 
 @pytest.mark.parametrize("condition", [1.0, 1e3, 1e8])
-def test_the_sweep_inverts_and_takes_the_determinant(condition: float) -> None:
+def test_the_sweep_inverts_and_the_factors_solve(condition: float) -> None:
     rng = np.random.default_rng(22)
     for _ in range(10):
         basis, _ = np.linalg.qr(rng.normal(size=(6, 6)))
         values = np.geomspace(1.0, condition, 6)
         A = basis * values @ basis.T
         inverse, determinant = invert_spd(A)
+        factors, x = A.copy(), rng.normal(size=6)
+        factor_spd(factors)
+        b = A @ x
+        solve_factored(factors, b)
+        np.testing.assert_allclose(b, x, atol=1e-13 * condition)
         np.testing.assert_allclose(inverse @ A, np.eye(6), atol=1e-13 * condition)
         assert determinant == pytest.approx(np.prod(values), rel=1e-13 * condition)
 

@@ -16,7 +16,7 @@ from vergence.robot.manipulability import (
     measure_gradient,
     posture,
 )
-from vergence.robot.positive_definite import invert_spd, outer_square, times_six
+from vergence.robot.positive_definite import factor_spd, outer_square, solve_factored
 
 
 class TrackingGains(NamedTuple):
@@ -75,23 +75,23 @@ def tracking_displacement(
         w: w'(q).
         gradient: ∂w'/∂x along the camera's axes, (6,), per m and per rad.
     """
-    H, g = outer_square(B.T), np.zeros(6)
+    H, u = outer_square(B.T), np.zeros(6)
     for r in range(len(B)):
         for i in range(6):
-            g[i] -= B[r, i] * error_px[r]
+            u[i] -= B[r, i] * error_px[r]
     for i in range(6):
         weight = gains.Q * gains.controlled[i]
-        g[i] *= weight
+        u[i] *= weight
         for j in range(6):
             H[i, j] *= weight * gains.controlled[j]
         H[i, i] += gains.R[i]
-    inverse = invert_spd(H)[0]
-    u = times_six(inverse, g)
+    factor_spd(H)
+    solve_factored(H, u)
     if gains.S > 0.0 and w > 0.0:
-        scale = gains.S / (2.0 * w * w) * gains.period
+        away, scale = np.empty(6), gains.S / (2.0 * w * w) * gains.period
         for i in range(6):
-            g[i] = scale * gradient[i] * gains.avoiding[i] * gains.controlled[i]
-        away = times_six(inverse, g)
+            away[i] = scale * gradient[i] * gains.avoiding[i] * gains.controlled[i]
+        solve_factored(H, away)
         size = 0.0
         for i in range(6):
             size += away[i] * away[i]

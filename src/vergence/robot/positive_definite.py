@@ -1,6 +1,7 @@
-"""Symmetric positive definite matrices of six axes: inverse and determinant in one sweep.
+"""Symmetric positive definite matrices: inverse and determinant in one sweep.
 
-Loops of constant length six, one division a pivot: a third of what a call of LAPACK takes.
+For the six axes of a twist loops of constant length six, one division a pivot: a third of what a
+call of LAPACK takes.
 """
 
 import numpy as np
@@ -36,6 +37,57 @@ def invert_spd(A: FloatArray) -> tuple[FloatArray, float]:
                 for j in range(6):
                     inverse[i, j] -= factor * inverse[k, j]
     return inverse, determinant
+
+
+@njit(cache=True, error_model="numpy")
+def invert_spd_any(A: FloatArray) -> FloatArray:
+    """Return A⁻¹ (n, n) for as many joints as there are, with `invert_spd`'s care for pivots."""
+    n = len(A)
+    if n == 6:
+        inverse: FloatArray = invert_spd(A)[0]
+        return inverse
+    inverse = A.copy()
+    trace = 1e-280
+    for i in range(n):
+        trace += A[i, i]
+    for k in range(n):
+        scale = 1.0 / max(inverse[k, k], _PIVOT_FLOOR * trace)
+        for j in range(n):
+            inverse[k, j] *= scale
+        inverse[k, k] = scale
+        for i in range(n):
+            if i != k:
+                factor = inverse[i, k]
+                inverse[i, k] = 0.0
+                for j in range(n):
+                    inverse[i, j] -= factor * inverse[k, j]
+    return inverse
+
+
+@njit(cache=True, error_model="numpy")
+def factor_spd(A: FloatArray) -> None:
+    """Turn A (6, 6) into its factors in place, A = L D Lᵀ: L below the diagonal, D⁻¹ on it."""
+    for k in range(6):
+        A[k, k] = 1.0 / A[k, k]
+        for i in range(k + 1, 6):
+            factor = A[i, k] * A[k, k]
+            for j in range(k + 1, i + 1):
+                A[i, j] -= factor * A[j, k]
+        for i in range(k + 1, 6):
+            A[i, k] *= A[k, k]
+
+
+@njit(cache=True, error_model="numpy")
+def solve_factored(L: FloatArray, b: FloatArray) -> None:
+    """Replace b (6,) by A⁻¹ b, given what `factor_spd` made of A."""
+    for i in range(1, 6):
+        for j in range(i):
+            b[i] -= L[i, j] * b[j]
+    for i in range(6):
+        b[i] *= L[i, i]
+    for i in range(4, -1, -1):
+        for j in range(i + 1, 6):
+            b[i] -= L[j, i] * b[j]
 
 
 @njit(cache=True, error_model="numpy")
