@@ -23,7 +23,7 @@ from vergence.features import Observation, interaction_matrix_points
 from vergence.planning import Reference
 from vergence.robot import Arm, Chain, JointState, manipulability
 from vergence.robot.manipulability import determinant_gradient
-from vergence.robot.positive_definite import invert_spd
+from vergence.robot.positive_definite import invert_spd_any
 
 
 class Avoidance(NamedTuple):
@@ -78,7 +78,7 @@ def constrained_rates(
         for j in range(n):
             for k in range(6):
                 H[i, j] += J[k, i] * HJ[k, j]
-    H_inverse = invert_spd(H)[0]
+    H_inverse = invert_spd_any(H)
     if avoidance.S > 0.0 and m.value > 0.0:
         pull = avoidance.S * period * period / (2.0 * m.value * m.value) * m.gradient_q
         rate = H_inverse @ pull
