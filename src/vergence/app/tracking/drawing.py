@@ -55,7 +55,8 @@ def _edges(
 ) -> None:
     import cv2
 
-    seen = sample_edges(T, lens_of(camera), model.edges, model.edge_normals, model.surface, _PLACES)
+    places = np.full(len(model.edges), _PLACES)
+    seen = sample_edges(T, lens_of(camera), model.edges, model.edge_normals, model.surface, places)
     along = (np.diff(seen.edge) == 0) & (np.diff(seen.place) == 1)
     for n in np.flatnonzero(along):
         ends = _fixed(seen.points_px[n]), _fixed(seen.points_px[n + 1])

@@ -15,7 +15,8 @@ from vergence.vision.known_object.pose_fit import PoseFit
 from vergence.vision.known_object.profiles import SHARP_WIDTH
 from vergence.vision.known_object.projection import pixel_rows
 
-LEAST_SAMPLES = 4
+LEAST_SAMPLES = 4  # for a direction
+LONG = 6  # samples from which on an edge says all it can: shorter ones share their bias with others
 BLUR_SHARE = 0.25  # of its width beyond a sharp edge's, by which a blurred edge may be wrong
 SLIDING_PX = 100.0  # standard deviation along an edge
 
@@ -29,7 +30,7 @@ def edge_points(
     found: BoolArray,
     bias_px: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return points (M, 3), places (M, 2) and covariances (M, 2, 2), two for each edge seen.
+    """Return points (M, 3), places (M, 2), covariances (M, 2, 2): two an edge, one a short one.
 
     Args:
         fit: the pose fitted to the picture; only what the picture says is handed on, not the pose.
@@ -85,7 +86,7 @@ def _line(
     places: FloatArray,
     covariances: FloatArray,
 ) -> int:
-    """Fill the two points of one edge, samples first … last - 1; return 2, or 0 if it has none."""
+    """Fill the two points of one edge, samples first … last - 1; return how many."""
     nu, nv, width = 0.0, 0.0, 0.0
     n, ss, so, sss, sso, soo = 0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -104,15 +105,25 @@ def _line(
             sss += s * s
             sso += s * o
             soo += o * o
-    if n < LEAST_SAMPLES:
+    if n == 0:
         return 0
     middle, spread = ss / n, sss - ss * ss / n
-    if spread < 4.0 * n:  # shorter than a few pixels
-        return 0
+    blur = BLUR_SHARE * max(width / n - SHARP_WIDTH, 0.0)
+    systematic = (bias_px**2 + blur**2) * max(1.0, LONG / n)
+    if n < LEAST_SAMPLES or spread < 4.0 * n:  # too short for a direction: one place tells it
+        middle_sample = first
+        for i in range(first, last):
+            if found[i]:
+                middle_sample = i
+        points[0] = samples.points[middle_sample]
+        offset = so / n
+        places[0, 0] = pixels[middle_sample, 0] + offset * nu
+        places[0, 1] = pixels[middle_sample, 1] + offset * nv
+        _fill(covariances[0], fit.spread_px**2 / n + systematic, nu, nv)
+        return 1
     slope = (sso - ss * so / n) / spread
     residual = max(soo - so * so / n - slope * slope * spread, 0.0) / (n - 2)
-    blur = BLUR_SHARE * max(width / n - SHARP_WIDTH, 0.0)
-    variance = 2.0 * max(residual, fit.spread_px**2) / n + bias_px**2 + blur**2
+    variance = 2.0 * max(residual, fit.spread_px**2) / n + systematic
     rows = np.empty((2, 6))
     for k in range(2):
         wanted = middle + (2 * k - 1) * np.sqrt(spread / n)
@@ -138,8 +149,14 @@ def _line(
         s = nv * (u - pixels[first, 0]) - nu * (v - pixels[first, 1])
         offset = so / n + slope * (s - middle)
         places[k, 0], places[k, 1] = u + offset * nu, v + offset * nv
-        along = SLIDING_PX**2
-        covariances[k, 0, 0] = variance * nu * nu + along * nv * nv
-        covariances[k, 1, 1] = variance * nv * nv + along * nu * nu
-        covariances[k, 0, 1] = covariances[k, 1, 0] = (variance - along) * nu * nv
+        _fill(covariances[k], variance, nu, nv)
     return 2
+
+
+@njit(cache=True)
+def _fill(covariance: FloatArray, across: float, nu: float, nv: float) -> None:
+    """Fill a covariance (2, 2) with a variance across an edge, and a large one along it."""
+    along = SLIDING_PX**2
+    covariance[0, 0] = across * nu * nu + along * nv * nv
+    covariance[1, 1] = across * nv * nv + along * nu * nu
+    covariance[0, 1] = covariance[1, 0] = (across - along) * nu * nv

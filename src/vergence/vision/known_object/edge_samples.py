@@ -53,7 +53,7 @@ def sample_edges(
     edges: FloatArray,
     edge_normals: FloatArray,
     surface: FloatArray,
-    places: int,
+    places: IntArray,
 ) -> EdgeSamples:
     """Return the places on sharp edges that are seen under a pose.
 
@@ -63,17 +63,17 @@ def sample_edges(
         edges: ends of the sharp edges, (E, 2, 3), m.
         edge_normals: of the faces at each, (E, 2, 3).
         surface: triangles that hide, (F, 3, 3), m.
-        places: how many places an edge has, evenly spaced.
+        places: how many places each edge has, evenly spaced, (E,).
     """
-    most = len(edges) * places
+    most = int(np.sum(places))
     edge, place = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
     points, pixels, normals = np.empty((most, 3)), np.empty((most, 2)), np.empty((most, 2))
     table = face_table(T, surface)
     count = 0
     for e in range(len(edges)):
         along = edges[e, 1] - edges[e, 0]
-        for k in range(places):
-            X = edges[e, 0] + ((k + 0.5) / places) * along
+        for k in range(places[e]):
+            X = edges[e, 0] + ((k + 0.5) / places[e]) * along
             x, y, z = in_camera(T, X)
             if z <= 1e-6 or not edge_faces_camera(T, X, edge_normals[e], LEAST_COSINE):
                 continue

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.vision.known_object.corner_extractor import require_image
@@ -25,7 +25,8 @@ from vergence.vision.known_object.projection import lens_of, pixel_rows
 
 _FINE_REACH_PX = 5
 _DOUBLE_PX = 5.0  # edges nearer to each other are not told apart
-_MOST_SAMPLES = 800  # over all edges
+_MOST_SAMPLES = 400  # over all edges
+_MOST_PLACES = 40  # of an edge
 _LEARNED_PX = 1.0
 _REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
 
@@ -82,13 +83,16 @@ class EdgeTracker:
             raise InputError(self.model.name, "edges", "none", allowed)
 
     @property
-    def places(self) -> int:
-        """How many places an edge has."""
-        return int(np.clip(_MOST_SAMPLES // len(self.model.edges), 6, 30))
+    def places(self) -> IntArray:
+        """How many places each edge has, (E,): as many as its length is worth."""
+        length = np.linalg.norm(self.model.edges[:, 1] - self.model.edges[:, 0], axis=1)
+        share = length / length.sum()
+        places: IntArray = np.clip(np.rint(_MOST_SAMPLES * share), 1, _MOST_PLACES).astype(np.int64)
+        return places
 
     def blank(self) -> EdgeMemory:
         """Return the memory before the first picture."""
-        shape = (len(self.model.edges), self.places)
+        shape = (len(self.model.edges), int(self.places.max()))
         return EdgeMemory(np.zeros((*shape, 2 * TEMPLATE + 1)), np.zeros(shape, dtype=np.bool_))
 
     def measure(
@@ -115,12 +119,13 @@ class EdgeTracker:
         require_image(image, camera)
         lens = lens_of(camera)
         prior = np.asarray(np.linalg.inv(pose_covariance), dtype=np.float64)
-        samples = self._samples(T_camera_target, lens)
+        samples = self._samples(T_camera_target, lens, _DOUBLE_PX)
         reach = self._reach(T_camera_target, lens, samples, pose_covariance)
         steps = self._search(image, samples, reach, memory)
         start = shifted(T_camera_target, lens, *vote_shift(samples, steps, reach))
         fit = fit_pose(start, T_camera_target, prior, lens, samples, steps, 3.0, 1.0, 12)
-        samples = self._samples(fit.T, lens)
+        blur = _width(fit, steps)
+        samples = self._samples(fit.T, lens, max(_DOUBLE_PX, blur))
         steps = self._search(image, samples, _FINE_REACH_PX, memory)
         fit = fit_pose(fit.T, T_camera_target, prior, lens, samples, steps, 1.5, 0.6, 8)
         found = agreeing(fit, steps, self.likeness, 1.5)
@@ -158,7 +163,7 @@ class EdgeTracker:
         known[at] = True
         return EdgeMemory(templates, known)
 
-    def _samples(self, T: FloatArray, lens: FloatArray) -> EdgeSamples:
+    def _samples(self, T: FloatArray, lens: FloatArray, apart_px: float) -> EdgeSamples:
         model = self.model
         samples = sample_edges(
             np.ascontiguousarray(T),
@@ -168,7 +173,7 @@ class EdgeTracker:
             model.surface,
             self.places,
         )
-        alone: EdgeSamples = without_doubles(samples, _DOUBLE_PX)
+        alone: EdgeSamples = without_doubles(samples, apart_px)
         return alone
 
     def _search(
@@ -196,3 +201,11 @@ class EdgeTracker:
             widest = max(widest, float(across @ covariance @ across))
         wanted = 3.0 * np.sqrt(widest) + 3.0
         return int(np.clip(wanted, self.least_reach_px, self.most_reach_px))
+
+
+def _width(fit: PoseFit, steps: Steps) -> float:
+    """How wide the steps are that belong to edges, px: what is nearer is blurred into one."""
+    rows = np.flatnonzero(fit.chosen >= 0)
+    if not len(rows):
+        return 0.0
+    return float(np.median(steps.widths[rows, fit.chosen[rows]])) + 2.0
