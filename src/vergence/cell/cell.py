@@ -56,9 +56,10 @@ class Cell(Table):
         """The rate of the fastest camera."""
         return max(camera.rate_hz for camera in self.cameras.values())
 
-    def resolve(self, model: Path) -> Path:
-        """Return a model's path as seen from the cell's file."""
-        return model if model.is_absolute() else self._path.parent / model
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """The cameras whose pictures are looked at: all, unless the file names some."""
+        return self.perception.cameras or tuple(self.cameras)
 
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some tables replaced; nested keys by dictionaries, as in the file."""
