@@ -83,31 +83,35 @@ def joseph_update(P: FloatArray, reduced: FloatArray) -> tuple[FloatArray, Float
         P: covariance, (12, 12).
         reduced: whitened [U | z], (6, 7), U upper triangular, of states 0 to 5.
     """
-    K = np.empty((STATES, POSE))  # first P Uᵀ
+    PU = np.empty((STATES, POSE))  # P Uᵀ
     for i in range(STATES):
         for m in range(POSE):
-            K[i, m] = 0.0
+            PU[i, m] = 0.0
             for k in range(m, POSE):
-                K[i, m] += P[i, k] * reduced[m, k]
-    L = _innovation_factor(K, reduced)
-    correction, square = np.zeros(STATES), 0.0
-    for i in range(POSE):
-        z = reduced[i, POSE]
-        for k in range(i):
-            z -= L[i, k] * L[k, POSE]
-        L[i, POSE] = z * L[i, i]  # L⁻¹ z
-        square += L[i, POSE] * L[i, POSE]
+                PU[i, m] += P[i, k] * reduced[m, k]
+    inverse = _innovation_inverse(PU, reduced)
+    K, correction, square = np.empty((STATES, POSE)), np.zeros(STATES), 0.0
     for i in range(STATES):
-        _solve_factored(L, K[i])
+        w = PU[i]
         for m in range(POSE):
+            c = inverse[m]
+            K[i, m] = (
+                w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4] + w[5] * c[5]
+            )
             correction[i] += K[i, m] * reduced[m, POSE]
-    return correction, _joseph_covariance(P, K, reduced), square
+    for m in range(POSE):
+        for k in range(POSE):
+            square += reduced[m, POSE] * inverse[m, k] * reduced[k, POSE]
+    return correction, _joseph_covariance(P, PU, K, reduced), square
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _innovation_factor(PU: FloatArray, reduced: FloatArray) -> FloatArray:
-    """Return L of S = U P Uᵀ + I, (6, 7): 1/L_ii on the diagonal, the last column free."""
-    L = np.empty((POSE, POSE + 1))
+def _innovation_inverse(PU: FloatArray, reduced: FloatArray) -> FloatArray:
+    """Return S⁻¹ of S = U P Uᵀ + I, (6, 6), by its Cholesky factor.
+
+    The eigenvalues of S are 1 or more, and the Joseph form forgives a gain that is slightly off.
+    """
+    L = np.zeros((POSE, POSE))  # its diagonal inverted; then all of L⁻¹
     for i in range(POSE):
         for j in range(i + 1):
             s = 1.0 if i == j else 0.0
@@ -116,53 +120,46 @@ def _innovation_factor(PU: FloatArray, reduced: FloatArray) -> FloatArray:
             for k in range(j):
                 s -= L[i, k] * L[j, k]
             L[i, j] = 1.0 / np.sqrt(s) if i == j else s * L[j, j]
-    return L
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _solve_factored(L: FloatArray, row: FloatArray) -> None:
-    """Overwrite a row (6,) by (L Lᵀ)⁻¹ times it; the diagonal of L holds its inverse."""
+    for j in range(POSE):
+        for i in range(j + 1, POSE):
+            s = 0.0
+            for k in range(j, i):
+                s -= L[i, k] * L[k, j]
+            L[i, j] = s * L[i, i]
+    inverse = np.empty((POSE, POSE))
     for i in range(POSE):
-        value = row[i]
-        for k in range(i):
-            value -= L[i, k] * row[k]
-        row[i] = value * L[i, i]
-    for i in range(POSE - 1, -1, -1):
-        value = row[i]
-        for k in range(i + 1, POSE):
-            value -= L[k, i] * row[k]
-        row[i] = value * L[i, i]
+        for j in range(i + 1):
+            s = 0.0
+            for k in range(i, POSE):
+                s += L[k, i] * L[k, j]
+            inverse[i, j] = inverse[j, i] = s
+    return inverse
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _joseph_covariance(P: FloatArray, K: FloatArray, reduced: FloatArray) -> FloatArray:
-    """Return (I - K U) P (I - K U)ᵀ + K Kᵀ: one triangle, and its mirror image.
+def _joseph_covariance(
+    P: FloatArray, PU: FloatArray, K: FloatArray, reduced: FloatArray
+) -> FloatArray:
+    """Return X (I - K U)ᵀ + K Kᵀ = X + (K - X Uᵀ) Kᵀ with X = (I - K U) P = P - K (P Uᵀ)ᵀ.
 
-    The sums over six are written out: they then run in registers, at half the time.
+    Row by row, one triangle and its mirror image. The sums over six are written out: they then run
+    in registers, at half the time.
     """
-    KU = np.zeros((STATES, POSE))
-    for i in range(STATES):
-        for k in range(POSE):
-            for m in range(k + 1):
-                KU[i, k] += K[i, m] * reduced[m, k]
-    x = np.empty(STATES)  # a row of (I - K U) P
+    x, g = np.empty(STATES), np.empty(POSE)  # a row of X, and of K - X Uᵀ
     updated = np.empty((STATES, STATES))
     for i in range(STATES):
-        a0, a1, a2, a3, a4, a5 = KU[i, 0], KU[i, 1], KU[i, 2], KU[i, 3], KU[i, 4], KU[i, 5]
-        k0, k1, k2, k3, k4, k5 = K[i, 0], K[i, 1], K[i, 2], K[i, 3], K[i, 4], K[i, 5]
-        for j in range(STATES):
-            x[j] = P[i, j] - (
-                a0 * P[0, j]
-                + a1 * P[1, j]
-                + a2 * P[2, j]
-                + a3 * P[3, j]
-                + a4 * P[4, j]
-                + a5 * P[5, j]
-            )
-        x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+        a0, a1, a2, a3, a4, a5 = K[i, 0], K[i, 1], K[i, 2], K[i, 3], K[i, 4], K[i, 5]
+        for j in range(max(POSE, i + 1)):
+            w = PU[j]
+            lost = a0 * w[0] + a1 * w[1] + a2 * w[2] + a3 * w[3] + a4 * w[4] + a5 * w[5]
+            x[j] = P[i, j] - lost
+        for m in range(POSE):
+            g[m] = K[i, m]
+            for k in range(m, POSE):
+                g[m] -= x[k] * reduced[m, k]
+        g0, g1, g2, g3, g4, g5 = g[0], g[1], g[2], g[3], g[4], g[5]
         for j in range(i + 1):
-            c, d = KU[j], K[j]
-            left = x0 * c[0] + x1 * c[1] + x2 * c[2] + x3 * c[3] + x4 * c[4] + x5 * c[5]
-            added = k0 * d[0] + k1 * d[1] + k2 * d[2] + k3 * d[3] + k4 * d[4] + k5 * d[5]
-            updated[i, j] = updated[j, i] = x[j] - left + added
+            c = K[j]
+            added = g0 * c[0] + g1 * c[1] + g2 * c[2] + g3 * c[3] + g4 * c[4] + g5 * c[5]
+            updated[i, j] = updated[j, i] = x[j] + added
     return updated
