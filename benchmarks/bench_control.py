@@ -14,8 +14,7 @@ from vergence.control import (
     OptimalTrackingLaw,
     optimal_tracking_tick,
     pack_setup,
-    packed_tick,
-    packed_twist,
+    tracking_twist,
 )
 from vergence.robot import Arm
 
@@ -41,24 +40,24 @@ def law_of(arm: Arm, S: float) -> OptimalTrackingLaw:
 def law_alone(law: OptimalTrackingLaw) -> Callable[[], None]:
     """Interaction matrix and camera twist, without the arm: what `vpServo` does for a camera."""
     weights, v_camera = pack_setup(law.setup).weights, np.empty(6)
-    return lambda: packed_twist(weights, FEATURES, v_camera)
+    return lambda: tracking_twist(weights, FEATURES, v_camera)
 
 
 def whole_tick(law: OptimalTrackingLaw) -> Callable[[], None]:
     """From features and joint positions to joint rates."""
     weights, joints = pack_setup(law.setup)
     result = np.empty(16)
-    return lambda: packed_tick(weights, joints, POSE, FEATURES, result)
+    return lambda: optimal_tracking_tick(weights, joints, POSE, FEATURES, result)
 
 
 @njit
-def repeat_tick(count, setup, q, features):  # type: ignore[no-untyped-def]
+def repeat_tick(count, weights, joints, q, features):  # type: ignore[no-untyped-def]
     """Ticks inside a kernel; each at a new configuration, so that none can be left out."""
-    total, q = 0.0, q.copy()
+    q, result = q.copy(), np.empty(len(q) + 10)
     for _ in range(count):
         q[0] += 1e-9
-        total += optimal_tracking_tick(setup, q, features).rates[0]
-    return total
+        optimal_tracking_tick(weights, joints, q, features, result)
+    return result[0]
 
 
 def run() -> list[dict[str, Any]]:
@@ -66,7 +65,8 @@ def run() -> list[dict[str, Any]]:
     plain, avoiding = law_of(arm, S=0.0), law_of(arm, S=1e-6)
     alone = calls(law_alone(plain))
     tick, gradient = calls(whole_tick(plain)), calls(whole_tick(avoiding))
-    inside = loops(lambda count: repeat_tick(count, avoiding.setup, POSE, FEATURES))
+    packed = pack_setup(avoiding.setup)
+    inside = loops(lambda count: repeat_tick(count, *packed, POSE, FEATURES))
     return [
         row("control: interaction matrix + law", alone, visp("tick"), ratio_aim=0.15),
         row("control: interaction matrix + law", alone, machinevision("tick")),

@@ -11,9 +11,8 @@ from vergence.control import (
     image_model,
     optimal_tracking_tick,
     pack_setup,
-    packed_tick,
-    packed_twist,
     tracking_displacement,
+    tracking_twist,
     unpack_tick,
 )
 from vergence.errors import InputError, ShapeError
@@ -117,40 +116,41 @@ def test_no_features_ask_for_no_motion() -> None:
 
 @pytest.mark.parametrize("per_joint", [False, True])
 @pytest.mark.parametrize("S", [0.0, 1e-3])
-def test_packing_changes_nothing(S: float, per_joint: bool) -> None:
+def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
+    k = 50.0 if per_joint else 1e5
     law = OptimalTrackingLaw(
         ARM,
         CAMERA,
         np.ones(4),
+        axes=FOUR,
         avoidance_axes=("x", "y"),
         S=S,
         penalty="per_joint" if per_joint else "product",
-        penalty_k=50.0 if per_joint else 1e5,
+        penalty_k=k,
     )
-    features = drawn_features(np.random.default_rng(31), 4)
-    plain = optimal_tracking_tick(law.setup, START, features)
-    weights, joints = pack_setup(law.setup)
-    result, v_camera = np.empty(16), np.empty(6)
-    packed_tick(weights, joints, START, features, result)
-    for found, expected in zip(unpack_tick(result), plain, strict=True):
-        np.testing.assert_array_equal(found, expected)
-    packed_twist(weights, features, v_camera)
-    if S == 0.0:
-        np.testing.assert_array_equal(v_camera, plain.v_camera)
-
-
-def test_the_tick_is_its_parts_put_together() -> None:
-    law = OptimalTrackingLaw(ARM, CAMERA, np.ones(4), axes=FOUR, avoidance_axes=("x", "y"), S=1e-3)
     features = drawn_features(np.random.default_rng(32), 4)
-    tick = optimal_tracking_tick(law.setup, START, features)
-    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, 1e5, False, law.singular_below)
+    result = np.empty(16)
+    optimal_tracking_tick(*pack_setup(law.setup), START, features, result)
+    tick = unpack_tick(result)
+    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, k, per_joint, law.singular_below)
     error, B = image_model(features, CAMERA.focal_px)
     u = tracking_displacement(error, B, law.setup.gains, m.value, m.gradient_camera)
     np.testing.assert_allclose(tick.v_camera, u / PERIOD, rtol=1e-9, atol=1e-12)
     wanted = m.J_inverse @ tick.v_camera
     np.testing.assert_allclose(tick.rates, tick.scale * wanted, rtol=1e-9, atol=1e-12)
-    assert (tick.w, tick.penalty) == (m.value, m.penalty)
-    assert tick.sigma == m.smallest_singular_value
+    np.testing.assert_allclose(
+        [tick.w, tick.penalty, tick.sigma], [m.value, m.penalty, m.smallest_singular_value]
+    )
+
+
+def test_the_law_alone_is_the_tick_without_avoidance() -> None:
+    law = OptimalTrackingLaw(ARM, CAMERA, np.ones(4))
+    weights, joints = pack_setup(law.setup)
+    features = drawn_features(np.random.default_rng(31), 4)
+    result, v_camera = np.empty(16), np.empty(6)
+    optimal_tracking_tick(weights, joints, START, features, result)
+    tracking_twist(weights, features, v_camera)
+    np.testing.assert_array_equal(v_camera, unpack_tick(result).v_camera)
 
 
 def test_a_feature_that_was_not_found_has_no_say() -> None:

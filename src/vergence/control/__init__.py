@@ -25,9 +25,8 @@ from vergence.control.tracking_kernels import (
     image_model,
     optimal_tracking_tick,
     pack_setup,
-    packed_tick,
-    packed_twist,
     tracking_displacement,
+    tracking_twist,
     unpack_tick,
 )
 
@@ -56,12 +55,11 @@ __all__ = [
     "moved",
     "optimal_tracking_tick",
     "pack_setup",
-    "packed_tick",
-    "packed_twist",
     "pose_difference",
     "resolve_redundant",
     "resolve_twist",
     "stoppable_speed",
     "tracking_displacement",
+    "tracking_twist",
     "unpack_tick",
 ]

@@ -10,8 +10,8 @@ from vergence.control.command import JointCommand
 from vergence.control.tracking_kernels import (
     TrackingGains,
     TrackingSetup,
+    optimal_tracking_tick,
     pack_setup,
-    packed_tick,
     unpack_tick,
 )
 from vergence.errors import InputError, nearest
@@ -112,7 +112,7 @@ class OptimalTrackingLaw:
             (self.camera.normalize(seen), self.camera.normalize(wanted), depth[view.found])
         )
         result = np.empty(self.arm.joint_count + 10)
-        packed_tick(*self._packed, joints.position, features, result)
+        optimal_tracking_tick(*self._packed, joints.position, features, result)
         tick = unpack_tick(result)
         sigma = tick.sigma
         fault = None

@@ -119,33 +119,6 @@ def image_model(features: FloatArray, focal_px: FloatArray) -> tuple[FloatArray,
     return error_px, B
 
 
-@njit(cache=True, error_model="numpy")
-def optimal_tracking_tick(
-    setup: TrackingSetup, q: FloatArray, features: FloatArray
-) -> TrackingTick:
-    """Return joint rates and what led to them.
-
-    Args:
-        setup: what stays the same.
-        q: joint positions, (n,).
-        features: as for `image_model`, (M, 5).
-    """
-    gains = setup.gains
-    arm = posture(setup.chain, q, setup.damping)
-    P, gradient_P = limit_penalty(q, setup.q_min, setup.q_max, setup.penalty_k, setup.per_joint)
-    gradient = gains.avoiding
-    if gains.S > 0.0:
-        gradient = camera_gradient(arm, measure_gradient(arm, P, gradient_P))
-    error_px, B = image_model(features, setup.focal_px)
-    w = P * arm.det_JJt
-    v_camera = tracking_displacement(error_px, B, gains, w, gradient)
-    for i in range(6):
-        v_camera[i] /= gains.period
-    rates = joint_rates(arm, v_camera)
-    scale = slow_down(rates, setup.rate_max)
-    return TrackingTick(rates, v_camera, scale, w, P, arm.sigma)
-
-
 class PackedSetup(NamedTuple):
     """A setup in two arrays: every array costs a call from Python 0.1 µs, a container more."""
 
@@ -154,7 +127,7 @@ class PackedSetup(NamedTuple):
 
 
 def pack_setup(setup: TrackingSetup) -> PackedSetup:
-    """Write a setup into arrays, for `packed_tick`."""
+    """Write a setup into arrays, for `optimal_tracking_tick`."""
     gains, chain = setup.gains, setup.chain
     numbers = (gains.Q, gains.S, gains.avoidance_max, gains.period)
     penalty = (setup.penalty_k, setup.per_joint, setup.damping)
@@ -172,23 +145,16 @@ def unpack_gains(w: FloatArray) -> TrackingGains:
 
 
 @njit(cache=True, error_model="numpy")
-def unpack_setup(w: FloatArray, joints: FloatArray) -> TrackingSetup:
-    """Read a setup back, its arrays as views."""
-    chain = Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 3, 3])
-    low, high, rate = joints[:-1, 3, 0], joints[:-1, 3, 1], joints[:-1, 3, 2]
-    gains = unpack_gains(w)
-    return TrackingSetup(gains, w[7:9], w[4], w[5] != 0.0, w[6], low, high, rate, chain)
-
-
-@njit(cache=True, error_model="numpy")
-def packed_tick(
+def optimal_tracking_tick(
     weights: FloatArray,
     joints: FloatArray,
     q: FloatArray,
     features: FloatArray,
     result: FloatArray,
 ) -> None:
-    """The tick as Python calls it: arrays alone, the result in one of them.
+    """One tick: features and joint positions in, joint rates and what led to them out.
+
+    The setup comes packed inside kernels too: handing containers on costs a tick a fifth more.
 
     Args:
         weights: of `pack_setup`.
@@ -197,19 +163,31 @@ def packed_tick(
         features: as for `image_model`, (M, 5).
         result: takes the fields of a `TrackingTick` one after the other, (n + 10,).
     """
-    tick = optimal_tracking_tick(unpack_setup(weights, joints), q, features)
-    n = len(q)
-    for i in range(n):
-        result[i] = tick.rates[i]
+    n, gains, focal_px = len(q), unpack_gains(weights), weights[7:9]
+    penalty_k, per_joint, damping = weights[4], weights[5] != 0.0, weights[6]
+    q_min, q_max, rate_max = joints[:-1, 3, 0], joints[:-1, 3, 1], joints[:-1, 3, 2]
+    arm = posture(Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 3, 3]), q, damping)
+    P, gradient_P = limit_penalty(q, q_min, q_max, penalty_k, per_joint)
+    gradient = gains.avoiding
+    if gains.S > 0.0:
+        gradient = camera_gradient(arm, measure_gradient(arm, P, gradient_P))
+    error_px, B = image_model(features, focal_px)
+    w = P * arm.det_JJt
+    v_camera = tracking_displacement(error_px, B, gains, w, gradient)
     for i in range(6):
-        result[n + i] = tick.v_camera[i]
-    result[n + 6], result[n + 7] = tick.scale, tick.w
-    result[n + 8], result[n + 9] = tick.penalty, tick.sigma
+        v_camera[i] /= gains.period
+    rates = joint_rates(arm, v_camera)
+    scale = slow_down(rates, rate_max)
+    for i in range(n):
+        result[i] = rates[i]
+    for i in range(6):
+        result[n + i] = v_camera[i]
+    result[n + 6], result[n + 7], result[n + 8], result[n + 9] = scale, w, P, arm.sigma
 
 
 @njit(cache=True, error_model="numpy")
-def packed_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray) -> None:
-    """The law alone as Python calls it, (17): no arm, no avoidance; fills the twist (6,)."""
+def tracking_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray) -> None:
+    """The law alone, (17): no arm, no avoidance; fills the camera twist (6,)."""
     gains, focal_px = unpack_gains(weights), weights[7:9]
     error_px, B = image_model(features, focal_px)
     u = tracking_displacement(error_px, B, gains, 0.0, gains.avoiding)
@@ -218,7 +196,7 @@ def packed_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray
 
 
 def unpack_tick(result: FloatArray) -> TrackingTick:
-    """Give the numbers of `packed_tick` their names again."""
+    """Give the numbers of `optimal_tracking_tick` their names again."""
     n = len(result) - 10
     scale, w, penalty, sigma = result[n + 6 :].tolist()
     return TrackingTick(result[:n], result[n : n + 6], scale, w, penalty, sigma)
