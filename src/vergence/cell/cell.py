@@ -58,8 +58,9 @@ class Cell(Table):
 
     @property
     def watched(self) -> tuple[str, ...]:
-        """The cameras whose pictures are looked at: all, unless the file names some."""
-        return self.perception.cameras or tuple(self.cameras)
+        """The cameras whose pictures are looked at: all, unless the file names some to follow by."""
+        named = self.perception.cameras if self.task.kind == "follow" else None
+        return named or tuple(self.cameras)
 
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some tables replaced; nested keys by dictionaries, as in the file."""

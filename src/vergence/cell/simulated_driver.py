@@ -45,6 +45,7 @@ class SimulatedDriver:
                     np.random.default_rng([cell.seed, 2, number]),
                 )
                 for number, (name, table) in enumerate(cell.cameras.items())
+                if name in cell.watched
             }
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self.world.move_target(self._pose(0.0))
@@ -168,7 +169,8 @@ class SimulatedDriver:
 
     def _frame(self, camera: str) -> Frame:
         blind = any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
-        image = self._renderers[camera].take(self.world.data, blind) if self._renderers else None
+        renderer = self._renderers.get(camera)
+        image = None if renderer is None else renderer.take(self.world.data, blind)
         joints = {name: self.world.joint_position(name) for name in self.arms}
         return Frame(camera, self.time, image, joints, self._truth(camera, blind))
 

@@ -67,7 +67,7 @@ def _wanted_pose(task: FollowTable, driver: SimulatedDriver) -> FloatArray:
 
 
 def _require_sight(cell: Cell, driver: SimulatedDriver) -> None:
-    names = cell.perception.cameras or tuple(cell.cameras)
+    names = cell.watched
     for name in names:
         truth = driver.first_frame(name).truth
         if truth is not None and truth.visible.any():

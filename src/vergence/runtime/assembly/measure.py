@@ -12,7 +12,7 @@ from vergence.estimation import Measure
 from vergence.features import ImagePoints
 
 if TYPE_CHECKING:
-    from vergence.vision.known_object.object_model import ObjectModel
+    from vergence.vision.known_object import ObjectModel
 
 
 class CornerWindows:
@@ -28,7 +28,7 @@ class CornerWindows:
     def __init__(
         self, model: "ObjectModel", cameras: Mapping[str, Camera], systematic_px: float = 0.25
     ) -> None:
-        from vergence.vision.known_object.corner_extractor import CornerExtractor
+        from vergence.vision.known_object import CornerExtractor
 
         self._extractor = CornerExtractor(model)
         self._cameras = cameras
@@ -129,8 +129,10 @@ def with_noise(measure: Measure, noise_px: float) -> Measure:
     return claimed
 
 
+_NO_POINTS = np.empty((0, 2))
+_NO_COVARIANCE = np.empty((0, 2, 2))
+_NONE = np.zeros(0, dtype=np.bool_)
+
+
 def _no_points(frame: Frame) -> ImagePoints:
-    none = np.empty((0, 2))
-    return ImagePoints(
-        frame.camera, frame.time, none, np.empty((0, 2, 2)), np.zeros(0, dtype=np.bool_), ()
-    )
+    return ImagePoints(frame.camera, frame.time, _NO_POINTS, _NO_COVARIANCE, _NONE, ())

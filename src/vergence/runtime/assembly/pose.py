@@ -33,7 +33,7 @@ from vergence.runtime.assembly.measure import (
 )
 
 if TYPE_CHECKING:
-    from vergence.vision.known_object.object_model import ObjectModel
+    from vergence.vision.known_object import ObjectModel
 
 
 class FollowedPose(Protocol):
@@ -55,8 +55,7 @@ def target_shape(cell: Cell, driver: SimulatedDriver) -> "ObjectModel":
     Raises:
         InputError: if it has no corners and the file names no features.
     """
-    from vergence.vision.known_object.loading import object_model_of
-    from vergence.vision.known_object.object_model import ObjectModel
+    from vergence.vision.known_object import ObjectModel, object_model_of
 
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
@@ -68,7 +67,7 @@ def follow_pose(
 ) -> FollowedPose:
     """Return the perception that a cell describes, for a target of known geometry."""
     table = cell.perception
-    names = table.cameras or tuple(cell.cameras)
+    names = cell.watched
     rig = CameraRig.of({name: driver.cameras[name] for name in names}, table.noise_px)
     measure: Measure
     if images:
@@ -89,7 +88,8 @@ def follow_pose(
     camera_pose, start = camera_poses(cell, driver), _rough_pose(cell, driver)
     if table.filter == "rpy":
         period = 1.0 / max(cell.cameras[name].rate_hz for name in names)
-        rpy = RpyPoseFilter(frame_period=period)
+        # The paper has no gate, and one wrong corner then throws its filter off the target.
+        rpy = RpyPoseFilter(frame_period=period, gate=PoseFilter().gate)
         return PosePerception(rig, shape, camera_pose, measure, rpy, rpy.start(0.0, start), **parts)
     pose = PoseFilter(
         acceleration_density=table.acceleration_density,

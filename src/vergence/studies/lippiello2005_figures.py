@@ -1,0 +1,82 @@
+"""Figures 5 to 8 of [Lippiello2005], drawn from our runs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.drawing import curve, figure, legend, save
+from vergence.geometry import matrix_to_rpy
+from vergence.studies.check import Figure
+from vergence.studies.lippiello2005_trials import Trial
+
+_WIDTH, _HEIGHT = 7.6, 4.6  # inches
+
+
+def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
+    """Write every figure into a folder; return them in the paper's order."""
+    out.mkdir(parents=True, exist_ok=True)
+    hybrid, fixed, ours = trials["hybrid"], trials["fixed"], trials["ours"]
+    drawn = {
+        "figure_05": (
+            _trajectory(hybrid),
+            "Figure 5: the object's trajectory in its first frame, slow then twice as fast.",
+        ),
+        "figure_06": (
+            _errors(hybrid, "estimation_m", "estimation_rad"),
+            "Figure 6: error of the estimated pose, both cameras, the paper's settings.",
+        ),
+        "figure_07": (
+            _errors(hybrid, "hand_m", "hand_rad"),
+            "Figure 7: error of the slave's hand relative to the object, both cameras, the "
+            "paper's settings.",
+        ),
+        "figure_07_ours": (
+            _errors(ours, "hand_m", "hand_rad"),
+            "The same with the error-state filter, feed-forward and prediction over the latency.",
+        ),
+        "figure_08": (
+            _errors(fixed, "estimation_m", "estimation_rad"),
+            "Figure 8: error of the estimated pose, the fixed camera alone, the paper's settings.",
+        ),
+    }
+    files = []
+    for name, (drawing, caption) in drawn.items():
+        path = out / f"{name}.svg"
+        save(drawing, path)
+        files.append(Figure(path, caption))
+    return tuple(files)
+
+
+def _trajectory(trial: Trial) -> Any:
+    poses = trial.trace["truth"]
+    relative = np.linalg.inv(poses[0]) @ poses
+    rpy = np.array([matrix_to_rpy(np.ascontiguousarray(T[:3, :3])) for T in relative])
+    drawing, (above, below) = figure(_WIDTH, _HEIGHT, rows=2, sharex=True)
+    time = trial.trace["time"]
+    _three(above, time, relative[:, :3, 3], ("x", "y", "z"), "position (m)")
+    _three(below, time, np.rad2deg(rpy[:, ::-1]), ("roll", "pitch", "yaw"), "angle (degrees)")
+    below.set_xlabel("time (s)")
+    return drawing
+
+
+def _errors(trial: Trial, position: str, angle: str) -> Any:
+    drawing, (above, below) = figure(_WIDTH, _HEIGHT, rows=2, sharex=True)
+    rows = trial.trace.between(trial.moving_from / 2)
+    time = trial.trace["time"][rows]
+    _three(above, time, 1e3 * trial.trace[position][rows], ("x", "y", "z"), "position error (mm)")
+    below.plot(time, np.rad2deg(trial.trace[angle][rows]), **curve(0))
+    below.set_ylabel("orientation error (degrees)")
+    below.set_xlabel("time (s)")
+    return drawing
+
+
+def _three(
+    axes: Any, time: FloatArray, values: FloatArray, names: tuple[str, ...], label: str
+) -> None:
+    for k, name in enumerate(names):
+        axes.plot(time, values[:, k], label=name, **curve(k))
+    axes.set_ylabel(label)
+    legend(axes)
