@@ -22,6 +22,7 @@ class PlanFailure:
 
     obstacle: Obstacle
     reason: str  # one sentence for a person
+    proved: bool = False  # whether there is no path at all, as against none found
 
     def __bool__(self) -> bool:
         """A failure is false."""

@@ -1,7 +1,7 @@
 """The planner to use: an optimised continuous path, and a tree search behind it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from vergence.planning.inverse_kinematics import finite_range, goal_configuratio
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
+from vergence.planning.separation import proves_no_path
 from vergence.planning.smoothing import SplineProblem, least_clearance, optimise_spline
 from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
 from vergence.planning.tree import connect_trees, pull_into_view, shorten
 from vergence.planning.visibility import View
 
+PROOF_CELLS = 32  # of the grid that shows some problems to have no path
 SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
 
 
@@ -46,10 +48,25 @@ class OptimisedPlanner:
     tree_samples: int = 4000  # before the tree gives up; 0 for no tree
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
-        """Return the smoothest path found that keeps every constraint, or what stood in the way."""
+        """Return the smoothest path found that keeps every constraint, or what stood in the way.
+
+        Where none keeps the margins, a fifth of them will do before there is no plan.
+        """
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
+        plan = self._with_margins(problem)
+        if (
+            isinstance(plan, Path)
+            or plan.proved
+            or problem.margin_px == problem.margin_joint == 0.0
+        ):
+            return plan
+        px, joint = 0.2 * problem.margin_px, 0.2 * problem.margin_joint
+        second = self._with_margins(replace(problem, margin_px=px, margin_joint=joint))
+        return second if second else plan
+
+    def _with_margins(self, problem: PlanningProblem) -> Path | PlanFailure:
         goals = goal_configurations(
             problem.arm, problem.T_world_goal, problem.q_start, self.branches
         )
@@ -57,8 +74,13 @@ class OptimisedPlanner:
             return _unreachable(problem)
         view = problem.view(_margin_kept(problem))
         best = self._from_guesses(problem, view, goals)
-        if best is None and self.tree_samples > 0:
-            best = self._from_tree(problem, view, goals)
+        if best is None:
+            everywhere = goal_configurations(problem.arm, problem.T_world_goal, problem.q_start, 64)
+            if proves_no_path(problem, everywhere, PROOF_CELLS):
+                failure = self._obstacle(problem, view, goals)
+                return replace(failure, reason=failure.reason + "; no path exists", proved=True)
+            if self.tree_samples > 0:
+                best = self._from_tree(problem, view, goals)
         if best is None:
             return self._obstacle(problem, view, goals)
         samples = spline_basis(len(best.controls), self.waypoints).values
@@ -201,8 +223,6 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
 
 def _unreachable(problem: PlanningProblem) -> PlanFailure:
     """Say whether limits or the arm's reach keep it from the goal."""
-    from dataclasses import replace
-
     free = np.full(problem.arm.joint_count, np.inf)
     unlimited = replace(problem.arm, q_min=-free, q_max=free)
     solutions = goal_configurations(unlimited, problem.T_world_goal, problem.q_start, 1)

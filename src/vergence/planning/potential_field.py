@@ -52,11 +52,11 @@ class PotentialFieldPlanner:
         straight = descend(field, chain, upsilon, q, self.step, self.steps_max)
         if self.gain_image <= 0.0 and self.gain_joint <= 0.0:
             return _as_path(problem, field, straight), straight.end
-        field = self._with_zones(problem, field, straight.q[-1])
+        field = self.with_zones(problem, field, straight.q[-1])
         walked = descend(field, chain, upsilon, q, self.step, self.steps_max)
         return _as_path(problem, field, walked), walked.end
 
-    def _with_zones(self, problem: PlanningProblem, field: Field, q_goal: FloatArray) -> Field:
+    def with_zones(self, problem: PlanningProblem, field: Field, q_goal: FloatArray) -> Field:
         """Switch the potentials on, their zones no wider than the goal's own clearance."""
         low, high = field.m_star.min(axis=0), field.m_star.max(axis=0)
         x_min, x_max, y_min, y_max = field.bounds
@@ -84,6 +84,16 @@ class PotentialFieldPlanner:
         if not path.in_view().all():
             return PlanFailure(Obstacle.VISIBILITY, "points leave the image on the way")
         return None
+
+
+def make_field(
+    planner: PotentialFieldPlanner, problem: PlanningProblem, long_way: bool = False
+) -> tuple[Field, FloatArray]:
+    """Return the field a planner walks down, with Υ at the start; for those who time its kernel."""
+    field, upsilon = _pose_free_field(problem, long_way)
+    q = problem.q_start.copy()
+    straight = descend(field, problem.arm.chain, upsilon, q, planner.step, planner.steps_max)
+    return planner.with_zones(problem, field, straight.q[-1]), upsilon
 
 
 def _pose_free_field(problem: PlanningProblem, long_way: bool) -> tuple[Field, FloatArray]:
