@@ -1,0 +1,14 @@
+"""Marks that users put on things: round ones, and AprilTag or ArUco markers."""
+
+from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector, marker_corners
+from vergence.vision.marks.round import RoundMarks, circle_centre_bias, measure_round_marks
+
+__all__ = [
+    "DICTIONARIES",
+    "CodedMarks",
+    "MarkerDetector",
+    "RoundMarks",
+    "circle_centre_bias",
+    "marker_corners",
+    "measure_round_marks",
+]

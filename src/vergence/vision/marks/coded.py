@@ -1,0 +1,89 @@
+"""AprilTag and ArUco markers, found by OpenCV."""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray, IntArray
+from vergence.errors import InputError, nearest
+
+DICTIONARIES = {
+    "apriltag_16h5": "DICT_APRILTAG_16h5",
+    "apriltag_25h9": "DICT_APRILTAG_25h9",
+    "apriltag_36h10": "DICT_APRILTAG_36h10",
+    "apriltag_36h11": "DICT_APRILTAG_36h11",
+    **{
+        f"aruco_{bits}x{bits}_{count}": f"DICT_{bits}X{bits}_{count}"
+        for bits in (4, 5, 6, 7)
+        for count in (50, 100, 250, 1000)
+    },
+    "aruco_original": "DICT_ARUCO_ORIGINAL",
+}
+
+
+class CodedMarks(NamedTuple):
+    """The markers of a picture."""
+
+    ids: IntArray  # (M,)
+    corners_px: FloatArray  # (M, 4, 2) clockwise from the marker's own top left
+    covariance_px: FloatArray  # (M, 4, 2, 2) px²
+
+
+def marker_corners(size: float) -> FloatArray:
+    """Return the corners of a marker in its own frame, (4, 3), m, in the order they are found in.
+
+    The frame is in its middle, x to its right, y to its top, z out of it.
+
+    Args:
+        size: side of its black square, m.
+    """
+    h = 0.5 * size
+    return np.array([[-h, h, 0.0], [h, h, 0.0], [h, -h, 0.0], [-h, -h, 0.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerDetector:
+    """Finds the markers of one dictionary, their corners refined to a fraction of a pixel."""
+
+    dictionary: str
+    noise_px: float = 0.2  # standard deviation that a refined corner is taken to have
+    _detector: Any = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        import cv2
+
+        if self.dictionary not in DICTIONARIES:
+            allowed = nearest(self.dictionary, DICTIONARIES)
+            raise InputError("MarkerDetector", "dictionary", self.dictionary, allowed)
+        if not self.noise_px > 0.0:
+            raise InputError("MarkerDetector", "noise_px", self.noise_px, "above zero")
+        known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[self.dictionary]))
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        object.__setattr__(self, "_detector", cv2.aruco.ArucoDetector(known, parameters))
+
+    def detect(
+        self, image: ImageArray, window: tuple[int, int, int, int] | None = None
+    ) -> CodedMarks:
+        """Find the markers of a picture, or of a window of it.
+
+        Args:
+            image: grey, (height, width).
+            window: left, top, right, bottom in pixels, the last two excluded; all by default.
+        """
+        left, top = (max(window[0], 0), max(window[1], 0)) if window else (0, 0)
+        if window is not None:
+            image = image[top : max(window[3], top), left : max(window[2], left)]
+        if not image.size:
+            return _marks([], None, self.noise_px)
+        corners, ids, _ = self._detector.detectMarkers(np.ascontiguousarray(image))
+        marks = _marks(corners, ids, self.noise_px)
+        return marks._replace(corners_px=marks.corners_px + (left, top))
+
+
+def _marks(corners: Any, ids: Any, noise_px: float) -> CodedMarks:
+    places = np.array(corners, dtype=np.float64).reshape(-1, 4, 2)
+    numbers = np.zeros(0) if ids is None else np.ravel(ids)
+    covariance = np.tile(np.eye(2) * noise_px**2, (len(places), 4, 1, 1))
+    return CodedMarks(numbers.astype(np.int64), places, covariance)

@@ -1,0 +1,144 @@
+"""Marks are found to a fraction of a pixel, or a reason is given."""
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.camera import Camera
+from vergence.errors import InputError
+from vergence.vision.marks import (
+    MarkerDetector,
+    circle_centre_bias,
+    marker_corners,
+    measure_round_marks,
+)
+
+CAMERA = Camera(320, 240, 400.0, 400.0, 159.5, 119.5)
+FINE = 8
+
+
+def disc(
+    centre: tuple[float, float], radius: float, mark: int = 30, ground: int = 200
+) -> ImageArray:
+    v, u = np.mgrid[: 80 * FINE, : 80 * FINE]
+    u, v = (u + 0.5) / FINE - 0.5, (v + 0.5) / FINE - 0.5
+    inside = (u - centre[0]) ** 2 + (v - centre[1]) ** 2 < radius**2
+    fine = np.where(inside, mark, ground).astype(np.float64)
+    return np.rint(fine.reshape(80, FINE, 80, FINE).mean(axis=(1, 3))).astype(np.uint8)
+
+
+def bent() -> ImageArray:
+    """A mark with the shape of an L."""
+    image = np.full((80, 80), 20, np.uint8)
+    image[20:42, 34:38] = image[38:42, 34:50] = 210
+    return image
+
+
+def circle_picture(centre: FloatArray, normal: FloatArray, radius: float) -> FloatArray:
+    """Centroid of the picture of a circle, by sampling its disc's rim."""
+    n = normal / np.linalg.norm(normal)
+    a = np.cross(n, [0.0, 1.0, 0.0])
+    a /= np.linalg.norm(a)
+    b = np.cross(n, a)
+    angle = np.linspace(0.0, 2 * np.pi, 4000, endpoint=False)[:, None]
+    rim = CAMERA.project(centre + radius * (np.cos(angle) * a + np.sin(angle) * b))
+    x, y = rim.T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    area = cross.sum() / 2
+    return np.array(
+        [
+            ((x + np.roll(x, -1)) * cross).sum() / (6 * area),
+            ((y + np.roll(y, -1)) * cross).sum() / (6 * area),
+        ]
+    )
+
+
+@pytest.mark.parametrize(("mark", "ground"), [(30, 200), (220, 40)])
+@pytest.mark.parametrize("radius", [3.0, 7.5, 12.0])
+def test_the_centroid_is_the_centre(mark: int, ground: int, radius: float) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        centre = tuple(rng.uniform(38, 42, 2))
+        image = disc(centre, radius, mark, ground)
+        image = np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+        found = measure_round_marks(image, np.array([[39.0, 41.0]]), np.array([[22.0, 22.0]]))
+        assert found.found[0]
+        assert np.linalg.norm(found.points_px[0] - centre) < 0.12
+        assert found.area_px[0] == pytest.approx(np.pi * radius**2, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("image", "reason"),
+    [
+        (np.full((80, 80), 99, np.uint8), "no contrast"),
+        (disc((40.0, 12.0), 14.0), "no mark near the prediction"),
+        (bent(), "not round"),
+    ],
+)
+def test_a_mark_that_is_none_has_a_reason(image: np.ndarray, reason: str) -> None:
+    middle = np.array([[40.0, 30.0]])
+    found = measure_round_marks(image, middle, np.array([[20.0, 20.0]]))
+    assert not found.found[0]
+    assert found.reasons[0] == reason
+    np.testing.assert_array_equal(found.points_px, middle)
+
+
+def test_a_mark_outside_the_image_is_told() -> None:
+    found = measure_round_marks(disc((40, 40), 5), np.array([[-4.0, 5.0]]), np.array([[9.0, 9.0]]))
+    assert found.reasons == ("outside the image",)
+
+
+def test_the_bias_of_a_slanted_circle_is_known() -> None:
+    centre, normal = np.array([0.05, -0.03, 0.4]), np.array([0.6, 0.3, -1.0])
+    true_centre = CAMERA.project(centre[None])[0]
+    bias = circle_picture(centre, normal, 0.03) - true_centre
+    assert np.linalg.norm(bias) > 0.3
+    np.testing.assert_allclose(circle_centre_bias(CAMERA, centre, normal, 0.03), bias, atol=1e-3)
+
+
+def test_a_circle_that_faces_the_camera_has_no_bias() -> None:
+    bias = circle_centre_bias(CAMERA, np.array([0.0, 0.0, 0.4]), np.array([0.0, 0.0, -1.0]), 0.03)
+    np.testing.assert_allclose(bias, 0.0, atol=1e-9)
+
+
+def marker_picture(number: int, quad: FloatArray) -> ImageArray:
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    side = 400
+    tag = np.full((side + 200, side + 200), 255, np.uint8)
+    tag[100:-100, 100:-100] = cv2.aruco.generateImageMarker(dictionary, number, side)
+    # Corners of the black square, where pixel centres are at integers.
+    square = np.array([[100, 100], [500, 100], [500, 500], [100, 500]], np.float32) - 0.5
+    fine = (quad + 0.5) * 4 - 0.5
+    H = cv2.getPerspectiveTransform(square, fine.astype(np.float32))
+    big = cv2.warpPerspective(tag, H, (1280, 960), borderValue=180)
+    return cv2.resize(big, (320, 240), interpolation=cv2.INTER_AREA)
+
+
+QUAD = np.array([[110.3, 60.2], [201.7, 72.4], [195.1, 160.8], [104.6, 151.3]])
+
+
+def test_a_marker_is_found_with_its_number_and_corners() -> None:
+    found = MarkerDetector("apriltag_36h11").detect(marker_picture(7, QUAD))
+    assert found.ids.tolist() == [7]
+    assert np.linalg.norm(found.corners_px[0] - QUAD, axis=1).max() < 0.5
+    assert found.covariance_px.shape == (1, 4, 2, 2)
+
+
+def test_a_window_keeps_the_pixels_of_the_picture() -> None:
+    detector, image = MarkerDetector("apriltag_36h11"), marker_picture(7, QUAD)
+    whole, part = detector.detect(image), detector.detect(image, (80, 40, 230, 190))
+    np.testing.assert_allclose(part.corners_px, whole.corners_px, atol=0.05)
+    assert len(detector.detect(image, (300, 40, 300, 190)).ids) == 0
+    assert len(detector.detect(image[:, :100]).ids) == 0
+
+
+def test_corners_of_a_marker_run_clockwise_from_its_top_left() -> None:
+    corners = marker_corners(0.1)
+    np.testing.assert_allclose(corners[0], [-0.05, 0.05, 0.0])
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.1, 0.1, 0.0])
+
+
+def test_a_dictionary_that_is_not_known_is_answered_with_those_that_are() -> None:
+    with pytest.raises(InputError, match="did you mean apriltag_36h11"):
+        MarkerDetector("apriltag36h11")
