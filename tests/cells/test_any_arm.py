@@ -60,7 +60,7 @@ def test_a_link_is_drawn_by_its_visual_shape_where_it_can_be_read(tmp_path, seen
 def test_a_missing_mesh_is_named(tmp_path):
     path = urdf(tmp_path, "obj")
     (tmp_path / "robots" / "seen.obj").unlink()
-    with pytest.raises(InputError, match="package://robots/seen.obj"):
+    with pytest.raises(InputError, match=r"package://robots/seen\.obj"):
         read_urdf(path)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
 import mujoco
@@ -43,7 +43,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
         _lock_idle_joints(robot, last_body)
     _set_compiler(robot)
     try:
-        spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
+        spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
     except ValueError as error:
         raise InputError(str(path), "", str(error), "a URDF that MuJoCo reads") from None
     for geom in spec.geoms:
@@ -55,8 +55,8 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
 
 def _parse(path: Path) -> Element:
     try:
-        robot = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
+        robot = ET.parse(path).getroot()
+    except ET.ParseError as error:
         raise InputError(str(path), "", str(error), "XML") from None
     if robot.tag != "robot":
         raise InputError(str(path), "", f"<{robot.tag}>", "<robot>, as a URDF begins")
@@ -134,4 +134,4 @@ def _set_compiler(robot: Element) -> None:
         "boundmass": "1e-3",
         "boundinertia": "1e-6",
     }
-    ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", compiler)
+    ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", compiler)

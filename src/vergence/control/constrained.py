@@ -17,7 +17,7 @@ from vergence.control.constraints import (
     constraint_rows,
 )
 from vergence.control.image_motion import ImageMotion
-from vergence.control.objective import Objective
+from vergence.control.objective import Objective, seen_only
 from vergence.errors import InputError, nearest
 from vergence.features import Observation, interaction_matrix_points
 from vergence.planning import Reference
@@ -187,7 +187,8 @@ class ConstrainedLaw:
         view = observation.views[-1]
         depth = self.depth_m if reference.depth_m is None else reference.depth_m
         features = self._motion.update(view, depth, joints)
-        wanted = self.objective.twist_objective(features, view.found, depth, reference)
+        seen = seen_only(features, view.found, depth, reference)
+        wanted, (features, _, depth, _) = self.objective.twist_objective(*seen), seen
         answer = constrained_rates(
             self.arm.chain,
             self._limits,

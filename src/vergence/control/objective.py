@@ -1,5 +1,6 @@
 """What every law comes down to: a quadratic in the camera's twist."""
 
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -32,6 +33,29 @@ class Objective(Protocol):
             reference: what is wanted.
         """
         ...
+
+
+def seen_only(
+    features: FeatureState, found: BoolArray, depth: FloatArray, reference: Reference
+) -> tuple[FeatureState, BoolArray, FloatArray, Reference]:
+    """Return the arguments of `twist_objective` without the features that were not found.
+
+    Of those, nobody may know where they are.
+    """
+    if found.all():
+        return features, found, depth, reference
+
+    def seen(values: FloatArray | None) -> FloatArray | None:
+        return None if values is None else values[found]
+
+    kept = replace(
+        reference,
+        points_px=seen(reference.points_px),
+        velocity_px=seen(reference.velocity_px),
+        depth_m=seen(reference.depth_m),
+    )
+    state = FeatureState(features.points[found], features.flow[found])
+    return state, found[found], depth[found], kept
 
 
 @njit(cache=True)

@@ -1,0 +1,106 @@
+"""The plain law: an objective and nothing else."""
+
+import numpy as np
+import pytest
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control.constrained import ConstrainedLaw
+from vergence.control.image_based import ImageBased
+from vergence.control.plain import PlainLaw
+from vergence.errors import InputError
+from vergence.features import ImagePoints, Observation
+from vergence.outcome import OutcomeKind
+from vergence.planning import Reference
+from vergence.robot import JointState
+from vergence.robot.positive_definite import invert_spd_any
+
+SQUARE = [[0.05, 0.05, 0.0], [-0.05, 0.05, 0.0], [-0.05, -0.05, 0.0], [0.05, -0.05, 0.0]]
+PERIOD = 1 / 30
+
+
+@pytest.fixture(scope="module")
+def scene():
+    driver = SimulatedDriver(load_cell("puma560").replace(target={"features": SQUARE}), False)
+    truth = driver.first_frame("wrist").truth
+    q = driver.read().joints["puma"].position
+    return driver.world.arm_to_camera("wrist"), driver.cameras["wrist"], truth, q
+
+
+def observe(points_px, found=None, time=0.0):
+    m = len(points_px)
+    found = np.ones(m, bool) if found is None else found
+    view = ImagePoints("wrist", time, points_px, np.zeros((m, 2, 2)), found, ("",) * m)
+    return Observation(time, (view,))
+
+
+def still(q, time=0.0):
+    return JointState(time, q, np.zeros_like(q))
+
+
+def test_error_decays_at_the_gain(scene):
+    arm, camera, truth, q = scene
+    world = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
+    law = PlainLaw(arm, camera, ImageBased(camera, gain=2.0), truth.depth_m)
+    desired = truth.points_px + [15.0, -10.0]
+    errors = []
+    for k in range(60):
+        T = np.linalg.inv(arm.forward_kinematics(q))
+        points = camera.project(world @ T[:3, :3].T + T[:3, 3])
+        command = law.command(
+            observe(points, time=k * PERIOD), Reference(0.0, desired), still(q, k * PERIOD)
+        )
+        errors.append(np.linalg.norm(points - desired))
+        q = q + PERIOD * command.velocity
+    assert errors[30] == pytest.approx(errors[0] * (1 - 2 * PERIOD) ** 30, rel=0.15)
+
+
+def test_the_camera_keeps_its_course_where_rates_are_at_their_limit(scene):
+    arm, camera, truth, q = scene
+    command = PlainLaw(arm, camera, ImageBased(camera, gain=100.0), truth.depth_m).command(
+        observe(truth.points_px), Reference(0.0, truth.points_px + 60.0), still(q)
+    )
+    assert command.active == ("joint rates",)
+    assert np.max(np.abs(command.velocity) / arm.rate_max) == pytest.approx(1.0)
+    np.testing.assert_allclose(arm.jacobian(q) @ command.velocity, command.v_camera, atol=1e-9)
+
+
+def test_a_singular_arm_ends_the_task(scene):
+    arm, camera, truth, q = scene
+    straight = q.copy()
+    straight[4] = 0.0
+    command = PlainLaw(arm, camera, ImageBased(camera), truth.depth_m).command(
+        observe(truth.points_px), Reference(0.0, truth.points_px), still(straight)
+    )
+    assert command.fault is not None
+    assert command.fault[0] is OutcomeKind.SINGULARITY
+
+
+@pytest.mark.parametrize("kind", [PlainLaw, ConstrainedLaw])
+def test_features_that_were_not_found_count_for_nothing(scene, kind):
+    arm, camera, truth, q = scene
+    points = truth.points_px.copy()
+    points[2] = np.nan
+    found = np.array([True, True, False, True])
+    desired = truth.points_px + 10.0
+    few = np.flatnonzero(found)
+    without = kind(arm, camera, ImageBased(camera), truth.depth_m[few])
+    partly = kind(arm, camera, ImageBased(camera), truth.depth_m)
+    np.testing.assert_allclose(
+        partly.command(observe(points, found), Reference(0.0, desired), still(q)).velocity,
+        without.command(observe(points[few]), Reference(0.0, desired[few]), still(q)).velocity,
+        atol=1e-9,
+    )
+
+
+def test_depths_below_zero_are_refused(scene):
+    arm, camera, _, _ = scene
+    with pytest.raises(InputError, match="depth_m"):
+        PlainLaw(arm, camera, ImageBased(camera), np.array([1.0, -1.0]))
+
+
+@pytest.mark.parametrize("n", [2, 6, 7, 11])
+def test_the_sweep_inverts_for_any_number_of_joints(n):
+    rng = np.random.default_rng(n)
+    A = rng.normal(size=(n, n + 2))
+    H = A @ A.T + 1e-3 * np.eye(n)
+    np.testing.assert_allclose(invert_spd_any(H) @ H, np.eye(n), atol=1e-8)
