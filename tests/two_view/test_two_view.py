@@ -178,3 +178,10 @@ def test_bad_arguments_are_named() -> None:
         estimate_two_view(np.zeros((9, 2)), np.zeros((8, 2)), CAMERA)
     with pytest.raises(InputError, match="reference"):
         estimate_two_view(np.zeros((9, 2)), np.zeros((9, 2)), CAMERA, reference=np.array([1, 12]))
+
+
+def test_points_that_are_not_finite_are_refused_by_name() -> None:
+    px = np.full((9, 2), 100.0)
+    px[3, 1] = np.nan
+    with pytest.raises(InputError, match="points_star_px"):
+        estimate_two_view(np.zeros((9, 2)), px, CAMERA)

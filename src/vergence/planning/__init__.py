@@ -1,6 +1,28 @@
 """Planning: what the features or the target's pose should be, and when."""
 
+from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.fixed_reference import FixedReference
+from vergence.planning.inverse_kinematics import goal_configurations
+from vergence.planning.optimised import OptimisedPlanner
+from vergence.planning.path import Path
+from vergence.planning.potential_field import PotentialFieldPlanner
+from vergence.planning.problem import PlanningProblem
 from vergence.planning.reference import Reference
+from vergence.planning.separation import proves_no_path
+from vergence.planning.timing import TimeLaw
+from vergence.planning.trajectory import Trajectory
 
-__all__ = ["FixedReference", "Reference"]
+__all__ = [
+    "FixedReference",
+    "Obstacle",
+    "OptimisedPlanner",
+    "Path",
+    "PlanFailure",
+    "PlanningProblem",
+    "PotentialFieldPlanner",
+    "Reference",
+    "TimeLaw",
+    "Trajectory",
+    "goal_configurations",
+    "proves_no_path",
+]

@@ -56,13 +56,9 @@ class OptimisedPlanner:
         if failure is not None:
             return failure
         plan = self._with_margins(problem)
-        if (
-            isinstance(plan, Path)
-            or plan.proved
-            or problem.margin_px == problem.margin_joint == 0.0
-        ):
-            return plan
         px, joint = 0.2 * problem.margin_px, 0.2 * problem.margin_joint
+        if isinstance(plan, Path) or plan.proved or px == joint == 0.0:
+            return plan
         second = self._with_margins(replace(problem, margin_px=px, margin_joint=joint))
         return second if second else plan
 

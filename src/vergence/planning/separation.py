@@ -13,6 +13,7 @@ width can matter. Cells it rejects hold no valid configuration.
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.planning.problem import PlanningProblem
@@ -199,13 +200,13 @@ def _inside(G: FloatArray, h: FloatArray, x: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def label_islands(seen: BoolArray, shape: IntArray) -> IntArray:
+def label_islands(seen: BoolArray, shape: IntArray) -> NDArray[np.int32]:
     """Return a number for each cell, equal for cells joined by neighbours, corners included.
 
     Unseen cells have the number -1.
     """
-    labels = np.full(len(seen), -1)
-    stack = np.empty(len(seen), np.int64)
+    labels = np.full(len(seen), -1, np.int32)
+    stack = np.empty(np.sum(seen) + 1, np.int64)
     axes, neighbours = len(shape), 3 ** len(shape)
     at = np.empty(axes, np.int64)
     island = 0

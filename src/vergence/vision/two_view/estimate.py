@@ -6,67 +6,18 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Camera
 from vergence.errors import InputError, ShapeError
 from vergence.vision.two_view import bundle
-from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION, TwoViewState
-from vergence.vision.two_view.checks import (
-    chi_square_quantile,
-    distinct_count,
-    fewest_off_a_line,
-    widest_triples,
-)
+from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION
+from vergence.vision.two_view.checks import distinct_count, fewest_off_a_line, widest_triples
 from vergence.vision.two_view.covariance import (
     points_in_desired,
     reference_plane,
     upsilon_covariance,
 )
-from vergence.vision.two_view.decomposition import decompose_homography, inverse_depths
+from vergence.vision.two_view.decomposition import decompose_homography
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
-from vergence.vision.two_view.linear import homogeneous, linear_homography
+from vergence.vision.two_view.fit import Fit, Views, robust_inliers, simplest_fit
+from vergence.vision.two_view.linear import homogeneous
 from vergence.vision.two_view.result import TwoView
-from vergence.vision.two_view.search import find_inliers, fit_general, rotation_between
-
-ITERATIONS = 25  # most steps of bundle adjustment
-GATE = 3.29  # standard deviations beyond which a match is wrong (one in a thousand)
-
-
-class _Views:
-    """The matches in normalized coordinates, with the noise they are judged by."""
-
-    def __init__(self, m_star: FloatArray, m: FloatArray, weight: FloatArray) -> None:
-        self.m_star, self.m, self.weight = m_star, m, weight
-
-    def __len__(self) -> int:
-        return len(self.m)
-
-    def take(self, chosen: BoolArray) -> "_Views":
-        return _Views(self.m_star[chosen], self.m[chosen], self.weight)
-
-    @property
-    def variance(self) -> float:
-        """Of a normalized coordinate."""
-        return float(np.mean(1.0 / self.weight) ** 2)
-
-    def adjust(self, model: int, state: TwoViewState) -> "_Fit":
-        state, residuals = bundle.adjust_bundle(
-            model, state, self.m_star, self.m, self.weight, ITERATIONS
-        )
-        return _Fit(self, model, state, residuals)
-
-
-class _Fit:
-    """A model at its best, and whether the noise explains what is left."""
-
-    def __init__(
-        self, views: _Views, model: int, state: TwoViewState, residuals: FloatArray
-    ) -> None:
-        self.views, self.model, self.state, self.residuals = views, model, state, residuals
-        self.chi_square = float(np.sum(residuals**2))
-        poses, a_point = bundle.bundle_sizes(model)
-        self.freedom = (4 - a_point) * len(views) - poses
-
-    @property
-    def accepted(self) -> bool:
-        possible = self.model != GENERAL or bool((self.state.w > 0).all())
-        return possible and self.chi_square <= chi_square_quantile(self.freedom) + 1e-6
 
 
 def estimate_two_view(
@@ -100,7 +51,7 @@ def estimate_two_view(
 
     Raises:
         ShapeError: if the two lists differ in shape.
-        InputError: if a reference index is not one of the points, or there are fewer than three.
+        InputError: if a point is not finite, or `reference` is not three or more of the points.
     """
     points_px = np.ascontiguousarray(points_px, dtype=np.float64)
     points_star_px = np.ascontiguousarray(points_star_px, dtype=np.float64)
@@ -108,22 +59,25 @@ def estimate_two_view(
         raise ShapeError("points_px", points_px.shape, (None, 2))
     if points_star_px.shape != points_px.shape:
         raise ShapeError("points_star_px", points_star_px.shape, points_px.shape)
+    for name, points in (("points_px", points_px), ("points_star_px", points_star_px)):
+        if not np.isfinite(points).all():
+            raise InputError("estimate_two_view", name, "NaN or infinity", "finite pixels")
     if reference is not None:
         reference = _checked_reference(reference, len(points_px))
     failure = _degenerate(points_px, points_star_px, noise_px)
     if failure is not None:
         return failure
-    views = _Views(
+    views = Views(
         np.ascontiguousarray(camera.normalize(points_star_px)),
         np.ascontiguousarray(camera.normalize(points_px)),
         camera.focal_px / noise_px,
     )
     hint = np.array([0.0, 0.0, 1.0]) if normal_hint is None else np.asarray(normal_hint)
     inliers = np.ones(len(views), dtype=np.bool_)
-    fit = _simplest_fit(views)
+    fit = simplest_fit(views)
     if fit is None:
-        inliers = _robust_inliers(views)
-        fit = _simplest_fit(views.take(inliers)) if inliers.sum() >= 5 else None
+        inliers = robust_inliers(views)
+        fit = simplest_fit(views.take(inliers)) if inliers.sum() >= 5 else None
     if fit is None:
         return TwoViewFailure(
             TwoViewProblem.WRONG_MATCHES,
@@ -174,45 +128,6 @@ def _degenerate(
     return None
 
 
-def _simplest_fit(views: _Views) -> _Fit | None:
-    """Return the simplest of turn, plane and general object that the noise explains."""
-    count = len(views)
-    start = TwoViewState(
-        rotation_between(views.m_star, views.m),
-        np.zeros(3),
-        np.array([0.0, 0.0, 1.0]),
-        views.m_star,
-        np.ones(count),
-    )
-    turn = views.adjust(ROTATION, start)
-    if turn.accepted:
-        return turn
-    rotations, translations, normals = decompose_homography(
-        linear_homography(views.m_star, views.m)
-    )
-    plane = views.adjust(PLANE, start._replace(R=rotations[0], t=translations[0], n=normals[0]))
-    if count < 8:
-        return plane if plane.accepted else None
-    R, t, _ = fit_general(views.m_star, views.m, 5, 9.0 * views.variance)
-    depths, _ = inverse_depths(R, t, views.m_star, views.m)
-    general = views.adjust(GENERAL, start._replace(R=R, t=t, w=np.maximum(depths, 1e-3)))
-    # A plane is a general object with N − 3 fewer unknowns: keep it unless the rest gains more.
-    shaped = plane.chi_square - general.chi_square > chi_square_quantile(count - 3)
-    if plane.accepted and not (general.accepted and shaped):
-        return plane
-    return general if general.accepted else None
-
-
-def _robust_inliers(views: _Views) -> BoolArray:
-    gate = GATE**2 * views.variance
-    # The mean of both directions of transfer has twice the freedom of one Sampson distance.
-    plane = find_inliers(False, views.m_star, views.m, 1.5 * gate)
-    if len(views) < 9:
-        return plane
-    general = find_inliers(True, views.m_star, views.m, gate)
-    return general if general.sum() >= max(8, plane.sum() + 3) else plane
-
-
 def _spread(values: FloatArray, inliers: BoolArray) -> FloatArray:
     """Return values of the inliers at their places among all matches, NaN elsewhere."""
     result = np.full((len(inliers), *values.shape[1:]), np.nan)
@@ -220,12 +135,12 @@ def _spread(values: FloatArray, inliers: BoolArray) -> FloatArray:
     return result
 
 
-def _rms_px(fit: _Fit, noise_px: float) -> float:
+def _rms_px(fit: Fit, noise_px: float) -> float:
     return float(noise_px * np.sqrt(fit.chi_square / fit.residuals.size))
 
 
 def _planar_result(
-    fit: _Fit, inliers: BoolArray, hint: FloatArray, noise_px: float
+    fit: Fit, inliers: BoolArray, hint: FloatArray, noise_px: float
 ) -> TwoView | TwoViewFailure:
     state = fit.state
     H = state.R + np.outer(state.t, state.n)
@@ -248,7 +163,7 @@ def _planar_result(
 
 
 def _planar_motion(
-    fit: _Fit, inliers: BoolArray, noise_px: float, R: FloatArray, t: FloatArray, n: FloatArray
+    fit: Fit, inliers: BoolArray, noise_px: float, R: FloatArray, t: FloatArray, n: FloatArray
 ) -> TwoView | None:
     rays = homogeneous(fit.state.x_star)
     inverse_rho_star = rays @ n
@@ -274,7 +189,7 @@ def _planar_motion(
 
 
 def _general_result(
-    fit: _Fit, inliers: BoolArray, reference: IntArray | None, noise_px: float
+    fit: Fit, inliers: BoolArray, reference: IntArray | None, noise_px: float
 ) -> TwoView | TwoViewFailure:
     state, views = fit.state, fit.views
     if reference is None:
