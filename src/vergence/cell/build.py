@@ -6,7 +6,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
 from vergence.cell.locate import locate_model
@@ -15,35 +14,9 @@ from vergence.cell.schema import ArmTable, CameraTable, Placement
 from vergence.cell.urdf import read_urdf
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion
-from vergence.robot import Arm
 
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
 _ROOM = Path(__file__).with_name("scene.xml")
-
-
-def start_position(cell: Cell, name: str, arm: Arm) -> FloatArray:
-    """Return an arm's joint positions at the start (n,), rad or m.
-
-    Raises:
-        InputError: if their number is wrong or one is outside its limits.
-    """
-    given, key = cell.arms[name].start_deg, f"arms.{name}.start_deg"
-    if len(given) != arm.joint_count:
-        raise InputError(
-            str(cell.path),
-            key,
-            f"{len(given)} values",
-            f"{arm.joint_count}: {', '.join(arm.names)}",
-        )
-    unit = np.where(arm.chain.sliding, 1.0, np.pi / 180)
-    start = np.array(given) * unit
-    for i, joint in enumerate(arm.names):
-        if not arm.q_min[i] <= start[i] <= arm.q_max[i]:
-            low, high = arm.q_min[i] / unit[i], arm.q_max[i] / unit[i]
-            raise InputError(
-                str(cell.path), f"{key}[{i}]", given[i], f"{joint} between {low:.6g} and {high:.6g}"
-            )
-    return frozen(start)
 
 
 def assemble(cell: Cell) -> Any:

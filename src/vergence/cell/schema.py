@@ -190,13 +190,31 @@ class FollowTable(Table):
     target_timeout_s: Positive = 2.0  # with pictures, but the target lost
 
 
+class ReachTable(Table):
+    """Bring the camera to where the target looks as in a picture taken before, along a plan."""
+
+    kind: Literal["reach"]
+    arm: str
+    camera: str
+    goal_deg: tuple[float, ...]  # joints when the desired picture was taken; metres if they slide
+    distance_m: Positive  # believed distance of that camera from the reference plane, d*
+    planner: Literal["optimised", "potential_field"] = "optimised"
+    margin_px: Annotated[float, Field(ge=0)] = 10.0  # kept from the border of the image
+    margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
+    camera_speed_m_s: Positive = 0.25
+    image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Positive = 0.5  # with pictures, but the target lost
+
+
 def _task_kind(value: Any) -> str:
     kind = value.get("kind", "track") if isinstance(value, dict) else value.kind
     return str(kind)
 
 
 Task = Annotated[
-    Annotated[TrackTable, Tag("track")] | Annotated[FollowTable, Tag("follow")],
+    Annotated[TrackTable, Tag("track")]
+    | Annotated[FollowTable, Tag("follow")]
+    | Annotated[ReachTable, Tag("reach")],
     Discriminator(_task_kind),
 ]
 
@@ -272,8 +290,17 @@ class ConstrainedTable(Table):
     flow_smoothing_s: Annotated[float, Field(ge=0)] = 0.1  # of the target's motion in the image
 
 
+class PathTrackingTable(Table):
+    """The law of [Mezouar2001] section 5: keeps image points on a planned trajectory."""
+
+    kind: Literal["path_tracking"]
+    gain: Positive = 2.0  # λ, 1/s
+    interaction: Literal["current", "desired", "mean"] = "desired"  # where L is taken
+
+
 Law = Annotated[
-    OptimalTrackingTable | PositionBasedTable | ConstrainedTable, Field(discriminator="kind")
+    OptimalTrackingTable | PositionBasedTable | ConstrainedTable | PathTrackingTable,
+    Field(discriminator="kind"),
 ]
 
 # What stands at a place in the file, or is the kind of what stands there.
@@ -291,8 +318,10 @@ TABLES: dict[str, type[Table]] = {
     "random": RandomMotion,
     "track": TrackTable,
     "follow": FollowTable,
+    "reach": ReachTable,
     "perception": PerceptionTable,
     "optimal_tracking": OptimalTrackingTable,
     "position_based": PositionBasedTable,
     "constrained": ConstrainedTable,
+    "path_tracking": PathTrackingTable,
 }

@@ -88,6 +88,17 @@ class SimulatedDriver:
         """Return what a camera sees at the start, without its latency."""
         return self._frame(camera)
 
+    def frame_at(self, camera: str, arm: str, position: FloatArray) -> Frame:
+        """Return what a camera would see if an arm's joints stood at a position, (n,).
+
+        It stands for a picture taken beforehand, by driving there.
+        """
+        now = self.world.joint_position(arm)
+        self.world.place_arm(arm, position)
+        frame = self._frame(camera)
+        self.world.place_arm(arm, now)
+        return frame
+
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
         """Make image points the target's features: where their rays meet it, (M, 3).
 

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
-from vergence.cell.build import FROM_MUJOCO_CAMERA, assemble, intrinsics, start_position
+from vergence.cell.build import FROM_MUJOCO_CAMERA, assemble, intrinsics
 from vergence.cell.cell import Cell
+from vergence.cell.joint_positions import joint_positions
 from vergence.cell.motion import placement_pose
 from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion
@@ -105,6 +106,11 @@ class World:
             np.ascontiguousarray(T_world_target[:3, :3])
         )
 
+    def place_arm(self, arm: str, position: FloatArray) -> None:
+        """Put an arm's joints somewhere (n,), against all physics, and update every pose."""
+        self.data.qpos[self._qpos[arm]] = position
+        self.update()
+
     def command(self, arm: str, position: FloatArray, velocity: FloatArray) -> None:
         """Set an arm's servos: their lag k_v/k_p times the wanted rate is fed forward."""
         self.data.ctrl[self._actuators[arm]] = position + self._lag[arm] * velocity
@@ -181,7 +187,9 @@ class World:
 
     def _place_at_start(self) -> None:
         for name in self.cell.arms:
-            start = start_position(self.cell, name, self.arms[name])
+            key = f"arms.{name}.start_deg"
+            given = self.cell.arms[name].start_deg
+            start = joint_positions(self.cell, key, given, self.arms[name])
             self.data.qpos[self._qpos[name]] = start
             self.data.ctrl[self._actuators[name]] = start
         self.move_target(placement_pose(self.cell.target))

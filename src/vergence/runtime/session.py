@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from vergence.cell import Cell, SimulatedDriver
 from vergence.outcome import Outcome
-from vergence.runtime.assembly import assemble_parts
+from vergence.runtime.assembly import Parts, assemble_parts
 from vergence.runtime.loop import Loop, Patience
 from vergence.runtime.recording import Listener, RunInfo
 from vergence.runtime.summary import Summary
@@ -44,6 +44,20 @@ def _run(
     parts = assemble_parts(cell, driver, images)
     summary = Summary(cell.task.camera)
     everyone = (summary, *listeners)
+    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
+    for listener in everyone:
+        listener.begin(info)
+    outcome = parts if isinstance(parts, Outcome) else _loop(cell, driver, parts, everyone)
+    values = dict(summary.values)
+    values["duration_s"] = outcome.time
+    for listener in everyone:
+        listener.close(outcome, values)
+    return RunResult(outcome, values)
+
+
+def _loop(
+    cell: Cell, driver: SimulatedDriver, parts: Parts, listeners: Sequence[Listener]
+) -> Outcome:
     loop = Loop(
         driver,
         cell.task.arm,
@@ -51,15 +65,7 @@ def _run(
         parts.planner,
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
-        listeners=everyone,
+        listeners=listeners,
         patience=Patience(cell.task.image_timeout_s, cell.task.target_timeout_s),
     )
-    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
-    for listener in everyone:
-        listener.begin(info)
-    outcome = loop.run(cell.duration_s)
-    values = dict(summary.values)
-    values["duration_s"] = outcome.time
-    for listener in everyone:
-        listener.close(outcome, values)
-    return RunResult(outcome, values)
+    return loop.run(parts.duration_s or cell.duration_s)

@@ -1,14 +1,19 @@
 """From a cell to the parts of its loop."""
 
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import FollowTable, TrackTable
+from vergence.cell.schema import FollowTable, ReachTable, TrackTable
+from vergence.outcome import Outcome
 from vergence.runtime.assembly.follow import follow_parts
 from vergence.runtime.assembly.parts import Parts
+from vergence.runtime.assembly.reach import reach_parts
 from vergence.runtime.assembly.track import track_parts
 
 
-def assemble_parts(cell: Cell, driver: SimulatedDriver, images: bool) -> Parts:
+def assemble_parts(cell: Cell, driver: SimulatedDriver, images: bool) -> Parts | Outcome:
     """Choose perception, planner and law by the kind of the task and the kind of the law.
+
+    Returns:
+        The parts, or why the run ends before anything moves.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
@@ -18,3 +23,5 @@ def assemble_parts(cell: Cell, driver: SimulatedDriver, images: bool) -> Parts:
             return track_parts(cell, cell.task, driver, images)
         case FollowTable():
             return follow_parts(cell, cell.task, driver, images)
+        case ReachTable():
+            return reach_parts(cell, cell.task, driver, images)

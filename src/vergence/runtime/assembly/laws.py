@@ -4,12 +4,18 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import ConstrainedTable, OptimalTrackingTable, PositionBasedTable
+from vergence.cell.schema import (
+    ConstrainedTable,
+    OptimalTrackingTable,
+    PathTrackingTable,
+    PositionBasedTable,
+)
 from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
+from vergence.control.path_tracking import PathTrackingLaw
 from vergence.errors import InputError
 from vergence.robot import yoshikawa_measure
 
@@ -30,6 +36,11 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
         case PositionBasedTable():
             _require_task(cell, "follow")
             return _position_based(cell, driver, cell.law)
+        case PathTrackingTable():
+            _require_task(cell, "reach")
+            name, table = cell.task.camera, cell.law
+            arm, camera = driver.world.arm_to_camera(name), driver.cameras[name]
+            return PathTrackingLaw(arm, camera, table.gain, table.interaction)
 
 
 def _require_task(cell: Cell, *kinds: str) -> None:

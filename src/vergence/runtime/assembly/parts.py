@@ -12,3 +12,4 @@ class Parts(NamedTuple):
     perception: Perception
     planner: Planner
     law: Law
+    duration_s: float | None = None  # how long the task takes; as long as the cell says if None

@@ -1,0 +1,68 @@
+"""Reaching a picture taken beforehand: planned and tracked, or refused before anything moves."""
+
+import numpy as np
+import pytest
+
+from vergence.cell import load_cell
+from vergence.errors import InputError
+from vergence.outcome import OutcomeKind
+from vergence.runtime import run_cell
+from vergence.studies.trace import Trace
+
+
+def test_the_gantry_gets_where_the_picture_was_taken_and_keeps_the_marks_in_view():
+    cell, trace = load_cell("gantry"), Trace("eye")
+    result = run_cell(cell, [trace], images=False)
+    assert result.outcome.succeeded
+    assert result.summary["final_error_px"] < 0.05
+    assert result.summary["max_error_px"] < 5.0
+
+
+def test_both_planners_reach_the_goal():
+    cell = load_cell("gantry").replace(task={"planner": "potential_field"})
+    result = run_cell(cell, images=False)
+    assert result.outcome.succeeded
+    assert result.summary["final_error_px"] < 0.05
+
+
+def test_rendered_marks_lead_there_too():
+    cell = load_cell("gantry").replace(task={"camera_speed_m_s": 0.6})
+    result = run_cell(cell)
+    assert result.outcome.succeeded
+    assert result.summary["max_error_px"] < 5.0
+    assert result.summary["max_drift_px"] < 0.6
+
+
+def test_a_way_that_takes_too_long_is_an_outcome_before_anything_moves():
+    result = run_cell(load_cell("gantry").replace(duration_s=3.0), images=False)
+    assert result.outcome.kind is OutcomeKind.INFEASIBLE
+    assert "duration_s is 3" in result.outcome.reason
+
+
+def test_the_same_seed_gives_the_same_run():
+    cell = load_cell("gantry").replace(task={"camera_speed_m_s": 0.6})
+    first, second = Trace("eye"), Trace("eye")
+    run_cell(cell, [first], images=False)
+    run_cell(cell, [second], images=False)
+    np.testing.assert_array_equal(first["T_world_camera"], second["T_world_camera"])
+
+
+def test_no_translation_between_the_pictures_is_an_outcome_not_a_run():
+    start = load_cell("gantry").arms["gantry"].start_deg
+    cell = load_cell("gantry").replace(task={"goal_deg": start})
+    result = run_cell(cell, images=False)
+    assert result.outcome.kind is OutcomeKind.INFEASIBLE
+    assert result.outcome.time == 0.0
+    assert result.outcome.reason
+
+
+def test_a_goal_from_which_the_marks_are_out_of_sight_is_refused():
+    cell = load_cell("gantry").replace(task={"goal_deg": [0.0, 0.0, 0.0, 0.0, 90.0, 0.0]})
+    with pytest.raises(InputError, match="does not see"):
+        run_cell(cell, images=False)
+
+
+def test_a_goal_outside_the_joint_limits_is_refused_by_name():
+    cell = load_cell("gantry").replace(task={"goal_deg": [9.0, 0.0, 0.0, 0.0, 0.0, 0.0]})
+    with pytest.raises(InputError, match=r"task\.goal_deg\[0\].*joint1 between"):
+        run_cell(cell, images=False)
