@@ -19,7 +19,7 @@ def test_the_gantry_gets_where_the_picture_was_taken_and_keeps_the_marks_in_view
 
 
 def test_both_planners_reach_the_goal():
-    cell = load_cell("gantry").replace(task={"planner": "potential_field"})
+    cell = load_cell("gantry").replace(task={"planner": "potential_field", "camera_speed_m_s": 0.6})
     result = run_cell(cell, images=False)
     assert result.outcome.succeeded
     assert result.summary["final_error_px"] < 0.05
