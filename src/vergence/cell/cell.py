@@ -58,7 +58,7 @@ class Cell(Table):
 
     @property
     def watched(self) -> tuple[str, ...]:
-        """The cameras whose pictures are looked at: all, unless the file names some to follow by."""
+        """The cameras that are looked through: all, unless the file names some to follow by."""
         named = self.perception.cameras if self.task.kind == "follow" else None
         return named or tuple(self.cameras)
 

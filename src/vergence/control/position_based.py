@@ -12,6 +12,8 @@ from vergence.geometry import se3_compose, se3_inverse
 from vergence.planning import Reference
 from vergence.robot import Arm, Chain, JointState, forward_kinematics, jacobian
 
+_ONSET_S = 0.5  # of the motion of redundant joints, so that no joint meets its acceleration limit
+
 
 @njit(cache=True)
 def hand_rates(
@@ -85,6 +87,7 @@ class PositionBasedLaw:
         self._null_space, self._singular_below = null_space, singular_below
         self._goal: MovingPose | None = None
         self._reference: MovingPose | None = None
+        self._spare = np.zeros(arm.joint_count)  # what redundant joints do, gently begun
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -105,15 +108,19 @@ class PositionBasedLaw:
         """Return joint rates (n,) for the next inner period from the last set-point (n,)."""
         if self._goal is None or self._reference is None:
             return np.zeros(self._arm.joint_count)
-        self._goal = MovingPose(moved(self._goal, self._period), self._goal.twist)
-        self._reference = interpolate(
+        ahead = interpolate(
             self._reference, self._goal, self._frequency, self._damping, self._period
         )
-        return self._rates(position, self._reference)
+        # The place of now with the velocity that leads to the next one: no tick of lead or lag.
+        rates = self._rates(position, MovingPose(self._reference.T, ahead.twist))
+        self._reference = ahead
+        self._goal = MovingPose(moved(self._goal, self._period), self._goal.twist)
+        return rates
 
     def hold(self) -> None:
         """Forget the goal and the trajectory."""
         self._goal = self._reference = None
+        self._spare = np.zeros(self._arm.joint_count)
 
     def _goal_of(self, target: TargetState, wanted: FloatArray, now: float) -> MovingPose:
         """Return where the hand should be now, and how fast that place moves."""
@@ -128,12 +135,14 @@ class PositionBasedLaw:
         return MovingPose(T_hand, twist)
 
     def _rates(self, position: FloatArray, reference: MovingPose) -> FloatArray:
+        away = -self._null_space * self._arm.normalized(position)
+        self._spare = self._spare + self._period / _ONSET_S * (away - self._spare)
         rates: FloatArray = hand_rates(
             self._arm.chain,
             position,
             reference,
             self._gain,
-            -self._null_space * self._arm.normalized(position),
+            self._spare,
             self._arm.rate_max,
             self._singular_below,
         )

@@ -67,6 +67,8 @@ def reproduce(
 def variants(cell: Cell) -> Mapping[str, Cell]:
     """Return the cells to run, by name."""
     paper = cell.replace(**PAPER)
+    # Four features are for following: a start known well, since they are too few to find it by.
+    four = {"budget": 4, "start_error_m": 0.002, "start_error_deg": 0.3}
     return {
         "hybrid": paper,
         "fixed": paper.replace(**FIXED),
@@ -75,8 +77,8 @@ def variants(cell: Cell) -> Mapping[str, Cell]:
         "ours": cell,
         "blinded": blinded(cell),
         "outliers": cell.replace(perception={"outliers": 0.2}),
-        "four_information": cell.replace(perception={"budget": 4}),
-        "four_indexes": cell.replace(perception={"budget": 4, "selection": "indexes"}),
+        "four_information": cell.replace(perception=four),
+        "four_indexes": cell.replace(perception={**four, "selection": "indexes"}),
     }
 
 

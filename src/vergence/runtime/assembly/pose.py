@@ -8,6 +8,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Frame
 from vergence.cell import Cell, SimulatedDriver
+from vergence.cell.schema import PerceptionTable
 from vergence.estimation import (
     Blocked,
     CameraPose,
@@ -34,6 +35,9 @@ from vergence.runtime.assembly.measure import (
 
 if TYPE_CHECKING:
     from vergence.vision.known_object import ObjectModel
+
+_LEAST_M, _LEAST_RAD = 1e-3, 2e-3  # no start is known better
+_START_VELOCITY = (0.1, 0.3)  # m/s and rad/s, standard deviations about rest
 
 
 class FollowedPose(Protocol):
@@ -68,7 +72,8 @@ def follow_pose(
     """Return the perception that a cell describes, for a target of known geometry."""
     table = cell.perception
     names = cell.watched
-    rig = CameraRig.of({name: driver.cameras[name] for name in names}, table.noise_px)
+    expected = table.believed_noise_px or table.noise_px  # as wide as the windows must allow for
+    rig = CameraRig.of({name: driver.cameras[name] for name in names}, expected)
     measure: Measure
     if images:
         measure = CornerWindows(model, driver.cameras)
@@ -86,16 +91,19 @@ def follow_pose(
     }
     shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
     camera_pose, start = camera_poses(cell, driver), _rough_pose(cell, driver)
+    covariance = _start_covariance(table)
     if table.filter == "rpy":
         period = 1.0 / max(cell.cameras[name].rate_hz for name in names)
         # The paper has no gate, and one wrong corner then throws its filter off the target.
         rpy = RpyPoseFilter(frame_period=period, gate=PoseFilter().gate)
-        return PosePerception(rig, shape, camera_pose, measure, rpy, rpy.start(0.0, start), **parts)
+        first = rpy.start(0.0, start, covariance=covariance)
+        return PosePerception(rig, shape, camera_pose, measure, rpy, first, **parts)
     pose = PoseFilter(
         acceleration_density=table.acceleration_density,
         angular_acceleration_density=table.angular_acceleration_density,
     )
-    return PosePerception(rig, shape, camera_pose, measure, pose, pose.start(0.0, start), **parts)
+    belief = pose.start(0.0, start, covariance=covariance)
+    return PosePerception(rig, shape, camera_pose, measure, pose, belief, **parts)
 
 
 def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
@@ -127,6 +135,14 @@ def _blocked_at(driver: SimulatedDriver) -> Any:
         return obstacles.blocked
 
     return at
+
+
+def _start_covariance(table: PerceptionTable) -> FloatArray:
+    """Return what is known of pose and velocity at the start, (12, 12)."""
+    position = max(table.start_error_m, _LEAST_M)
+    angle = max(np.deg2rad(table.start_error_deg), _LEAST_RAD)
+    deviations: FloatArray = np.repeat([position, angle, *_START_VELOCITY], 3)
+    return np.diag(deviations**2)
 
 
 def _rough_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:

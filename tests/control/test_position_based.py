@@ -1,0 +1,129 @@
+"""The hand kept at a wanted pose relative to a moving target."""
+
+import numpy as np
+import pytest
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control import Guard, InnerLaw, MovingPose, PositionBasedLaw, moved
+from vergence.features import Observation, TargetState
+from vergence.geometry import se3_compose, se3_inverse, se3_log
+from vergence.planning import Reference
+from vergence.robot import Arm, JointState
+
+RATE, OUTER = 500, 26
+LATENCY_S = 1 / OUTER
+WANTED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
+
+
+@pytest.fixture(scope="module")
+def arms() -> dict[str, tuple[Arm, np.ndarray]]:
+    """The six-joint arm and the one on a track, with their starts."""
+    driver = SimulatedDriver(load_cell("lippiello2005"), images=False)
+    six = driver.world.arm_to_body("master"), driver.world.joint_position("master")
+    return {"six": six, "seven": (driver.arms["slave"], driver.world.joint_position("slave"))}
+
+
+def target_state(target: MovingPose, time: float) -> TargetState:
+    return TargetState(time, target.T, target.twist, np.eye(12), True)
+
+
+def follow(
+    arm: Arm, start: np.ndarray, twist: np.ndarray, law: PositionBasedLaw, seconds: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return hand errors (K, 6) in the hand and joint positions (K, n), a row an outer tick.
+
+    Joints follow their set-points at once; pictures are late by one frame.
+    """
+    T_target = se3_compose(arm.forward_kinematics(start), WANTED)
+    target = MovingPose(T_target, twist)
+    guard = Guard(arm, start, 1 / RATE)
+    errors, positions = [], []
+    tick = 0
+    for k in range(int(seconds * OUTER)):
+        time = tick / RATE
+        seen = MovingPose(moved(target, time - LATENCY_S), twist)
+        observation = Observation(time - LATENCY_S, (), target_state(seen, time - LATENCY_S))
+        joints = JointState(time, guard.position, np.zeros(arm.joint_count))
+        law.command(observation, Reference(time, T_camera_target=WANTED), joints)
+        while tick < int((k + 1) * RATE / OUTER):
+            guard.step(law.follow(guard.position))
+            tick += 1
+        T_hand = arm.forward_kinematics(guard.position)
+        T_wanted = se3_compose(moved(target, tick / RATE), se3_inverse(WANTED))
+        errors.append(se3_log(se3_compose(se3_inverse(T_wanted), T_hand)))
+        positions.append(guard.position)
+    return np.array(errors), np.array(positions)
+
+
+@pytest.mark.parametrize("which", ["six", "seven"])
+def test_a_target_at_constant_velocity_is_followed_without_error(
+    which: str, arms: dict[str, tuple[Arm, np.ndarray]]
+) -> None:
+    arm, start = arms[which]
+    twist = np.array([-0.03, 0.05, 0.02, 0.0, 0.05, 0.1])
+    errors, _ = follow(arm, start, twist, PositionBasedLaw(arm, 1 / RATE), 2.0)
+    assert np.abs(errors[-10:]).max() < 2e-4
+
+
+def test_without_feed_forward_and_prediction_the_hand_lags_by_filter_and_latency(
+    arms: dict[str, tuple[Arm, np.ndarray]],
+) -> None:
+    arm, start = arms["seven"]
+    twist = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
+    law = PositionBasedLaw(arm, 1 / RATE, filter_hz=5.0, feed_forward=False, prediction=False)
+    errors, _ = follow(arm, start, twist, law, 2.0)
+    least = 0.05 * (2 / (2 * np.pi * 5.0) + LATENCY_S)
+    lag = np.linalg.norm(errors[-1, :3])
+    assert least <= lag <= least + 0.05 / OUTER + 1e-4
+
+
+@pytest.mark.parametrize("feed_forward", [True, False])
+def test_a_target_that_stands_is_reached_either_way(
+    feed_forward: bool, arms: dict[str, tuple[Arm, np.ndarray]]
+) -> None:
+    arm, start = arms["seven"]
+    law = PositionBasedLaw(arm, 1 / RATE, feed_forward=feed_forward, prediction=feed_forward)
+    errors, _ = follow(arm, start, np.zeros(6), law, 1.0)
+    assert np.abs(errors).max() < 1e-9
+
+
+def test_a_spare_joint_leaves_its_limit_while_the_hand_stays(
+    arms: dict[str, tuple[Arm, np.ndarray]],
+) -> None:
+    arm, start = arms["seven"]
+    start = start.copy()
+    start[0] = 0.95 * arm.q_max[0]
+    law = PositionBasedLaw(arm, 1 / RATE, null_space=0.5)
+    errors, positions = follow(arm, start, np.zeros(6), law, 3.0)
+    assert abs(positions[-1, 0]) < abs(start[0]) - 0.1
+    assert np.abs(errors).max() < 1e-3
+
+
+def test_limits_hold_when_the_target_flees_out_of_reach(
+    arms: dict[str, tuple[Arm, np.ndarray]],
+) -> None:
+    arm, start = arms["six"]
+    law = PositionBasedLaw(arm, 1 / RATE)
+    _, positions = follow(arm, start, np.array([1.0, 0.5, 0.3, 0.5, 0.0, 0.0]), law, 4.0)
+    assert np.isfinite(positions).all()
+    assert (positions >= arm.q_min).all()
+    assert (positions <= arm.q_max).all()
+
+
+def test_without_a_target_the_arm_is_asked_to_stand(
+    arms: dict[str, tuple[Arm, np.ndarray]],
+) -> None:
+    arm, start = arms["six"]
+    law = PositionBasedLaw(arm, 1 / RATE)
+    joints = JointState(0.0, start, np.zeros(6))
+    T_target = se3_compose(arm.forward_kinematics(start), WANTED)
+    seen = Observation(0.0, (), target_state(MovingPose(T_target, np.ones(6)), 0.0))
+    law.command(seen, Reference(0.0, T_camera_target=WANTED), joints)
+    assert law.follow(start).any()
+    command = law.command(Observation(0.1, ()), Reference(0.1, T_camera_target=WANTED), joints)
+    assert not command.velocity.any()
+    assert not law.follow(start).any()
+
+
+def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> None:
+    assert isinstance(PositionBasedLaw(arms["six"][0], 1 / RATE), InnerLaw)
