@@ -85,7 +85,8 @@ def _from_ros(table: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _checked(table: Mapping[str, Any], width: int, height: int, source: str, prefix: str) -> Camera:
-    given = {key: float(numbers(table, key, (), source)) for key in _OPTIONS}
+    named = {prefix + key: value for key, value in table.items()}
+    given = {key: float(numbers(named, prefix + key, (), source)) for key in _OPTIONS}
     for key in ("fx", "fy"):
         if not 0.1 * width <= given[key] <= 100.0 * width:
             allowed = f"a focal length in pixels; the pictures are {width} x {height}"
@@ -98,7 +99,7 @@ def _checked(table: Mapping[str, Any], width: int, height: int, source: str, pre
             raise InputError(source, prefix + key, given[key], allowed)
     distortion = np.zeros(5)
     if "distortion" in table:
-        values = numbers(table, "distortion", (None,), source)
+        values = numbers(named, prefix + "distortion", (None,), source)
         if len(values) > 5:
             allowed = "k1, k2, p1, p2, k3, or fewer"
             raise InputError(source, prefix + "distortion", f"{len(values)} values", allowed)

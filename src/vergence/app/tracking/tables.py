@@ -78,18 +78,17 @@ def numbers(
     Raises:
         InputError: if it is not that.
     """
-    wanted = " x ".join("any number" if n is None else str(n) for n in shape) or "one"
+    size = " x ".join("any number" if n is None else str(n) for n in shape)
+    wanted = f"{size} finite numbers" if shape else "a finite number"
     try:
         array = np.array(table[key], dtype=np.float64)
     except KeyError:
-        raise InputError(
-            source, key, "nothing", f"{wanted} numbers; this key is required"
-        ) from None
+        raise InputError(source, key, "nothing", f"{wanted}; this key is required") from None
     except (TypeError, ValueError):
-        raise InputError(source, key, table[key], f"{wanted} numbers") from None
+        raise InputError(source, key, table[key], wanted) from None
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
     )
     if not fits or not np.isfinite(array).all():
-        raise InputError(source, key, table[key], f"{wanted} finite numbers")
+        raise InputError(source, key, table[key], wanted)
     return array
