@@ -105,7 +105,7 @@ def test_a_target_that_leaves_the_image_is_a_named_outcome() -> None:
     trace, _ = traced(shortened(3.0, target__motion=motion), images=False)
     assert trace.outcome.kind is OutcomeKind.TARGET_LOST
     assert 0.3 < trace.outcome.time < 1.5
-    assert "left the image" in trace.outcome.reason
+    assert "out of sight" in trace.outcome.reason
 
 
 def test_two_axis_tracking_ends_at_the_joint_limit_or_the_singularity_by_name() -> None:

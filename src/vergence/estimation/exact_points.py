@@ -38,5 +38,5 @@ class ExactPoints:
             np.where(truth.visible[:, None], truth.points_px + noise, np.nan),
             np.broadcast_to(covariance, (len(noise), 2, 2)),
             truth.visible,
-            tuple("" if seen else "left the image" for seen in truth.visible),
+            tuple("" if seen else "out of sight" for seen in truth.visible),
         )

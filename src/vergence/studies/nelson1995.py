@@ -1,20 +1,19 @@
 """[Nelson1995] section 5: tracking with and without avoidance, and the limits of the method."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vergence.arrays import FloatArray
 from vergence.cell import Cell, load_cell
 from vergence.cell.schema import OptimalTrackingTable
-from vergence.outcome import Outcome, OutcomeKind
+from vergence.outcome import OutcomeKind
 from vergence.runtime import run_cell
 from vergence.studies import nelson1995_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
 from vergence.studies.trace import Trace
+from vergence.studies.trial import Trial, Trials
 
 TITLE = "Nelson and Khosla (1995): singularity and joint limit avoidance while tracking"
 RANGE_M = 2.5  # each way; 5 m in all
@@ -25,41 +24,6 @@ STRATEGIES: Mapping[str, Mapping[str, Any]] = {
     "avoidance": {},  # as the cell file has it: X and Y avoid, S = 0.001
 }
 WINDOW_PX = 32.0  # the search range of the tracker
-
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """One run: how it ended and its rows."""
-
-    outcome: Outcome
-    summary: Mapping[str, float]
-    trace: Trace
-
-    @property
-    def camera_m(self) -> FloatArray:
-        """Camera translation along the motion, (K,)."""
-        return _travel(self.trace["T_world_camera"])
-
-    @property
-    def object_m(self) -> FloatArray:
-        """Object translation along the motion, (K,)."""
-        return _travel(self.trace["T_world_target"])
-
-    @property
-    def estimated_m(self) -> FloatArray:
-        """Object translation as the arm knows it: x + z tan θ, (K,).
-
-        [Nelson1995] eq. (32) prints z / cos θ, which is metres off at large tilt.
-        """
-        T = self.trace["T_world_camera"]
-        height = T[:, 2, 3] - self.trace["T_world_target"][:, 2, 3]
-        tilt = np.arctan2(T[:, 0, 2], -T[:, 2, 2])
-        return self.camera_m + height * np.tan(tilt)
-
-
-def _travel(T: FloatArray) -> FloatArray:
-    along_x: FloatArray = T[:, 0, 3] - T[0, 0, 3]
-    return along_x
 
 
 def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
@@ -107,9 +71,6 @@ def run(cell: Cell, quick: bool) -> Trial:
     trace = Trace(cell.task.camera)
     result = run_cell(cell, [trace], images=not quick)
     return Trial(result.outcome, result.summary, trace)
-
-
-Trials = Mapping[tuple[str, int], Trial]
 
 
 def _two_axis(trials: Trials) -> list[Check]:

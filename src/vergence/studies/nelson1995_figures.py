@@ -1,8 +1,7 @@
 """Figures 4, 5 and 8 to 15 of [Nelson1995], drawn from our runs."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from vergence.cell.schema import OptimalTrackingTable
 from vergence.drawing import COLORS, curve, figure, legend, save
 from vergence.robot import Arm, joint_limit_penalty, manipulability
 from vergence.studies.check import Figure
-
-if TYPE_CHECKING:
-    from vergence.studies.nelson1995 import Trial
+from vergence.studies.trial import Trial, Trials
 
 _WIDTH, _HEIGHT = 7.6, 3.0  # inches
 _LABELS = {
@@ -24,7 +21,7 @@ _LABELS = {
 }
 
 
-def draw(out: Path, cell: Cell, trials: "Mapping[tuple[str, int], Trial]") -> tuple[Figure, ...]:
+def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
     """Write every figure into a folder; return them in the paper's order."""
     out.mkdir(parents=True, exist_ok=True)
     driver = SimulatedDriver(cell, images=False)
@@ -115,7 +112,7 @@ def _penalties(arm: Arm, start: FloatArray) -> Any:
     return drawing
 
 
-def _translation(trials: "Mapping[tuple[str, int], Trial]", sign: int) -> Any:
+def _translation(trials: Trials, sign: int) -> Any:
     drawing, axes = _axes("time (s)", "translation (m)")
     whole = trials["avoidance", sign]
     axes.plot(whole.trace["time"], whole.object_m, color="#999", linewidth=3, label="object")
@@ -145,7 +142,7 @@ def _translation(trials: "Mapping[tuple[str, int], Trial]", sign: int) -> Any:
     return drawing
 
 
-def _manipulability(trials: "list[Trial]", x: str, x_label: str) -> Any:
+def _manipulability(trials: list[Trial], x: str, x_label: str) -> Any:
     drawing, axes = _axes(x_label, "manipulability (m⁶)")
     for trial in trials:
         first = trial is trials[0]
@@ -164,7 +161,7 @@ def _manipulability(trials: "list[Trial]", x: str, x_label: str) -> Any:
     return drawing
 
 
-def _against(trials: "list[Trial]", x: str, column: str, x_label: str, y_label: str) -> Any:
+def _against(trials: list[Trial], x: str, column: str, x_label: str, y_label: str) -> Any:
     drawing, axes = _axes(x_label, y_label)
     for trial in trials:
         axes.plot(getattr(trial, x), trial.trace[column], **curve(0))
@@ -172,7 +169,7 @@ def _against(trials: "list[Trial]", x: str, column: str, x_label: str, y_label: 
     return drawing
 
 
-def _errors(trials: "Mapping[tuple[str, int], Trial]") -> Any:
+def _errors(trials: Trials) -> Any:
     drawing, axes = _axes("time (s)", "feature error (px)")
     for index, strategy in ((0, "two_axis"), (2, "avoidance")):
         trial = trials[strategy, -1]
