@@ -147,10 +147,9 @@ class World:
         """Whether a body is the target or a part of it."""
         return body in self._target_bodies
 
-    def arm_to_body(self, name: str, body: str | None = None) -> Arm:
-        """Return an arm with one of its bodies as its tip, its last one if none is named."""
-        table = self.cell.arms[name]
-        return self._arm_to(name, f"{name}/{body or table.body}", "body")
+    def arm_to_body(self, name: str) -> Arm:
+        """Return an arm with its last body as its tip."""
+        return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")
 
     def arm_to_target(self) -> Arm:
         """Return the arm that carries the target, with the target as its tip."""
