@@ -38,6 +38,7 @@ class Cell(Table):
     task: Task
     perception: PerceptionTable = PerceptionTable()
     law: Law
+    laws: dict[str, Law] = Field(default_factory=dict)  # others, by name, to compare it with
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
 

@@ -8,6 +8,7 @@ from vergence.cell.schema import (
     ConstrainedTable,
     OptimalTrackingTable,
     PathTrackingTable,
+    PlainTable,
     PositionBasedTable,
 )
 from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
@@ -16,6 +17,7 @@ from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.path_tracking import PathTrackingLaw
+from vergence.control.plain import PlainLaw
 from vergence.errors import InputError
 from vergence.robot import yoshikawa_measure
 
@@ -33,6 +35,9 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
         case ConstrainedTable():
             _require_task(cell, "track")
             return _constrained(cell, driver, cell.law)
+        case PlainTable():
+            _require_task(cell, "track")
+            return _plain(cell, driver, cell.law)
         case PositionBasedTable():
             _require_task(cell, "follow")
             return _position_based(cell, driver, cell.law)
@@ -79,12 +84,6 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
     name = cell.task.camera
     arm, camera = driver.world.arm_to_camera(name), driver.cameras[name]
     period = 1.0 / cell.cameras[name].rate_hz
-    objective: Objective
-    if table.objective == "image_based":
-        objective = ImageBased(camera, table.gain, table.interaction)
-    else:
-        _check_weights(cell, table)
-        objective = OptimalTracking(camera, table.axes, table.Q, table.R, period)
     low, high = table.depth_range
     if not low <= 1.0 <= high:
         raise InputError(
@@ -94,7 +93,7 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
     return ConstrainedLaw(
         arm,
         camera,
-        objective,
+        _objective(cell, driver, table),
         _depth(driver, name, table.depth_m),
         period=period,
         order=table.order,
@@ -108,7 +107,30 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
     )
 
 
-def _check_weights(cell: Cell, table: OptimalTrackingTable | ConstrainedTable) -> None:
+def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
+    name, smoothing = cell.task.camera, table.flow_smoothing_s
+    return PlainLaw(
+        driver.world.arm_to_camera(name),
+        driver.cameras[name],
+        _objective(cell, driver, table),
+        _depth(driver, name, table.depth_m),
+        flow_smoothing_s=np.inf if smoothing is None else smoothing,
+        singular_below=table.singular_below,
+    )
+
+
+def _objective(
+    cell: Cell, driver: SimulatedDriver, table: ConstrainedTable | PlainTable
+) -> Objective:
+    camera = driver.cameras[cell.task.camera]
+    if table.objective == "image_based":
+        return ImageBased(camera, table.gain, table.interaction)
+    _check_weights(cell, table)
+    period = 1.0 / cell.cameras[cell.task.camera].rate_hz
+    return OptimalTracking(camera, table.axes, table.Q, table.R, period)
+
+
+def _check_weights(cell: Cell, table: OptimalTrackingTable | ConstrainedTable | PlainTable) -> None:
     if isinstance(table.R, tuple) and len(table.R) != len(table.axes):
         raise InputError(
             str(cell.path), "law.R", f"{len(table.R)} weights", f"one, or {len(table.axes)}"

@@ -1,26 +1,11 @@
-"""The tables of a cell file, typed."""
+"""Arms, cameras, target, task and perception in a cell file."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-Vector3 = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0)]
-Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
-
-
-class Table(BaseModel):
-    """A table of the file: unknown keys are mistakes, values do not change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Placement(Table):
-    """A pose: a position and roll-pitch-yaw angles, R = Rz(yaw) Ry(pitch) Rx(roll)."""
-
-    position_m: Vector3 = (0.0, 0.0, 0.0)
-    rotation_rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+from vergence.cell.schema.base import Placement, Positive, Table, Vector3
 
 
 class SceneTable(Table):
@@ -234,94 +219,3 @@ class PerceptionTable(Table):
     start_error_deg: Annotated[float, Field(ge=0)] = 2.0
     acceleration_density: Positive = 0.01  # m²/s³, of the target, for the filter on SE(3)
     angular_acceleration_density: Positive = 0.25  # rad²/s³
-
-
-class OptimalTrackingTable(Table):
-    """The law of [Nelson1995] eq. (29), its gains in the paper's units (pixels, metres a frame)."""
-
-    kind: Literal["optimal_tracking"]
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
-    avoidance_axes: tuple[Axis, ...] = ()
-    Q: Positive = 2e-6  # 1/px²
-    R: Positive | tuple[Positive, ...] = 10.0  # one for all controlled axes, or one each
-    S: Annotated[float, Field(ge=0)] = 0.0
-    penalty: Literal["product", "per_joint"] = "product"
-    penalty_k: Positive = 1e5
-    depth_m: Positive | Literal["initial"] = "initial"  # what the start shows, held constant
-    avoidance_speed_max_m_s: Positive = 0.5
-    singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
-
-
-class PositionBasedTable(Table):
-    """The target's pose and a wanted relative pose make the hand's trajectory."""
-
-    kind: Literal["position_based"]
-    filter_hz: Positive = 5.0  # natural frequency of the second-order interpolating filter
-    damping: Positive = 1.0  # of that filter
-    feed_forward: bool = True  # the target's velocity goes through to the hand
-    prediction: bool = True  # the target's pose is predicted from the exposure to now
-    closed_loop_hz: Positive = 5.0  # how fast the joints make up for what they are behind
-    null_space: Annotated[float, Field(ge=0)] = 0.5  # 1/s, pull of spare joints to mid-range
-    singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping below it, of the largest value
-
-
-class ConstrainedTable(Table):
-    """Any objective in the image under hard joint limits, with view and singularities kept."""
-
-    kind: Literal["constrained"]
-    objective: Literal["image_based", "optimal_tracking"] = "image_based"
-    gain: Positive = 1.0  # λ of image_based, 1/s
-    interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
-    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
-    R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
-    S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
-    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
-    depth_range: tuple[Positive, Positive] = (0.5, 2.0)  # factors between which the truth lies
-    order: tuple[Literal["view", "singularity", "joint margin"], ...] = (
-        "view",
-        "singularity",
-        "joint margin",
-    )  # what is kept, most important first; joint limits always are
-    view_margin_px: Annotated[float, Field(ge=0)] = 10.0
-    joint_margin: Annotated[float, Field(ge=0, lt=0.5)] = 0.03  # share of each joint's range
-    manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
-    approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second
-    flow_smoothing_s: Annotated[float, Field(ge=0)] = 0.1  # of the target's motion in the image
-
-
-class PathTrackingTable(Table):
-    """The law of [Mezouar2001] section 5: keeps image points on a planned trajectory."""
-
-    kind: Literal["path_tracking"]
-    gain: Positive = 2.0  # λ, 1/s
-    interaction: Literal["current", "desired", "mean"] = "desired"  # where L is taken
-
-
-Law = Annotated[
-    OptimalTrackingTable | PositionBasedTable | ConstrainedTable | PathTrackingTable,
-    Field(discriminator="kind"),
-]
-
-# What stands at a place in the file, or is the kind of what stands there.
-TABLES: dict[str, type[Table]] = {
-    "scene": SceneTable,
-    "arms": ArmTable,
-    "joints": JointMotion,
-    "poses": PoseMotion,
-    "cameras": CameraTable,
-    "target": TargetTable,
-    "still": StillMotion,
-    "line": LineMotion,
-    "circle": CircleMotion,
-    "step": StepMotion,
-    "random": RandomMotion,
-    "track": TrackTable,
-    "follow": FollowTable,
-    "reach": ReachTable,
-    "perception": PerceptionTable,
-    "optimal_tracking": OptimalTrackingTable,
-    "position_based": PositionBasedTable,
-    "constrained": ConstrainedTable,
-    "path_tracking": PathTrackingTable,
-}

@@ -1,0 +1,22 @@
+"""What every table of a cell file is made of."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Vector3 = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0)]
+Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are mistakes, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Placement(Table):
+    """A pose: a position and roll-pitch-yaw angles, R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    rotation_rpy_deg: Vector3 = (0.0, 0.0, 0.0)

@@ -1,0 +1,90 @@
+"""The laws of a cell file."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from vergence.cell.schema.base import Axis, Positive, Table
+
+
+class OptimalTrackingTable(Table):
+    """The law of [Nelson1995] eq. (29), its gains in the paper's units (pixels, metres a frame)."""
+
+    kind: Literal["optimal_tracking"]
+    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
+    avoidance_axes: tuple[Axis, ...] = ()
+    Q: Positive = 2e-6  # 1/px²
+    R: Positive | tuple[Positive, ...] = 10.0  # one for all controlled axes, or one each
+    S: Annotated[float, Field(ge=0)] = 0.0
+    penalty: Literal["product", "per_joint"] = "product"
+    penalty_k: Positive = 1e5
+    depth_m: Positive | Literal["initial"] = "initial"  # what the start shows, held constant
+    avoidance_speed_max_m_s: Positive = 0.5
+    singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
+
+
+class PositionBasedTable(Table):
+    """The target's pose and a wanted relative pose make the hand's trajectory."""
+
+    kind: Literal["position_based"]
+    filter_hz: Positive = 5.0  # natural frequency of the second-order interpolating filter
+    damping: Positive = 1.0  # of that filter
+    feed_forward: bool = True  # the target's velocity goes through to the hand
+    prediction: bool = True  # the target's pose is predicted from the exposure to now
+    closed_loop_hz: Positive = 5.0  # how fast the joints make up for what they are behind
+    null_space: Annotated[float, Field(ge=0)] = 0.5  # 1/s, pull of spare joints to mid-range
+    singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping below it, of the largest value
+
+
+class ConstrainedTable(Table):
+    """Any objective in the image under hard joint limits, with view and singularities kept."""
+
+    kind: Literal["constrained"]
+    objective: Literal["image_based", "optimal_tracking"] = "image_based"
+    gain: Positive = 1.0  # λ of image_based, 1/s
+    interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
+    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
+    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
+    R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
+    S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
+    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
+    depth_range: tuple[Positive, Positive] = (0.5, 2.0)  # factors between which the truth lies
+    order: tuple[Literal["view", "singularity", "joint margin"], ...] = (
+        "view",
+        "singularity",
+        "joint margin",
+    )  # what is kept, most important first; joint limits always are
+    view_margin_px: Annotated[float, Field(ge=0)] = 10.0
+    joint_margin: Annotated[float, Field(ge=0, lt=0.5)] = 0.03  # share of each joint's range
+    manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
+    approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second
+    flow_smoothing_s: Annotated[float, Field(ge=0)] = 0.1  # of the target's motion in the image
+
+
+class PlainTable(Table):
+    """Any objective in the image by itself, through the inverse of the Jacobian: no limits kept."""
+
+    kind: Literal["plain"]
+    objective: Literal["image_based", "optimal_tracking"] = "image_based"
+    gain: Positive = 1.0  # λ of image_based, 1/s
+    interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
+    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
+    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
+    R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
+    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
+    flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the target stands if absent
+    singular_below: Annotated[float, Field(ge=0)] = 0.02  # where the law gives up
+
+
+class PathTrackingTable(Table):
+    """The law of [Mezouar2001] section 5: keeps image points on a planned trajectory."""
+
+    kind: Literal["path_tracking"]
+    gain: Positive = 2.0  # λ, 1/s
+    interaction: Literal["current", "desired", "mean"] = "desired"  # where L is taken
+
+
+Law = Annotated[
+    OptimalTrackingTable | PositionBasedTable | ConstrainedTable | PlainTable | PathTrackingTable,
+    Field(discriminator="kind"),
+]
