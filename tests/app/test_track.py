@@ -218,6 +218,7 @@ def test_points_found_by_hand_are_a_start(track: Track, tmp_path: Path) -> None:
         ({"images": "empty"}, "empty: given a folder without images"),
         ({"rate": "0"}, "--rate: given 0"),
         ({"contrast": "-1"}, "--contrast: given -1"),
+        ({"share": "1.5"}, "--share: given 1.5"),
         ({"scale": "0"}, "scale: given 0"),
     ],
 )

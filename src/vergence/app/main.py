@@ -153,6 +153,9 @@ def track(
     scale: Annotated[float, typer.Option(help="Metres in a unit of the model file.")] = 1.0,
     contrast: Annotated[float, typer.Option(help="Least step of an edge, grey levels.")] = 5.0,
     jolt: Annotated[float, typer.Option(help="Unforeseen motion, pixels a picture.")] = 3.0,
+    share: Annotated[
+        float, typer.Option(help="Least share of the edges to be found, for a picture to count.")
+    ] = 0.5,
     overlay: Annotated[
         bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
     ] = True,
@@ -165,7 +168,18 @@ def track(
 
     intrinsics = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
     request = Request(
-        images, model, start, camera, intrinsics, distortion, rate, scale, contrast, jolt, overlay
+        images,
+        model,
+        start,
+        camera,
+        intrinsics,
+        distortion,
+        rate,
+        scale,
+        contrast,
+        jolt,
+        share,
+        overlay,
     )
     raise typer.Exit(command(request, out, as_json))
 

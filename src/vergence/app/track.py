@@ -33,6 +33,7 @@ class Request(NamedTuple):
     scale: float
     contrast: float
     jolt_px: float
+    least_share: float
     overlay: bool
 
 
@@ -95,9 +96,19 @@ def _follower(
     for key, value in (("--contrast", request.contrast), ("--jolt", request.jolt_px)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("vergence track", key, value, "a number above zero")
+    if not 0.2 <= request.least_share <= 1.0:
+        allowed = "0.2 … 1: with fewer of its edges an object is not told from its background"
+        raise InputError("vergence track", "--share", request.least_share, allowed)
     start = starting_pose(request.start, camera)
     tracker = EdgeTracker(model, contrast=request.contrast)
-    rule = FollowRule(jolt_px=request.jolt_px)
+    share = request.least_share
+    usual = FollowRule()
+    rule = FollowRule(
+        jolt_px=request.jolt_px,
+        least_of_all=share,
+        least_share=min(usual.least_share, share + 0.07),
+        surprising_share=max(usual.surprising_share, share),
+    )
     return ObjectFollower(tracker, camera, start, 0.0, 1.0 / footage.rate_hz, rule)
 
 

@@ -45,8 +45,9 @@ class FollowRule:
     """When a picture counts, and when the object is lost."""
 
     jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the picture, per frame
-    least_share: float = 0.55  # of the edges expected, to believe a picture
-    surprise_share: float = 0.2  # more of it, if the picture contradicts the prediction
+    least_share: float = 0.57  # of the edges usually found, to believe a picture
+    least_of_all: float = 0.5  # of all the edges that should be seen
+    surprising_share: float = 0.75  # of both, if the picture contradicts the prediction
     least_lines: int = 3  # edges found, to believe a picture
     patience: int = 12  # pictures in a row without the object, after which it is lost
     turn_max_rad: float = (
@@ -150,9 +151,13 @@ class ObjectFollower:
         if not seen.expected:
             return "the object is outside the image"
         surprise = min(1.0, _surprise(belief, seen.T_camera_target) / _SURPRISING)
-        needed = rule.least_share + surprise * rule.surprise_share
-        if seen.share < needed:
-            return f"{seen.share:.0%} of the edges expected were found; {needed:.0%} are needed"
+        for share, least, what in (
+            (seen.usual, rule.least_share, "the edges expected"),
+            (seen.share, rule.least_of_all, "all edges"),
+        ):
+            needed = least + surprise * (rule.surprising_share - least)
+            if share < needed:
+                return f"{share:.0%} of {what} were found; {needed:.0%} are needed"
         if len(seen.points) < 2 * rule.least_lines:
             return f"{len(seen.points) // 2} edges were found; {rule.least_lines} are needed"
         return ""

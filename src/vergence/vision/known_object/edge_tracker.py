@@ -28,6 +28,8 @@ _DOUBLE_PX = 5.0  # edges nearer to each other are not told apart
 _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
 _LEARNED_PX = 1.0
+_UNKNOWN_RATE = 0.5  # at which a place counts that was not looked at yet
+_RATE_GAIN = 0.1  # of one picture: ten are remembered
 _REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
 
 
@@ -36,6 +38,7 @@ class EdgeMemory(NamedTuple):
 
     templates: FloatArray  # (E, P, 9) grey profiles, mean 0, norm 1
     known: BoolArray  # (E, P) whether there is one
+    rate: FloatArray  # (E, P) how often each was found of late, 0 … 1
 
 
 class EdgeMeasurement(NamedTuple):
@@ -47,6 +50,7 @@ class EdgeMeasurement(NamedTuple):
     T_camera_target: FloatArray  # (4, 4) the pose that fits this picture
     expected: int  # places on edges that should be seen
     found: int  # of them, where an edge was found that looks as remembered
+    usual: float  # the same as a share, each place weighing as often as it was found of late
     samples_px: FloatArray  # (N, 2) the places, under the fitted pose
     samples_found: BoolArray  # (N,)
     fit: PoseFit
@@ -93,7 +97,11 @@ class EdgeTracker:
     def blank(self) -> EdgeMemory:
         """Return the memory before the first picture."""
         shape = (len(self.model.edges), int(self.places.max()))
-        return EdgeMemory(np.zeros((*shape, 2 * TEMPLATE + 1)), np.zeros(shape, dtype=np.bool_))
+        return EdgeMemory(
+            np.zeros((*shape, 2 * TEMPLATE + 1)),
+            np.zeros(shape, dtype=np.bool_),
+            np.full(shape, _UNKNOWN_RATE),
+        )
 
     def measure(
         self,
@@ -135,10 +143,11 @@ class EdgeTracker:
             points,
             places,
             # The less of the object is seen, the likelier some of it is something else.
-            covariances * (expected / max(count, 1)) ** 2,
+            covariances * (expected / max(count, 1)) ** 4,
             fit.T,
             expected,
             count,
+            _usual(memory, samples, steps.readable, found),
             samples.points_px,
             found,
             fit,
@@ -161,7 +170,11 @@ class EdgeTracker:
         mixed = share * templates[at] + (1.0 - share) * looks
         templates[at] = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-12)
         known[at] = True
-        return EdgeMemory(templates, known)
+        rate = memory.rate.copy()
+        readable = seen.steps.readable
+        looked = seen.samples.edge[readable], seen.samples.place[readable]
+        rate[looked] += _RATE_GAIN * (seen.samples_found[readable] - rate[looked])
+        return EdgeMemory(templates, known, rate)
 
     def _samples(self, T: FloatArray, lens: FloatArray, apart_px: float) -> EdgeSamples:
         model = self.model
@@ -209,3 +222,15 @@ def _width(fit: PoseFit, steps: Steps) -> float:
     if not len(rows):
         return 0.0
     return float(np.median(steps.widths[rows, fit.chosen[rows]])) + 2.0
+
+
+def _usual(
+    memory: EdgeMemory, samples: EdgeSamples, readable: BoolArray, found: BoolArray
+) -> float:
+    """Return the share found of the places, each weighing as often as it was found of late.
+
+    Some edges of an object are never seen, for want of contrast; they say nothing.
+    """
+    weight = memory.rate[samples.edge[readable], samples.place[readable]]
+    total = float(weight.sum())
+    return float(weight[found[readable]].sum()) / total if total > 0.0 else 0.0
