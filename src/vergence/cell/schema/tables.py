@@ -80,6 +80,8 @@ class CameraTable(Placement):
     latency_frames: Annotated[int, Field(ge=0)] = 0  # from exposure until the picture arrives
     noise_grey: Annotated[float, Field(ge=0)] = 1.0  # standard deviation, of 255
     blind_s: tuple[tuple[float, float], ...] = ()  # from when to when its pictures are black
+    calibration_error_m: Annotated[float, Field(ge=0)] = 0.0  # how far its believed pose is off
+    calibration_error_deg: Annotated[float, Field(ge=0)] = 0.0
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":

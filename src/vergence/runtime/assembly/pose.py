@@ -24,7 +24,7 @@ from vergence.estimation import (
     TargetShape,
 )
 from vergence.features import Observation
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import se3, se3_compose, so3_exp
 from vergence.robot import forward_kinematics
 from vergence.runtime.assembly.measure import (
     CornerWindows,
@@ -107,8 +107,21 @@ def follow_pose(
 
 
 def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
-    """Return the function from a camera's name and joints at the exposure to T_world_camera."""
-    fixed = {n: driver.world.camera_pose(n) for n, t in cell.cameras.items() if t.arm is None}
+    """Return the function from a camera's name and joints at the exposure to T_world_camera.
+
+    It is off by each camera's calibration error, as a calibrated camera's is.
+    """
+    off = {
+        name: _small_motion(
+            np.random.default_rng([cell.seed, 6, number]),
+            table.calibration_error_m,
+            table.calibration_error_deg,
+        )
+        for number, (name, table) in enumerate(cell.cameras.items())
+    }
+    fixed = {
+        n: driver.world.camera_pose(n) @ off[n] for n, t in cell.cameras.items() if t.arm is None
+    }
     carried = {
         n: (t.arm, driver.world.arm_to_camera(n).chain)
         for n, t in cell.cameras.items()
@@ -119,7 +132,9 @@ def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
         if camera in fixed:
             return fixed[camera]
         arm, chain = carried[camera]
-        T_world_camera: FloatArray = forward_kinematics(chain, joints[arm])
+        T_world_camera: FloatArray = se3_compose(
+            forward_kinematics(chain, joints[arm]), off[camera]
+        )
         return T_world_camera
 
     return pose
@@ -148,10 +163,17 @@ def _start_covariance(table: PerceptionTable) -> FloatArray:
 def _rough_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:
     """Return the target's pose at the start as well as it is known, (4, 4)."""
     table = cell.perception
-    rng = np.random.default_rng([cell.seed, 4])
-    shift, turn = rng.normal(size=3), rng.normal(size=3)
+    off = _small_motion(
+        np.random.default_rng([cell.seed, 4]), table.start_error_m, table.start_error_deg
+    )
     truth = driver.world.target_pose()
-    angle = np.deg2rad(table.start_error_deg)
-    R = so3_exp(angle * turn / np.linalg.norm(turn)) @ truth[:3, :3]
-    T: FloatArray = se3(R, truth[:3, 3] + table.start_error_m * shift / np.linalg.norm(shift))
+    T: FloatArray = se3(off[:3, :3] @ truth[:3, :3], truth[:3, 3] + off[:3, 3])
+    return T
+
+
+def _small_motion(rng: np.random.Generator, distance_m: float, angle_deg: float) -> FloatArray:
+    """Return a motion (4, 4) of the given size in random directions."""
+    shift, turn = rng.normal(size=3), rng.normal(size=3)
+    R = so3_exp(np.deg2rad(angle_deg) * turn / np.linalg.norm(turn))
+    T: FloatArray = se3(R, distance_m * shift / np.linalg.norm(shift))
     return T
