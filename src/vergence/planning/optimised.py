@@ -16,6 +16,7 @@ from vergence.planning.smoothing import SplineProblem, least_clearance, optimise
 from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
 from vergence.planning.tree import connect_trees, pull_into_view, shorten
 from vergence.planning.visibility import View
+from vergence.planning.wrist_search import wrist_path
 
 PROOF_CELLS = 32  # of the grid that shows some problems to have no path
 SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
@@ -36,8 +37,8 @@ class OptimisedPlanner:
 
     The cost is ∫ |q'/q̇_max|² + smoothing ∫ |q''/q̇_max|² over the path. Guesses: straight in joint
     space to every inverse-kinematics branch, the same pulled into view, and the camera's straight
-    line turned in both senses; behind them a bidirectional tree. The same problem always has the
-    same answer.
+    line turned in both senses; behind them a bidirectional tree and, for arms that slide first, a
+    search over the wrist cell by cell. The same problem always has the same answer.
     """
 
     controls: int = 12  # of the spline; twice as many for what the tree finds
@@ -145,7 +146,9 @@ class OptimisedPlanner:
             problem.q_start.copy(), goals, samples, 0.15,
         )  # fmt: skip
         if not len(path):
-            return None
+            guess = wrist_path(problem, view, goals)
+            basis = spline_basis(2 * self.controls, 2 * self.samples, self.smoothing)
+            return self._smooth(problem, view, basis, guess) if len(guess) else None
         for controls in (2 * self.controls, 4 * self.controls):
             basis = spline_basis(controls, 4 * controls, self.smoothing)
             for draws in (random.random((200, 2)), np.empty((0, 2))):

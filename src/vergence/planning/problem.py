@@ -84,10 +84,10 @@ class PlanningProblem:
 
     @property
     def depth_min(self) -> float:
-        """Least depth to keep, m: half of the smaller one of start and goal."""
+        """Least depth to keep, m: a fifth of the smaller one of start and goal."""
         T_camera_world = se3_inverse(self.arm.forward_kinematics(self.q_start))
         depths = transform_points(T_camera_world, self.points_world)[:, 2]
-        return 0.5 * float(min(depths.min(), self.points_goal[:, 2].min()))
+        return 0.2 * float(min(depths.min(), self.points_goal[:, 2].min()))
 
     def view(self, margin_px: float | None = None) -> View:
         """Return what the camera must see, with the problem's margin or another."""

@@ -45,7 +45,7 @@ def proves_no_path(
     while True:
         shape, width = np.array(seen.shape), (high - low) / cells
         q_min, q_max = arm.q_min.copy(), arm.q_max.copy()
-        flat = visible_cells(arm.chain, view, q_min, q_max, low, width, shape, seen.ravel())
+        flat = visible_cells(arm.chain, view, q_min, q_max, low, width, shape, seen.ravel(), 1.0)
         islands = label_islands(flat, shape)
         homes = [_cell_of(q[3:], low, high, cells) for q in (problem.q_start, *goals)]
         if all(islands[homes[0]] != islands[home] for home in homes[1:]):
@@ -83,8 +83,12 @@ def visible_cells(
     width: FloatArray,
     shape: IntArray,
     asked: BoolArray,
+    ease: float,
 ) -> BoolArray:
-    """Return which of the cells asked for may hold a configuration that sees all points."""
+    """Return which of the cells asked for see all points.
+
+    With ease 1 those that may hold a configuration that does, with 0 those whose middle does.
+    """
     result = np.zeros(len(asked), np.bool_)
     for cell in prange(len(result)):
         if not asked[cell]:
@@ -94,7 +98,7 @@ def visible_cells(
         for i in range(len(shape) - 1, -1, -1):
             q[3 + i] = low[i] + (rest % shape[i] + 0.5) * width[i]
             rest //= shape[i]
-        result[cell] = cell_sees(chain, view, q, q_min, q_max, 0.5 * width.sum())
+        result[cell] = cell_sees(chain, view, q, q_min, q_max, ease * 0.5 * width.sum())
     return result
 
 
@@ -132,7 +136,7 @@ def cell_sees(
                 inside += side[i] * (view.points_world[j, i] - state.p[i])
             least = min(least, inside)
         # side·(P - p(x)) ≥ -shift ‖side‖ for every P, with p(x) = p + Σ axis_i (x_i - q_i).
-        h[k] = -least - shift * np.sqrt(np.sum(side**2))
+        h[k] = view.offsets[k] - least - shift * np.sqrt(np.sum(side**2))
         for i in range(3):
             for r in range(3):
                 G[k, i] -= state.axis[i, r] * side[r]

@@ -26,6 +26,8 @@ def pull_into_view(
         add_visibility_penalty(chain, q, view, margin, 1.0, g, H)
         for i in range(n):
             H[i, i] += 1e-3
+            if high[i] <= low[i]:  # a joint that is held
+                H[i, :], H[:, i], H[i, i], g[i] = 0.0, 0.0, 1.0, 0.0
         step = banded_solve(H, g, n)
         largest = np.abs(step).max()
         if largest > 0.5:
