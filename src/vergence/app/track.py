@@ -1,6 +1,7 @@
 """`vergence track`: the pose of a known object in footage, picture by picture."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from vergence.camera import Camera
     from vergence.vision.known_object import ObjectModel
 
+_NO_SAMPLES: dict[str, Any] = {
+    "samples_px": np.zeros((0, 2)),
+    "samples_found": np.zeros(0, dtype=np.bool_),
+}
 _KEY_FRAMES = 6  # spread over the footage
 _MOST_KEY_FRAMES = 24  # with those where the sighting changes
 
@@ -152,7 +157,7 @@ class _Run:
         steps: list[Step] = []
         took: list[float] = []
         progress = bar("{task.completed} / {task.total}")
-        task = progress.add_task("track", total=self._footage.count or None)
+        task = progress.add_task("prepare", total=self._footage.count or None)
         with progress, self._poses as poses, self._film:
             for number, picture in enumerate(chain((first,), rest)):
                 began = perf_counter()
@@ -160,11 +165,11 @@ class _Run:
                 took.append(perf_counter() - began)
                 poses.add(Path(picture.name).name, step)
                 self._draw(number, picture, step, steps[-1] if steps else None)
-                steps.append(step)
-                progress.update(task, completed=number + 1)
+                steps.append(replace(step, **_NO_SAMPLES))  # a long film must fit in memory
+                progress.update(task, completed=number + 1, description="track")
                 if step.sighting is Sighting.LOST:
                     break
-            self._key_frame(len(steps) - 1, picture, steps[-1])
+            self._key_frame(len(steps) - 1, picture, step)
         return _summary(steps, took)
 
     def _draw(self, number: int, picture: "Picture", step: "Step", before: "Step | None") -> None:
