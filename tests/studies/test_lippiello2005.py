@@ -65,7 +65,7 @@ def test_both_cameras_know_more_than_the_fixed_one(short: Cell) -> None:
 
 def test_the_same_seed_gives_the_same_run(short: Cell) -> None:
     first, second = (run(short.replace(duration_s=2.0), images=False) for _ in range(2))
-    assert first.trace["estimation_m"].tolist() == second.trace["estimation_m"].tolist()
+    assert first.trace["target_m"].tolist() == second.trace["target_m"].tolist()
 
 
 def test_with_every_camera_blind_the_run_ends_with_the_target_lost(short: Cell) -> None:
@@ -86,4 +86,4 @@ def run_four(seconds: float) -> np.ndarray:
     trace = PoseTrace("hand")
     result = run_cell(load_cell("four_cameras").replace(duration_s=seconds), [trace], images=False)
     assert result.outcome.succeeded
-    return np.linalg.norm(trace["estimation_m"][trace.between(0.5)], axis=1)
+    return np.linalg.norm(trace["target_m"][trace.between(0.5)], axis=1)

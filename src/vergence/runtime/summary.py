@@ -8,6 +8,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.features import ImagePoints
 from vergence.outcome import Outcome
+from vergence.runtime.pose_errors import pose_errors
 from vergence.runtime.recording import RunInfo, TickRecord
 
 
@@ -41,6 +42,7 @@ class Summary:
             ratio = command.manipulability / self._start_manipulability
             self._keep("min_manipulability_ratio", ratio, min)
             self._keep("min_penalty", command.penalty, min)
+        self._keep_pose_errors(record)
         view = record.observation.views[-1]
         if record.reference is not None and record.reference.points_px is not None:
             error = _farthest(view, record.reference.points_px)
@@ -57,6 +59,22 @@ class Summary:
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Nothing to let go of."""
+
+    def _keep_pose_errors(self, record: TickRecord) -> None:
+        errors = pose_errors(record, self._camera)
+        if errors is None:
+            return
+        for name, metres, radians in (
+            ("target", errors.target_m, errors.target_rad),
+            ("hand", errors.hand_m, errors.hand_rad),
+        ):
+            for key, value in (
+                (f"{name}_error_m", float(np.linalg.norm(metres))),
+                (f"{name}_error_deg", float(np.rad2deg(radians))),
+            ):
+                if not np.isnan(value):
+                    self.values[f"final_{key}"] = value
+                self._keep(f"max_{key}", value, max)
 
     def _keep_pace(self, time: float) -> None:
         now = perf_counter()

@@ -25,7 +25,7 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
             "Figure 5: the object's trajectory in its first frame, slow then twice as fast.",
         ),
         "figure_06": (
-            _errors(hybrid, "estimation_m", "estimation_rad"),
+            _errors(hybrid, "target_m", "target_rad"),
             "Figure 6: error of the estimated pose, both cameras, the paper's settings.",
         ),
         "figure_07": (
@@ -38,7 +38,7 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
             "The same with the error-state filter, feed-forward and prediction over the latency.",
         ),
         "figure_08": (
-            _errors(fixed, "estimation_m", "estimation_rad"),
+            _errors(fixed, "target_m", "target_rad"),
             "Figure 8: error of the estimated pose, the fixed camera alone, the paper's settings.",
         ),
     }
@@ -51,7 +51,7 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
 
 
 def _trajectory(trial: Trial) -> Any:
-    poses = trial.trace["truth"]
+    poses = trial.trace["T_world_target"]
     relative = np.linalg.inv(poses[0]) @ poses
     rpy = np.array([matrix_to_rpy(np.ascontiguousarray(T[:3, :3])) for T in relative])
     drawing, (above, below) = figure(_WIDTH, _HEIGHT, rows=2, sharex=True)

@@ -12,7 +12,8 @@ from vergence.cell.schema import PoseMotion
 from vergence.outcome import Outcome
 from vergence.runtime import run_cell
 from vergence.runtime.assembly.pose import follow_pose, target_shape
-from vergence.studies.pose_trace import PoseTrace, angle_between
+from vergence.runtime.pose_errors import angle_between
+from vergence.studies.pose_trace import PoseTrace
 
 # The paper's state, Q and R; trajectory planner without feed-forward or prediction. R = 9 px² is
 # what calibration left, so the cameras' poses are known that well: off by two or three pixels. How
@@ -39,13 +40,13 @@ class Trial:
     def position(self, start: float = -np.inf, end: float = np.inf) -> FloatArray:
         """Return the error of the estimated position while the object moves, (K,), m."""
         rows = self.trace.between(max(start, self.moving_from), end)
-        sizes: FloatArray = np.linalg.norm(self.trace["estimation_m"][rows], axis=1)
+        sizes: FloatArray = np.linalg.norm(self.trace["target_m"][rows], axis=1)
         return sizes
 
     def orientation_deg(self, start: float = -np.inf, end: float = np.inf) -> FloatArray:
         """Return the error of the estimated orientation while the object moves, (K,)."""
         rows = self.trace.between(max(start, self.moving_from), end)
-        degrees: FloatArray = np.rad2deg(self.trace["estimation_rad"][rows])
+        degrees: FloatArray = np.rad2deg(self.trace["target_rad"][rows])
         return degrees
 
     def hand_m(self) -> FloatArray:
