@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from vergence.app import campaign_commands
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
@@ -29,6 +30,7 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
   vergence run puma560            a Puma 560 follows a moving board; ends with a report to open
   vergence run puma560 --no-images --set duration_s=5     the same in a blink, without pictures
   vergence cells                  the cells that come with vergence
+  vergence compare panda          several laws from the same random starts
   vergence reproduce nelson1995 --quick                   a paper's experiments, checked
   vergence --help                 all commands
 """
@@ -182,6 +184,9 @@ def track(
         overlay,
     )
     raise typer.Exit(command(request, out, as_json))
+
+
+campaign_commands.register(app, _cell_names)
 
 
 @app.command(epilog="Example: vergence bench control")

@@ -1,0 +1,148 @@
+"""What `vergence compare` and `vergence map` have in common: running, data, pages."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vergence.app import markup
+from vergence.app.progress import bar
+from vergence.app.report import REPORT
+
+if TYPE_CHECKING:
+    from vergence.runtime.campaign import CellSource, Trial, TrialResult
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """How a campaign is run."""
+
+    folder: Path  # where results go, and are gone on with from
+    tolerance_px: float
+    workers: int | None  # processes of this machine; None for one a core
+    scheduler: str | None  # address of a Dask scheduler
+
+
+def prepare(
+    command: str,
+    cell: str,
+    settings: Sequence[str],
+    out: Path | None,
+    tolerance_px: float,
+    workers: int | None,
+    scheduler: str | None,
+) -> "tuple[CellSource, Running]":
+    """Return what the options of a command mean: which cell, and how to run it.
+
+    Raises:
+        InputError: if there is no such cell, or a setting cannot be used.
+    """
+    from vergence.app.output import new_folder
+    from vergence.app.run import overrides
+    from vergence.runtime.campaign import CellSource
+
+    source = CellSource.of(cell, overrides(settings), None)
+    folder = out or new_folder(f"{source.load().name}-{command}")
+    return source, Running(folder, tolerance_px, workers, scheduler)
+
+
+def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
+    """Run a campaign with a progress bar."""
+    from vergence.runtime.campaign import Crew, run_campaign
+
+    with bar("{task.completed} of {task.total} runs") as progress:
+        task = progress.add_task("runs", total=len(trials))
+
+        def show(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total)
+
+        return run_campaign(
+            source,
+            trials,
+            how.folder,
+            crew=Crew(how.workers, how.scheduler),
+            tolerance_px=how.tolerance_px,
+            progress=show,
+        )
+
+
+_COLUMNS = (
+    "ending",
+    "time_s",
+    "converged_s",
+    "final_error_px",
+    "max_error_px",
+    "path_m",
+    "target_m",
+    "left_view",
+    "reason",
+)
+
+
+def write_table(path: Path, results: "Sequence[TrialResult]") -> Path:
+    """Write results as CSV, a line each: their labels, then what came of them."""
+    labels = list(results[0].labels)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([*labels, *_COLUMNS])
+        for result in results:
+            values = [getattr(result, column) for column in _COLUMNS]
+            writer.writerow([*(result.labels[label] for label in labels), *map(_cell, values)])
+    return path
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "" if value is None else round(value, 6) if isinstance(value, float) else str(value)
+
+
+def write_page(folder: Path, kicker: str, title: str, remark: str, parts: Sequence[str]) -> Path:
+    """Write a page that needs nothing but itself; return where it is."""
+    header = (
+        f'<header><span class="kicker">{escape(kicker)}</span>'
+        f"<h1>{escape(title)}</h1><p>{escape(remark)}</p></header>"
+    )
+    path = folder / REPORT
+    path.write_text(markup.page(title, "\n".join([header, *parts])), encoding="utf-8")
+    return path
+
+
+def html_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table of a page, the first column naming its rows."""
+    head = "".join(
+        f'<th scope="col"{_number(i)}>{escape(word)}</th>' for i, word in enumerate(headings)
+    )
+    lines = "\n".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f'<td class="number">{escape(word)}</td>' for word in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{lines}\n</tbody></table>"
+
+
+def _number(column: int) -> str:
+    return ' class="number"' if column else ""
+
+
+def reasons_table(results: "Sequence[TrialResult]", name: str) -> str:
+    """Return what ended the runs that did not converge, each with its reason.
+
+    Args:
+        results: of the campaign.
+        name: what a run is called in the first column, filled with its labels.
+    """
+    from vergence.runtime.campaign import Ending
+
+    failed = [result for result in results if result.ending is not Ending.CONVERGED]
+    lines = "\n".join(
+        f'<tr><th scope="row">{escape(name.format(**result.labels))}</th>'
+        f"<td>{escape(result.ending.value)}</td>"
+        f'<td class="number">{result.time_s:.2f} s</td>'
+        f'<td class="note">{escape(result.reason)}</td></tr>'
+        for result in failed
+    )
+    return f"<table><tbody>\n{lines}\n</tbody></table>" if failed else ""

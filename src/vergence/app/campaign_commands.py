@@ -1,0 +1,120 @@
+"""The options of `vergence compare` and `vergence map`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.errors import InputError
+
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+_Out = Annotated[
+    Path | None,
+    typer.Option(help="Folder to write to, instead of runs/NAME-TIME; goes on with what is there."),
+]
+_Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
+]
+_Tolerance = Annotated[
+    float, typer.Option(min=0.0, help="Converged: every feature this near at the end, px.")
+]
+_Workers = Annotated[
+    int | None, typer.Option(min=1, help="Processes of this machine; one a core if absent.")
+]
+_Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="A Dask scheduler, whose workers run it instead."),
+]
+
+
+def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
+    """Add the two commands to the command line."""
+    cell_argument = typer.Argument(
+        help="Name of a built-in cell, a cell file or folder.", autocompletion=cell_names
+    )
+
+    @app.command(
+        epilog="Example: vergence compare panda --laws image_based,constrained --starts 40"
+    )
+    def compare(
+        cell: Annotated[str, cell_argument],
+        laws: Annotated[
+            str,
+            typer.Option(
+                help="Names, with commas between: own (the cell's law), the file's [laws.NAME], "
+                "image_based, image_based_desired, image_based_mean, optimal_tracking, "
+                "constrained, constrained_tracking."
+            ),
+        ] = "own,image_based,constrained",
+        starts: Annotated[int, typer.Option(min=1, help="How many, for each law.")] = 20,
+        seed: Annotated[int, typer.Option(min=0, help="Of the starts.")] = 0,
+        spread: Annotated[
+            float, typer.Option(min=0.0, max=1.0, help="Of the starts, share of a joint's range.")
+        ] = 0.2,
+        tolerance_px: _Tolerance = 2.0,
+        workers: _Workers = None,
+        scheduler: _Scheduler = None,
+        out: _Out = None,
+        settings: _Set = None,
+        as_json: _Json = False,
+    ) -> None:
+        """Run several laws from the same random starts: one table, and where each fails."""
+        from vergence.app.campaign import prepare
+        from vergence.app.compare import compare as command
+
+        names = list(dict.fromkeys(name.strip() for name in laws.split(",") if name.strip()))
+        if not names:
+            raise InputError("--laws", "", laws, "names with commas between")
+        source, how = prepare(
+            "compare", cell, settings or (), out, tolerance_px, workers, scheduler
+        )
+        raise typer.Exit(command(source, names, starts, seed, spread, how, as_json))
+
+    @app.command(
+        name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2"
+    )
+    def map_region(
+        cell: Annotated[str, cell_argument],
+        over: Annotated[
+            str,
+            typer.Option(help="places: the target goes to points of a square; or headings."),
+        ] = "places",
+        extent: Annotated[
+            float, typer.Option(min=0.0, help="Half a side of the square, or the way, in m.")
+        ] = 0.5,
+        steps: Annotated[
+            int, typer.Option(min=2, help="Points along a side, or directions all around.")
+        ] = 11,
+        speeds: Annotated[
+            str, typer.Option(help="Of the target, m/s, with commas; places take the first.")
+        ] = "0.1",
+        law: Annotated[str, typer.Option(help="Its name, as for `vergence compare`.")] = "own",
+        tolerance_px: _Tolerance = 2.0,
+        workers: _Workers = None,
+        scheduler: _Scheduler = None,
+        out: _Out = None,
+        settings: _Set = None,
+        as_json: _Json = False,
+    ) -> None:
+        """Map where a cell's law works: how far it follows the target, and what ends it."""
+        from vergence.app.campaign import prepare
+        from vergence.app.map_region import Region
+        from vergence.app.map_region import map_region as command
+
+        if over not in ("places", "headings"):
+            raise InputError("--over", "", over, "places, headings")
+        region = Region(over, extent, steps, _speeds(speeds), law)
+        source, how = prepare("map", cell, settings or (), out, tolerance_px, workers, scheduler)
+        raise typer.Exit(command(source, region, how, as_json))
+
+
+def _speeds(text: str) -> tuple[float, ...]:
+    try:
+        speeds = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        speeds = ()
+    if not speeds or min(speeds) <= 0:
+        raise InputError("--speeds", "", text, "numbers above zero with commas between, in m/s")
+    return speeds

@@ -1,0 +1,139 @@
+"""`vergence compare`: several laws from the same random starts, in one table."""
+
+import sys
+from collections.abc import Sequence
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+from vergence.app import markup
+from vergence.app.campaign import (
+    Running,
+    html_table,
+    reasons_table,
+    run,
+    write_page,
+    write_table,
+)
+from vergence.app.output import SUCCESS, emit, say
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from vergence.runtime.campaign import CellSource, Score, TrialResult
+
+_REMARK = (
+    "Every law sets out from the same random joints, from which it sees the target, for the same "
+    "picture; on exact projections, under the cell's rate and acceleration limits."
+)
+
+
+def compare(
+    source: "CellSource",
+    laws: Sequence[str],
+    starts: int,
+    seed: int,
+    spread: float,
+    how: Running,
+    as_json: bool,
+) -> int:
+    """Compare laws; write table, data and page into the run folder; return the exit code.
+
+    Args:
+        source: of the cell.
+        laws: their names.
+        starts: how many each.
+        seed: of the starts.
+        spread: share of each joint's range over which they are spread.
+        how: to run it.
+        as_json: whether to answer with one JSON object.
+    """
+    from vergence.runtime.campaign import scores, start_trials
+
+    cell = source.load()
+    results = run(source, start_trials(cell, laws, starts, seed, spread), how)
+    found = scores(results)
+    data = write_table(how.folder / "compare.csv", results)
+    report = _write_page(source, results, found, how)
+    if as_json:
+        answer = {"command": "compare", "cell": cell.name, "starts": starts, "seed": seed}
+        rows = [_as_json(score) for score in found]
+        emit({**answer, "laws": rows, "run": how.folder, "data": data, "report": report})
+        return SUCCESS
+    _tell(found)
+    say(f"  report  {report}")
+    say(f"  data    {data}")
+    return SUCCESS
+
+
+def _columns(found: "Sequence[Score]") -> list[Any]:
+    """Return the endings worth a column: the usual ones, and others that occurred."""
+    from vergence.runtime.campaign import Ending
+
+    usual = set(Ending) - {Ending.OTHER, Ending.REFUSED}
+    return [e for e in Ending if e in usual or any(score.count(e) for score in found)]
+
+
+def _headings(found: "Sequence[Score]") -> list[str]:
+    return ["law", *(ending.value for ending in _columns(found)), "time (s)", "path (m)"]
+
+
+def _row(score: "Score", found: "Sequence[Score]") -> list[str]:
+    counts = [str(score.count(ending)) for ending in _columns(found)]
+    medians = (score.converged_s, score.path_m)
+    return [score.law, *counts, *("–" if isnan(m) else f"{m:.2f}" for m in medians)]
+
+
+def _as_json(score: "Score") -> dict[str, Any]:
+    from vergence.runtime.campaign import Ending
+
+    counts = {ending.value.replace(" ", "_"): score.count(ending) for ending in Ending}
+    medians = {"median_time_s": score.converged_s, "median_path_m": score.path_m}
+    return {"law": score.law, "starts": score.trials, **counts, **medians}
+
+
+def _tell(found: "Sequence[Score]") -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for number, heading in enumerate(_headings(found)):
+        table.add_column(heading, justify="right" if number else "left", no_wrap=not number)
+    for score in found:
+        table.add_row(*_row(score, found))
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+
+def _write_page(
+    source: "CellSource", results: "Sequence[TrialResult]", found: "Sequence[Score]", how: Running
+) -> "Path":
+    from vergence.app.figures.endings import scores_figure, starts_figure
+    from vergence.runtime.campaign import Aim
+
+    cell = source.load()
+    aim = Aim.of(cell)
+    count = len(aim.desired_px)
+    middle = tuple(sum(row[axis] for row in aim.desired_px) / count for axis in (0, 1))
+    size = cell.cameras[cell.task.camera].resolution
+    tables = html_table(_headings(found), [_row(score, found) for score in found])
+    parts = [
+        markup.section(
+            "Result",
+            tables,
+            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end. Time until "
+            "then and the camera's path are medians over the runs that converged.</p>",
+            markup.figure(scores_figure(found), "How the runs of each law ended."),
+        ),
+        markup.section(
+            "Where each fails",
+            markup.figure(
+                starts_figure(results, (middle[0], middle[1]), size),
+                "Each mark is a start, its colour how the run from there ended; the line leads to "
+                "where it ended. Left the camera's place seen from above, right the features' "
+                "middle in the picture, the cross where it should be.",
+            ),
+        ),
+        markup.section("Why", reasons_table(results, "{law}, start {start}")),
+    ]
+    title = f"{cell.name}: {len(found)} laws from {found[0].trials} starts"
+    return write_page(how.folder, "vergence compare", title, _REMARK, parts)

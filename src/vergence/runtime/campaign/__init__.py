@@ -1,0 +1,37 @@
+"""Many runs of a cell: laws from random starts, regions of targets, on all cores or a cluster."""
+
+from vergence.runtime.campaign.aim import Aim
+from vergence.runtime.campaign.campaign import run_campaign
+from vergence.runtime.campaign.crew import Crew
+from vergence.runtime.campaign.ledger import RESULTS, Ledger
+from vergence.runtime.campaign.presets import OWN, PRESETS, law_table
+from vergence.runtime.campaign.region import heading_trials, place_trials
+from vergence.runtime.campaign.run_trial import run_trial
+from vergence.runtime.campaign.score import Score, scores
+from vergence.runtime.campaign.source import CellSource
+from vergence.runtime.campaign.starts import random_starts, start_trials
+from vergence.runtime.campaign.trace import TrialTrace
+from vergence.runtime.campaign.trial import Ending, Trial, TrialResult
+
+__all__ = [
+    "Aim",
+    "CellSource",
+    "Crew",
+    "Ending",
+    "Ledger",
+    "OWN",
+    "PRESETS",
+    "RESULTS",
+    "Score",
+    "Trial",
+    "TrialResult",
+    "TrialTrace",
+    "heading_trials",
+    "law_table",
+    "place_trials",
+    "random_starts",
+    "run_campaign",
+    "run_trial",
+    "scores",
+    "start_trials",
+]
