@@ -1,6 +1,7 @@
 """Work cells: what a cell file says, and the cell in simulation."""
 
 from vergence.cell.cell import Cell, built_in_cells, load_cell
+from vergence.cell.ideal_driver import IdealCell, IdealDriver
 from vergence.cell.motion import TargetPose, placement_pose, target_pose
 from vergence.cell.renderer import CameraRenderer, choose_renderer
 from vergence.cell.simulated_driver import SimulatedDriver
@@ -8,6 +9,8 @@ from vergence.cell.simulated_driver import SimulatedDriver
 __all__ = [
     "Cell",
     "CameraRenderer",
+    "IdealCell",
+    "IdealDriver",
     "SimulatedDriver",
     "TargetPose",
     "built_in_cells",

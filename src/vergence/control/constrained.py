@@ -109,7 +109,8 @@ def constrained_rates(
     for i in range(len(rank)):
         kind = rows.kind[i]
         active[kind] += solution.active[i]
-        given_up[kind] = max(given_up[kind], solution.given_up[i])
+        if kind != HARD:  # hard rows hold exactly: what the solver's rounding leaves is cut off
+            given_up[kind] = max(given_up[kind], solution.given_up[i])
     rates = solution.x
     for i in range(n):  # the solver's rounding must not pass a hard bound either
         rates[i] = min(max(rates[i], rows.d[2 * i + 1]), -rows.d[2 * i])

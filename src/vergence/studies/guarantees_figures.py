@@ -1,0 +1,63 @@
+"""Figures of the guarantees: how random runs end, and the way through a singularity."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from vergence.arrays import FloatArray
+from vergence.drawing import COLORS, curve, figure, legend, save
+from vergence.studies.check import Figure
+
+_WIDTH = 7.6  # inches
+
+
+def draw(out: Path, ends: Counter[tuple[str, str]], singular: FloatArray) -> tuple[Figure, ...]:
+    """Write the figures into a folder.
+
+    Args:
+        out: the folder.
+        ends: how many runs of a law ended how.
+        singular: rows of time (s), smallest singular value, error (px), (K, 3).
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    drawn = (
+        ("ends", _ends(ends), "How random runs end, law by law; none passed a joint limit."),
+        ("singularity", _singular(singular), "Through the wrist's singularity with the target."),
+    )
+    files = []
+    for name, drawing, caption in drawn:
+        path = out / f"{name}.svg"
+        save(drawing, path)
+        files.append(Figure(path, caption))
+    return tuple(files)
+
+
+def _ends(ends: Counter[tuple[str, str]]) -> Any:
+    laws = sorted({law for law, _ in ends})
+    kinds = sorted(
+        {kind for _, kind in ends}, key=lambda kind: -sum(ends[law, kind] for law in laws)
+    )
+    drawing, (axes,) = figure(_WIDTH, 0.5 * len(laws) + 1.1)
+    left = [0.0] * len(laws)
+    for index, kind in enumerate(kinds):
+        total = [sum(ends[law, other] for other in kinds) for law in laws]
+        share = [100.0 * ends[law, kind] / n for law, n in zip(laws, total, strict=True)]
+        axes.barh(laws, share, left=left, label=kind, color=COLORS[index % len(COLORS)], height=0.6)
+        left = [a + b for a, b in zip(left, share, strict=True)]
+    axes.set_xlabel("runs (%)")
+    axes.set_xlim(0, 100)
+    axes.grid(visible=False, axis="y")
+    legend(axes)
+    return drawing
+
+
+def _singular(singular: FloatArray) -> Any:
+    drawing, (upper, lower) = figure(_WIDTH, 4.2, rows=2, sharex=True)
+    upper.plot(singular[:, 0], singular[:, 1], **curve(0))
+    upper.set_ylabel("smallest singular\nvalue of J")
+    lower.plot(singular[:, 0], singular[:, 2], **curve(1))
+    lower.set_ylabel("largest feature\nerror (px)")
+    lower.set_xlabel("time (s)")
+    for axes in (upper, lower):
+        axes.set_ylim(bottom=0.0)
+    return drawing

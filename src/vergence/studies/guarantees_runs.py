@@ -1,0 +1,213 @@
+"""Random closed-loop runs that try to make an arm pass its limits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.cell import IdealCell, IdealDriver, load_cell
+from vergence.cell.ideal_driver import ARM, CAMERA
+from vergence.control import Law, OptimalTrackingLaw
+from vergence.control.constrained import ConstrainedLaw
+from vergence.control.image_based import ImageBased
+from vergence.control.optimal_objective import OptimalTracking
+from vergence.control.plain import PlainLaw
+from vergence.estimation import ExactPoints
+from vergence.geometry import se3, se3_inverse, so3_exp
+from vergence.outcome import Outcome
+from vergence.planning import FixedReference, Reference
+from vergence.robot import Arm, Sample, Setpoint
+from vergence.runtime import Listener, Loop
+
+CAMERA_MODEL = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
+LAWS = ("plain", "optimal tracking", "constrained image-based", "constrained tracking")
+CELLS = ("puma560", "lippiello2005", "gantry")  # six turning joints, seven with a track, 3 + 3
+RUN_S = 2.0
+
+
+class Excess(NamedTuple):
+    """How far a run went past limits at worst; negative or zero if it never did."""
+
+    position: float  # rad or m
+    rate: float  # rad/s or m/s
+
+
+class Watched:
+    """A driver that looks at every set-point on its way.
+
+    Args:
+        driver: the one that moves.
+        arm: whose limits count.
+    """
+
+    def __init__(self, driver: IdealDriver, arm: Arm) -> None:
+        self._driver, self._arm = driver, arm
+        self.excess = Excess(-np.inf, -np.inf)
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return self._driver.arms
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The cameras by name."""
+        return self._driver.cameras
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """How often `step` returns."""
+        return self._driver.inner_rate_hz
+
+    def read(self) -> Sample:
+        """Return what the driver has."""
+        return self._driver.read()
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Note by how much a set-point passes a limit, then let it through."""
+        q, rate = setpoints[ARM].position, setpoints[ARM].velocity
+        beyond = np.maximum(q - self._arm.q_max, self._arm.q_min - q).max()
+        too_fast = (np.abs(rate) - self._arm.rate_max).max()
+        nan = np.isnan(q).any() or np.isnan(rate).any()
+        worst = (np.inf, np.inf) if nan else (float(beyond), float(too_fast))
+        self.excess = Excess(max(self.excess[0], worst[0]), max(self.excess[1], worst[1]))
+        self._driver.step(setpoints)
+
+    def close(self) -> None:
+        """Let go."""
+        self._driver.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A run that is to be tried."""
+
+    cell: IdealCell
+    law: str
+    depth_factor: float  # believed over true
+    offset_px: FloatArray  # (2,) of the goal from the start
+
+    def run(self, duration_s: float = RUN_S) -> tuple[Excess, Outcome]:
+        """Run it; return what was exceeded and how it ended."""
+        return run_ideal(
+            self.cell, self.law, duration_s, self.depth_factor, self.offset_px, listeners=()
+        )
+
+
+def run_ideal(
+    cell: IdealCell,
+    law: str,
+    duration_s: float,
+    depth_factor: float = 1.0,
+    offset_px: FloatArray | None = None,
+    listeners: tuple[Listener, ...] = (),
+) -> tuple[Excess, Outcome]:
+    """Run the real loop on an ideal cell, features wanted where they are at the start."""
+    driver = IdealDriver(cell)
+    truth = driver.frame().truth
+    assert truth is not None
+    wanted = truth.points_px + (0.0 if offset_px is None else offset_px)
+    watched = Watched(driver, cell.arm)
+    loop = Loop(
+        watched,
+        ARM,
+        ExactPoints(CAMERA),
+        FixedReference(Reference(0.0, wanted)),
+        build(law, cell, truth.depth_m * depth_factor),
+        outer_rate_hz=cell.rate_hz,
+        listeners=listeners,
+    )
+    outcome = loop.run(duration_s)
+    return watched.excess, outcome
+
+
+def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
+    """Make one of `LAWS`."""
+    arm, camera, period = cell.arm, cell.camera, 1.0 / cell.rate_hz
+    match law:
+        case "plain":
+            return PlainLaw(arm, camera, ImageBased(camera, gain=2.0), depth, singular_below=0.0)
+        case "optimal tracking":
+            axes, avoiding = ("x", "y", "rx", "ry"), ("x", "y")
+            return OptimalTrackingLaw(
+                arm, camera, depth, axes=axes, avoidance_axes=avoiding, S=1e-3, period=period,
+                singular_below=1e-4,
+            )  # fmt: skip
+        case "constrained image-based":
+            objective = ImageBased(camera, gain=2.0)
+            return ConstrainedLaw(arm, camera, objective, depth, period=period, S=1e-3)
+        case _:
+            # Depth is free as well: where the arm has to look back over its base it moves up.
+            axes = ("x", "y", "z", "rx", "ry")
+            tracking = OptimalTracking(camera, axes, R=1.0, period=period)
+            return ConstrainedLaw(arm, camera, tracking, depth, period=period, S=1e-3)
+
+
+def arms() -> tuple[Arm, ...]:
+    """Return the arms of the built-in cells, each up to a camera in its hand."""
+    from vergence.cell import SimulatedDriver
+
+    found = []
+    for name in CELLS:
+        cell = load_cell(name)
+        driver = SimulatedDriver(cell, images=False)
+        camera = next(c for c in cell.cameras if cell.cameras[c].arm == cell.task.arm)
+        found.append(driver.world.arm_to_camera(camera))
+        driver.close()
+    return tuple(found)
+
+
+def attempt(known: tuple[Arm, ...], seed: int) -> Attempt:
+    """Draw an attempt: any arm, law and start, targets up to absurd speeds, bad beliefs."""
+    rng = np.random.default_rng([seed, 5])
+    arm = known[seed % len(known)]
+    low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
+    start = low + rng.uniform(0.01, 0.99, arm.joint_count) * (high - low)
+    T_camera_target = se3(so3_exp(rng.uniform(-0.5, 0.5, 3)), np.zeros(3))
+    T_camera_target[:3, 3] = [*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.4, 1.5)]
+    T_start = arm.forward_kinematics(start) @ T_camera_target
+    direction = rng.normal(size=3)
+    velocity = direction / np.linalg.norm(direction) * 10.0 ** rng.uniform(-2, 1)
+
+    def target(time: float) -> FloatArray:
+        T = T_start.copy()
+        T[:3, 3] += velocity * time
+        return T
+
+    features = np.column_stack((rng.uniform(-0.1, 0.1, (4, 2)), np.zeros(4)))
+    cell = IdealCell(
+        arm,
+        CAMERA_MODEL,
+        start,
+        target,
+        features,
+        latency_frames=int(rng.integers(0, 5)),
+        dropped=float(rng.choice([0.0, 0.3])),
+        seed=seed,
+    )
+    law = LAWS[(seed // len(known)) % len(LAWS)]
+    return Attempt(
+        cell, law, float(np.exp(rng.uniform(np.log(0.3), np.log(3)))), rng.normal(0, 60, 2)
+    )
+
+
+def joint_path(
+    cell: IdealCell, q_end: FloatArray, duration_s: float, T_camera_target: FloatArray
+) -> IdealCell:
+    """Return the cell with a target that is seen alike all along a straight way of the joints."""
+    start, arm = cell.start, cell.arm
+
+    def target(time: float) -> FloatArray:
+        share = 0.5 - 0.5 * np.cos(np.pi * np.clip(time / duration_s, 0.0, 1.0))
+        T: FloatArray = arm.forward_kinematics(start + share * (q_end - start)) @ T_camera_target
+        return T
+
+    return replace(cell, target=target)
+
+
+def facing(depth: float) -> FloatArray:
+    """Return T_camera_target of a target that faces the camera at a depth, (4, 4)."""
+    return se3_inverse(se3(so3_exp(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, depth])))

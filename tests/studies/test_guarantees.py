@@ -1,0 +1,56 @@
+"""No random run passes a limit, and a guard that lets go would be noticed."""
+
+import numpy as np
+import pytest
+
+from vergence.control import guard
+from vergence.robot import Setpoint
+from vergence.studies import guarantees
+from vergence.studies.guarantees_runs import LAWS, arms, attempt
+
+
+@pytest.fixture(scope="module")
+def known():
+    return arms()
+
+
+@pytest.mark.parametrize("first", range(0, 48, 12))
+def test_random_runs_of_every_law_and_arm_pass_no_limit(known, first):
+    for seed in range(first, first + 12):
+        excess, outcome = attempt(known, seed).run(1.0)
+        assert excess.position <= 0.0, (seed, outcome)
+        assert excess.rate <= 1e-12, (seed, outcome)
+
+
+def test_every_law_meets_every_arm(known):
+    met = {(seed % len(known), attempt(known, seed).law) for seed in range(len(known) * len(LAWS))}
+    assert len(met) == len(known) * len(LAWS)
+
+
+def test_the_same_seed_is_the_same_run(known):
+    assert attempt(known, 7).run(0.5) == attempt(known, 7).run(0.5)
+
+
+def test_a_guard_that_lets_everything_through_is_noticed(known, monkeypatch):
+    def open_guard(self, wanted):
+        self._position = self._position + self._dt * 5 * wanted
+        self._velocity = 5 * wanted
+        return Setpoint(self._position, self._velocity)
+
+    monkeypatch.setattr(guard.Guard, "step", open_guard)
+    monkeypatch.setattr(guard.Guard, "moving", property(lambda self: False))
+    worst = [attempt(known, seed).run(0.5)[0] for seed in range(12)]
+    assert max(excess.rate for excess in worst) > 0.0
+
+
+def test_the_hard_cases_hold(known):
+    puma = known[0]
+    check, rows = guarantees._singularity(puma)
+    assert check.holds, check.note
+    assert rows[:, 1].min() < 0.01
+    for hard in (guarantees._outside_start, guarantees._conflict):
+        assert hard(puma).holds, hard(puma).note
+
+
+def test_a_heading_that_led_the_papers_law_to_a_limit_is_completed(known):
+    assert guarantees._follows(known[0], "constrained tracking", 0.1, np.pi / 2, 32.0)
