@@ -141,8 +141,8 @@ def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
             return ConstrainedLaw(arm, camera, objective, depth, period=period, S=1e-3)
         case _:
             # Depth is free as well: where the arm has to look back over its base it moves up.
-            axes = ("x", "y", "z", "rx", "ry")
-            tracking = OptimalTracking(camera, axes, R=1.0, period=period)
+            with_depth = ("x", "y", "z", "rx", "ry")
+            tracking = OptimalTracking(camera, with_depth, R=1.0, period=period)
             return ConstrainedLaw(arm, camera, tracking, depth, period=period, S=1e-3)
 
 
