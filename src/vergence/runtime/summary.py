@@ -43,7 +43,11 @@ class Summary:
             self._keep("min_manipulability_ratio", ratio, min)
             self._keep("min_penalty", command.penalty, min)
         self._keep_pose_errors(record)
-        view = record.observation.views[-1]
+        views = [view for view in record.observation.views if view.camera == self._camera]
+        if views:
+            self._keep_image_errors(record, views[-1])
+
+    def _keep_image_errors(self, record: TickRecord, view: ImagePoints) -> None:
         if record.reference is not None and record.reference.points_px is not None:
             error = _farthest(view, record.reference.points_px)
             if not np.isnan(error):
