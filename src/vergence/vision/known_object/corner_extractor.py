@@ -9,7 +9,7 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.errors import InputError
-from vergence.vision.known_object.corner_fit import FOUND, TOO_FEW, fit_corner
+from vergence.vision.known_object.corner_fit import FOUND, LONGEST_PX, TOO_FEW, fit_corner
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.projection import (
     edge_faces_camera,
@@ -28,6 +28,7 @@ REASONS = (
     "fewer than two edges seen",
     "left its window",
 )
+CROWDED_VARIANCE = 1.0  # px², of a corner whose edges may have been taken for their neighbours
 _LEAST_COSINE = 0.05  # flatter faces make no edge to be told from its neighbour
 
 
@@ -73,8 +74,10 @@ def measure_corners(
     covariances = np.zeros((len(chosen), 2, 2))
     codes = np.empty(len(chosen), dtype=np.int64)
     table = face_table(T, surface)
+    lines = _lines(T, lens, edges, edge_normals)
     directions = np.empty((corner_edges.shape[1], 2))
     lengths = np.empty(corner_edges.shape[1])
+    arm = np.empty(2)
     for m in range(len(chosen)):
         X = corners[chosen[m]]
         x, y, z = in_camera(T, X)
@@ -84,14 +87,27 @@ def measure_corners(
             continue
         u, v = pixel_of(lens, x / z, y / z)
         places[m, 0], places[m, 1] = u, v
-        count = 0
+        apart = 2.0 + 0.35 * min(half_px[m, 0], half_px[m, 1])
+        alone, crowded = 0, 0  # the arms that are alone come first, the others from the end
         for k in range(corner_edges.shape[1]):
             e = corner_edges[chosen[m], k]
-            if e >= 0 and edge_faces_camera(T, X, edge_normals[e], _LEAST_COSINE):
-                length = _arm(T, lens, X, edges[e], table, u, v, directions[count])
-                if length > 0.0:
-                    lengths[count] = length
-                    count += 1
+            if e < 0 or not edge_faces_camera(T, X, edge_normals[e], _LEAST_COSINE):
+                continue
+            length = _arm(T, lens, X, edges[e], table, u, v, arm)
+            if length == 0.0:
+                continue
+            if _crowded(lines, e, u, v, arm, length, apart):
+                crowded += 1
+                row = len(lengths) - crowded
+            else:
+                row = alone
+                alone += 1
+            directions[row], lengths[row] = arm, length
+        count = alone
+        if alone < 2:  # then the others have to do, and are trusted less
+            for k in range(len(lengths) - crowded, len(lengths)):
+                directions[count], lengths[count] = directions[k], lengths[k]
+                count += 1
         if count < 2:
             codes[m] = TOO_FEW
             continue
@@ -109,7 +125,53 @@ def measure_corners(
         )
         if codes[m] == FOUND:
             places[m] = found
+            if alone < 2:
+                covariances[m, 0, 0] += CROWDED_VARIANCE
+                covariances[m, 1, 1] += CROWDED_VARIANCE
     return places, covariances, codes
+
+
+@njit(cache=True)
+def _lines(
+    T: FloatArray, lens: FloatArray, edges: FloatArray, edge_normals: FloatArray
+) -> FloatArray:
+    """Return both ends in the picture of each edge that faces the camera, (E, 4); else NaN."""
+    lines = np.full((len(edges), 4), np.nan)
+    for e in range(len(edges)):
+        x0, y0, z0 = in_camera(T, edges[e, 0])
+        x1, y1, z1 = in_camera(T, edges[e, 1])
+        if min(z0, z1) <= 1e-6 or not edge_faces_camera(T, edges[e, 0], edge_normals[e], 0.0):
+            continue
+        lines[e, 0], lines[e, 1] = pixel_of(lens, x0 / z0, y0 / z0)
+        lines[e, 2], lines[e, 3] = pixel_of(lens, x1 / z1, y1 / z1)
+    return lines
+
+
+@njit(cache=True)
+def _crowded(
+    lines: FloatArray,
+    own: int,
+    u: float,
+    v: float,
+    direction: FloatArray,
+    length: float,
+    apart_px: float,
+) -> bool:
+    """Tell whether another edge runs beside an arm, so that one may be taken for the other."""
+    at = 0.5 * min(length, LONGEST_PX)
+    x, y = u + at * direction[0], v + at * direction[1]
+    for e in range(len(lines)):
+        du, dv = lines[e, 2] - lines[e, 0], lines[e, 3] - lines[e, 1]
+        size = np.sqrt(du * du + dv * dv)
+        if e == own or not size > 0.0:
+            continue
+        du, dv = du / size, dv / size
+        along = (x - lines[e, 0]) * du + (y - lines[e, 1]) * dv
+        across = abs((y - lines[e, 1]) * du - (x - lines[e, 0]) * dv)
+        parallel = abs(du * direction[0] + dv * direction[1]) > 0.9
+        if parallel and -apart_px < along < size + apart_px and across < apart_px:
+            return True
+    return False
 
 
 @njit(cache=True)
