@@ -117,7 +117,9 @@ def places_figure(
 def headings_figure(results: Sequence[TrialResult]) -> Panels:
     """Draw how far the target came in each direction, a circle for each speed."""
     speeds = sorted({float(result.labels["speed_m_s"]) for result in results})
-    drawn, grid = _grid(1, len(speeds), 3.4 * len(speeds), 3.6, {"projection": "polar"})
+    drawn, grid = _grid(1, len(speeds), 3.4 * len(speeds), 4.0, {"projection": "polar"})
+    layout: Any = drawn.get_layout_engine()
+    layout.set(h_pad=0.3)
     for axes, speed in zip(grid[0], speeds, strict=True):
         own = [result for result in results if result.labels["speed_m_s"] == speed]
         for result in own:

@@ -1,0 +1,112 @@
+"""`vergence compare` and `vergence map`: tables, pages, pictures and data of many runs."""
+
+import csv
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import pytest
+
+from vergence.app.main import main
+
+Command = Callable[..., int]
+QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
+COMPARE = ["compare", "puma560", "--laws", "image_based,constrained", "--starts", "2", *QUICK]
+MAP = ["map", "puma560", "--law", "constrained", "--extent", "0.05", "--steps", "2", *QUICK]
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run the command line in an empty folder; return its exit code."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> int:
+        monkeypatch.setattr(sys, "argv", ["vergence", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        code = end.value.code
+        return code if isinstance(code, int) else 0
+
+    return run
+
+
+def rows_of(path: str) -> list[dict[str, str]]:
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_laws_are_compared_in_one_table(command: Command, capsys: object) -> None:
+    assert command(*COMPARE, "--json", "--out", "c") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [law["law"] for law in answer["laws"]] == ["image_based", "constrained"]
+    counts = ("converged", "off_goal", "joint_limit", "out_of_view", "singular", "lost")
+    for law in answer["laws"]:
+        assert sum(law[name] for name in counts) == law["starts"] == 2
+    rows = rows_of(answer["data"])
+    assert [row["law"] for row in rows] == ["image_based"] * 2 + ["constrained"] * 2
+    assert {"ending", "time_s", "path_m", "reason"} <= rows[0].keys()
+    page = Path(answer["report"]).read_text(encoding="utf-8")
+    assert page.count("<img") == 2
+    assert "image_based" in page
+
+
+def test_a_second_run_in_the_same_folder_goes_on_and_says_the_same(
+    command: Command, capsys: object
+) -> None:
+    assert command(*COMPARE, "--out", "c") == 0
+    first = capsys.readouterr().out
+    results = Path("c/results.jsonl").read_bytes()
+    assert command(*COMPARE, "--out", "c") == 0
+    assert capsys.readouterr().out == first
+    assert Path("c/results.jsonl").read_bytes() == results
+    assert command(*COMPARE, "--seed", "5", "--out", "c") == 2
+    assert "another campaign" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("over", "speeds", "columns", "runs"),
+    [
+        ("places", "0.1", {"x_m", "y_m"}, 4),
+        ("headings", "0.1,0.2", {"heading_deg", "speed_m_s", "distance_m"}, 4),
+    ],
+)
+def test_a_region_is_mapped_to_a_picture_and_a_table(
+    command: Command, capsys: object, over: str, speeds: str, columns: set[str], runs: int
+) -> None:
+    assert command(*MAP, "--over", over, "--speeds", speeds, "--json", "--out", "m") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["runs"] == runs == sum(answer["endings"].values())
+    rows = rows_of(answer["data"])
+    assert len(rows) == runs
+    assert columns <= rows[0].keys()
+    assert cv2.imread(answer["picture"]) is not None
+    assert "Where it works" in Path(answer["report"]).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["compare", "puma560", "--laws", ","], "--laws"),
+        (["compare", "puma560", "--laws", "imagebased"], "did you mean image_based"),
+        (["compare", "four_cameras"], "task.kind"),
+        (["map", "puma560", "--over", "starts"], "places, headings"),
+        (["map", "puma560", "--speeds", "0,1"], "--speeds"),
+        (["map", "no_such_cell"], "a built-in cell"),
+    ],
+)
+def test_a_mistake_is_one_message(
+    command: Command, capsys: object, arguments: list[str], said: str
+) -> None:
+    assert command(*arguments) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["compare", "map"])
+def test_the_help_has_an_example(command: Command, capsys: object, name: str) -> None:
+    assert command(name, "--help") == 0
+    assert f"Example: vergence {name}" in capsys.readouterr().out

@@ -1,0 +1,222 @@
+"""Campaigns: the same results wherever they are run, nothing lost, laws that begin alike."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vergence.cell import load_cell
+from vergence.errors import InputError
+from vergence.runtime.campaign import (
+    OWN,
+    PRESETS,
+    RESULTS,
+    Aim,
+    CellSource,
+    Crew,
+    Ending,
+    Trial,
+    TrialResult,
+    heading_trials,
+    law_table,
+    place_trials,
+    random_starts,
+    run_campaign,
+    run_trial,
+    scores,
+    start_trials,
+)
+
+QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
+ALONE = Crew(workers=1)
+
+
+@pytest.fixture(scope="module")
+def source():
+    return CellSource.of("puma560", QUICK, None)
+
+
+@pytest.fixture(scope="module")
+def trials(source):
+    return start_trials(source.load(), ["image_based", "constrained"], 6, seed=3, spread=0.1)
+
+
+@pytest.fixture(scope="module")
+def results(source, trials, tmp_path_factory):
+    """What the trials come to in this process."""
+    return run_campaign(source, trials, tmp_path_factory.mktemp("alone"), crew=ALONE)
+
+
+def test_every_trial_has_a_result_in_the_order_of_the_trials(trials, results):
+    assert [result.key for result in results] == [trial.key for trial in trials]
+    assert {result.ending for result in results} <= {Ending.CONVERGED, Ending.OFF_GOAL}
+    assert all(result.final_error_px is not None for result in results)
+
+
+def test_a_result_is_a_function_of_cell_and_trial(source, trials, results):
+    assert run_trial(source, trials[0], 2.0) == results[0]
+    assert TrialResult.from_json(json.loads(json.dumps(results[0].as_json()))) == results[0]
+
+
+def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
+    half = len(trials) // 2
+    for plain, constrained in zip(trials[:half], trials[half:], strict=True):
+        assert plain.changes["arms"] == constrained.changes["arms"]
+        assert plain.changes["law"] != constrained.changes["law"]
+    cell = source.load()
+    aim = Aim.of(cell)
+    fewer = random_starts(cell, aim, 2, seed=3, spread=0.1)
+    np.testing.assert_array_equal(fewer[1], trials[1].changes["arms"]["puma"]["start_deg"])
+
+
+def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_path):
+    whole = tmp_path / "whole"
+    run_campaign(source, trials, whole, crew=ALONE)
+    lines = (whole / RESULTS).read_text().splitlines(keepends=True)
+    part = tmp_path / "part"
+    part.mkdir()
+    (part / RESULTS).write_text("".join(lines[:4]) + lines[4][:40])  # header, three, and a half
+    seen = []
+    again = run_campaign(
+        source, trials, part, crew=ALONE, progress=lambda done, total: seen.append(done)
+    )
+    assert seen == list(range(3, len(trials) + 1))
+    assert again == results
+    assert len((part / RESULTS).read_text().splitlines()) == len(trials) + 1
+
+
+def test_results_of_another_campaign_are_not_gone_on_with(source, trials, tmp_path):
+    run_campaign(source, trials[:1], tmp_path, crew=ALONE)
+    with pytest.raises(InputError, match="trials differ"):
+        run_campaign(source, trials[:2], tmp_path, crew=ALONE)
+    with pytest.raises(InputError, match="tolerance_px differ"):
+        run_campaign(source, trials[:1], tmp_path, crew=ALONE, tolerance_px=1.0)
+
+
+def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
+    away = Trial("away", {"target": {"position_m": [5.0, 5.0, 0.0], "features": [[0, 0, 0]]}})
+    result = run_trial(source, away, 2.0)
+    assert result.ending is Ending.REFUSED
+    assert "does not see" in result.reason
+
+
+def test_endings_are_told_apart(source):
+    cell = source.load()
+    far = heading_trials(cell, 3.0, 1, (3.0,), law="image_based")[0]
+    assert run_trial(source, far, 2.0).ending is Ending.OUT_OF_VIEW
+    blind = Trial("blind", {**far.changes, "cameras": {"wrist": {"blind_s": [[0.1, 9.0]]}}})
+    still = {**blind.changes, "target": {**far.changes["target"], "motion": {"kind": "still"}}}
+    assert run_trial(source, Trial("lost", still), 2.0).ending is Ending.LOST
+
+
+def test_maps_cover_the_square_and_all_directions(source):
+    cell = source.load()
+    places = place_trials(cell, 0.2, 3, 0.1)
+    assert len({trial.key for trial in places}) == 9
+    assert [t.labels["x_m"] for t in places[:3]] == [-0.2, 0.0, 0.2]
+    assert places[4].changes["target"]["motion"]["kind"] == "still"
+    headings = heading_trials(cell, 0.5, 4, (0.1, 0.2))
+    assert len({trial.key for trial in headings}) == 8
+    quarter = headings[5].changes["target"]["motion"]["velocity_m_s"]
+    assert quarter == pytest.approx([0.0, 0.2, 0.0])
+
+
+def test_the_target_goes_as_far_as_the_map_says(source):
+    trial = place_trials(source.load(), 0.05, 2, 0.1, law="constrained")[0]
+    result = run_trial(source, trial, 20.0)
+    assert result.target_m == pytest.approx(0.05 * np.sqrt(2), abs=1e-6)
+    assert result.ending is Ending.CONVERGED
+
+
+def test_scores_count_every_trial_once(results):
+    found = scores(results)
+    assert [score.law for score in found] == ["image_based", "constrained"]
+    assert sum(score.trials for score in found) == len(results)
+    assert found[1].count(Ending.CONVERGED) == sum(
+        r.ending is Ending.CONVERGED for r in results if r.labels["law"] == "constrained"
+    )
+
+
+def test_laws_are_found_by_name(tmp_path):
+    cell = load_cell("ur5", {"laws.mine": "{ kind = 'plain', gain = 7.0 }"})
+    assert law_table(cell, "mine")["gain"] == 7.0
+    assert law_table(cell, OWN)["gain"] == cell.law.gain
+    for name in PRESETS:
+        assert cell.replace(law=law_table(cell, name)).law.kind == PRESETS[name]["kind"]
+    assert law_table(cell, "image_based")["gain"] == cell.law.gain
+    with pytest.raises(InputError, match="did you mean image_based"):
+        law_table(cell, "image_basde")
+
+
+def test_a_campaign_needs_a_task_in_the_image():
+    with pytest.raises(InputError, match=r"task\.kind"):
+        Aim.of(load_cell("four_cameras"))
+
+
+def test_an_address_without_a_scheduler_is_refused(source, trials, tmp_path):
+    with pytest.raises(InputError, match="address of a Dask scheduler"):
+        run_campaign(source, trials, tmp_path, crew=Crew(scheduler="nonsense://here"))
+
+
+class Cluster:
+    """A Dask scheduler and two workers, each a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "scheduler.json"
+        where = ["--scheduler-file", str(self.file), "--no-dashboard"]
+        self.processes = [self._start("scheduler", [*where, "--port", "0", "--host", "127.0.0.1"])]
+        while not self.file.exists():
+            time.sleep(0.05)
+        alone = ["--no-nanny", "--nthreads", "1", "--local-directory", str(folder)]
+        self.workers = [self._start("worker", [*where, *alone]) for _ in range(2)]
+        self.processes += self.workers
+        self.address = json.loads(self.file.read_text())["address"]
+
+    def _start(self, part: str, options: list[str]) -> "subprocess.Popen[bytes]":
+        command = [sys.executable, "-m", f"distributed.cli.dask_{part}", *options]
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def close(self) -> None:
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait()
+
+
+def test_a_worker_killed_midway_loses_nothing_and_changes_nothing(
+    source, trials, results, tmp_path
+):
+    cluster = Cluster(tmp_path)
+    try:
+        cluster_wait(cluster)
+
+        def kill_one(done: int, total: int) -> None:
+            if done == 3:
+                cluster.workers[0].kill()
+
+        found = run_campaign(
+            source,
+            trials,
+            tmp_path / "run",
+            crew=Crew(scheduler=cluster.address),
+            progress=kill_one,
+        )
+    finally:
+        cluster.close()
+    assert cluster.workers[0].returncode != 0
+    assert found == results
+
+
+def cluster_wait(cluster: Cluster) -> None:
+    """Wait until both workers are there, so that both have a share of the work."""
+    from distributed import Client
+
+    with Client(cluster.address) as client:
+        client.wait_for_workers(2)
+
+
+def test_processes_of_this_machine_find_the_same(source, trials, results, tmp_path):
+    assert run_campaign(source, trials[:4], tmp_path, crew=Crew(workers=2)) == results[:4]
