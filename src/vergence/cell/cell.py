@@ -203,10 +203,12 @@ def _check_names(cell: Cell) -> None:
         check("perception.cameras", name, cell.cameras)
     if cell.target.carried_by is not None:
         check("target.carried_by", cell.target.carried_by, cell.arms)
-    if cell.cameras[cell.task.camera].arm != cell.task.arm:
+    carrier, arm = cell.cameras[cell.task.camera].arm, cell.task.arm
+    to_hand = carrier is None and cell.target.carried_by == arm and cell.task.kind == "track"
+    if carrier != arm and not to_hand:
         raise InputError(
             str(cell.path),
             "task.camera",
-            f"{cell.task.camera}, which {cell.task.arm} does not carry",
-            f"a camera with arm = {cell.task.arm!r}",
+            f"{cell.task.camera}, which {arm} does not carry",
+            f"a camera with arm = {arm!r}, or a fixed one and target.carried_by = {arm!r}",
         )

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from copy import copy
 from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
@@ -26,6 +25,8 @@ class Obstacles:
     """
 
     def __init__(self, world: "World") -> None:
+        import mujoco
+
         self._world = world
         self._model = copy(world.model)
         of_target = [world.belongs_to_target(int(body)) for body in self._model.geom_bodyid]
@@ -36,6 +37,8 @@ class Obstacles:
 
     def move(self, joints: Mapping[str, FloatArray]) -> None:
         """Put the arms where their joints say, arm name to positions (n,)."""
+        import mujoco
+
         for arm, position in joints.items():
             self._data.qpos[self._world.joint_addresses(arm)] = position
         mujoco.mj_kinematics(self._model, self._data)

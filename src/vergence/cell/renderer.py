@@ -1,5 +1,6 @@
 """Offscreen pictures of the world, as its cameras would take them."""
 
+import importlib
 import os
 import sys
 from ctypes.util import find_library
@@ -11,22 +12,25 @@ from vergence.arrays import ImageArray
 from vergence.camera import Camera
 from vergence.errors import RenderingError
 
+_CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo settles on it, when imported
 _NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the picture
 
 
 def choose_renderer(needed: bool = True) -> None:
     """Choose how MuJoCo draws without a screen: EGL, else OSMesa, unless MUJOCO_GL says.
 
-    It has to run before MuJoCo is imported, so also where pictures may be wanted only later.
+    Where MuJoCo has been imported already, it is made to choose again.
 
     Raises:
         RenderingError: if neither library is there and a renderer is needed.
     """
-    if "MUJOCO_GL" in os.environ or sys.platform != "linux" or "mujoco" in sys.modules:
+    if "MUJOCO_GL" in os.environ or sys.platform != "linux":
         return
     for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
         if find_library(library):
             os.environ["MUJOCO_GL"] = name
+            if (chosen := sys.modules.get(_CHOICE)) is not None:
+                importlib.reload(chosen)
             return
     if not needed:
         return

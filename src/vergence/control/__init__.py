@@ -9,11 +9,19 @@ from vergence.control.conditioning import (
     has_full_rank,
     resolvability,
 )
+from vergence.control.constrained import ConstrainedLaw
+from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.guard import Guard, guarded_step, stoppable_speed
+from vergence.control.image_based import ImageBased
+from vergence.control.image_motion import FeatureState, ImageMotion
 from vergence.control.inner import InnerLaw
 from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.law import Law
+from vergence.control.objective import Objective, TwistObjective
+from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.optimal_tracking import OptimalTrackingLaw
+from vergence.control.path_tracking import PathTrackingLaw
+from vergence.control.plain import PlainLaw
 from vergence.control.position_based import PositionBasedLaw, hand_rates
 from vergence.control.redundancy import resolve_redundant
 from vergence.control.resolve import resolve_twist
@@ -31,6 +39,16 @@ from vergence.control.tracking_kernels import (
 )
 
 __all__ = [
+    "ConstrainedLaw",
+    "EyeToHandLaw",
+    "FeatureState",
+    "ImageBased",
+    "ImageMotion",
+    "Objective",
+    "OptimalTracking",
+    "PathTrackingLaw",
+    "PlainLaw",
+    "TwistObjective",
     "CameraDirections",
     "Resolvability",
     "camera_directions",

@@ -20,6 +20,7 @@ from vergence.robot.manipulability import (
     transmissibility_measure,
     yoshikawa_measure,
 )
+from vergence.robot.reversal import reverse_arm
 from vergence.robot.state import JointState, Sample, Setpoint
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "numeric_camera_gradient",
     "per_joint_limit_penalty",
     "relative_manipulability",
+    "reverse_arm",
     "transmissibility_measure",
     "world_jacobian",
     "yoshikawa_measure",

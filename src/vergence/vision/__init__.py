@@ -1,8 +1,25 @@
-"""Image points from windows of images: an SSD pyramid tracker and the picking of features."""
+"""Image points from windows of images, and what two views of them tell."""
 
 from vergence.vision.image import grey_image
 from vergence.vision.picking import Picked, pick_features
 from vergence.vision.ssd_tracker import SsdTracker
 from vergence.vision.tracks import PointTracker, Tracks
+from vergence.vision.two_view import (
+    TwoView,
+    TwoViewFailure,
+    TwoViewProblem,
+    estimate_two_view,
+)
 
-__all__ = ["Picked", "PointTracker", "SsdTracker", "Tracks", "grey_image", "pick_features"]
+__all__ = [
+    "Picked",
+    "PointTracker",
+    "SsdTracker",
+    "Tracks",
+    "TwoView",
+    "TwoViewFailure",
+    "TwoViewProblem",
+    "estimate_two_view",
+    "grey_image",
+    "pick_features",
+]

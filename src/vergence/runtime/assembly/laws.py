@@ -13,13 +13,14 @@ from vergence.cell.schema import (
 )
 from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
 from vergence.control.constrained import ConstrainedLaw
+from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
 from vergence.errors import InputError
-from vergence.robot import yoshikawa_measure
+from vergence.robot import Arm, reverse_arm, yoshikawa_measure
 
 
 def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
@@ -31,13 +32,13 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
     match cell.law:
         case OptimalTrackingTable():
             _require_task(cell, "track")
-            return _optimal_tracking(cell, driver, cell.law)
+            return _to_hand(cell, _optimal_tracking(cell, driver, cell.law))
         case ConstrainedTable():
             _require_task(cell, "track")
-            return _constrained(cell, driver, cell.law)
+            return _to_hand(cell, _constrained(cell, driver, cell.law))
         case PlainTable():
             _require_task(cell, "track")
-            return _plain(cell, driver, cell.law)
+            return _to_hand(cell, _plain(cell, driver, cell.law))
         case PositionBasedTable():
             _require_task(cell, "follow")
             return _position_based(cell, driver, cell.law)
@@ -54,6 +55,23 @@ def _require_task(cell: Cell, *kinds: str) -> None:
         raise InputError(str(cell.path), "law.kind", cell.law.kind, allowed)
 
 
+def _is_fixed(cell: Cell) -> bool:
+    return cell.cameras[cell.task.camera].arm is None
+
+
+def _to_hand(cell: Cell, law: Law) -> Law:
+    """Turn the joints round for a law whose camera is fixed and looks at the hand."""
+    return EyeToHandLaw(law) if _is_fixed(cell) else law
+
+
+def _arm(cell: Cell, driver: SimulatedDriver) -> Arm:
+    """Return the arm that carries the task's camera; backwards from the hand if it is fixed."""
+    world = driver.world
+    if not _is_fixed(cell):
+        return world.arm_to_camera(cell.task.camera)
+    return reverse_arm(world.arm_to_body(cell.task.arm), world.camera_pose(cell.task.camera))
+
+
 def _optimal_tracking(
     cell: Cell, driver: SimulatedDriver, table: OptimalTrackingTable
 ) -> OptimalTrackingLaw:
@@ -64,7 +82,7 @@ def _optimal_tracking(
             str(cell.path), "law.avoidance_axes", ", ".join(sorted(extra)), "a subset of law.axes"
         )
     return OptimalTrackingLaw(
-        driver.world.arm_to_camera(name),
+        _arm(cell, driver),
         driver.cameras[name],
         _depth(driver, name, table.depth_m),
         axes=table.axes,
@@ -82,14 +100,15 @@ def _optimal_tracking(
 
 def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -> ConstrainedLaw:
     name = cell.task.camera
-    arm, camera = driver.world.arm_to_camera(name), driver.cameras[name]
+    arm, camera = _arm(cell, driver), driver.cameras[name]
     period = 1.0 / cell.cameras[name].rate_hz
     low, high = table.depth_range
     if not low <= 1.0 <= high:
         raise InputError(
             str(cell.path), "law.depth_range", table.depth_range, "a factor up to 1 and one from 1"
         )
-    start = yoshikawa_measure(arm.jacobian(driver.read().joints[cell.task.arm].position))
+    q = driver.read().joints[cell.task.arm].position
+    start = yoshikawa_measure(arm.jacobian(q[::-1] if _is_fixed(cell) else q))
     return ConstrainedLaw(
         arm,
         camera,
@@ -110,7 +129,7 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
 def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
     name, smoothing = cell.task.camera, table.flow_smoothing_s
     return PlainLaw(
-        driver.world.arm_to_camera(name),
+        _arm(cell, driver),
         driver.cameras[name],
         _objective(cell, driver, table),
         _depth(driver, name, table.depth_m),

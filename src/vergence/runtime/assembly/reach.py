@@ -21,9 +21,8 @@ from vergence.planning.trajectory import Trajectory
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
 from vergence.runtime.stages import Perception
+from vergence.vision.marks import MarkTracker
 from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view
-from vergence.vision.white_marks import MarkTracker
-
 
 SETTLE_S = 2.0  # at the goal
 

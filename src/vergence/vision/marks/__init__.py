@@ -1,11 +1,13 @@
 """Marks that users put on things: round ones, and AprilTag or ArUco markers."""
 
 from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector, marker_corners
+from vergence.vision.marks.mark_tracker import MarkTracker
 from vergence.vision.marks.round import RoundMarks, circle_centre_bias, measure_round_marks
 
 __all__ = [
     "DICTIONARIES",
     "CodedMarks",
+    "MarkTracker",
     "MarkerDetector",
     "RoundMarks",
     "circle_centre_bias",

@@ -1,10 +1,10 @@
-"""White marks: placed to a fraction of a pixel, followed, and lost with a reason."""
+"""Round marks: placed to a fraction of a pixel, followed, and lost with a reason."""
 
 import cv2
 import numpy as np
 import pytest
 
-from vergence.vision.white_marks import MarkTracker
+from vergence.vision.marks import MarkTracker
 
 
 def picture(centres, radius=8.0, noise=1.0, scale=16, level=230):
@@ -41,7 +41,7 @@ def test_a_covered_mark_is_lost_with_its_reason_and_found_again():
     tracker = MarkTracker(picture(CENTRES), CENTRES)
     covered = tracker.track(picture(CENTRES[:2]))
     np.testing.assert_array_equal(covered.found, [True, True, False])
-    assert covered.reasons[2].startswith("no mark")
+    assert covered.reasons[2].startswith("no ")
     assert tracker.track(picture(CENTRES))
 
 
@@ -57,4 +57,4 @@ def test_pictures_that_show_nothing_lose_the_marks_with_a_reason(image):
 
 def test_a_mark_that_left_the_image_is_said_to_have_left():
     tracker = MarkTracker(picture(CENTRES), CENTRES)
-    assert tracker.track(picture(CENTRES), CENTRES + (400.0, 0.0)).reasons[0] == "left the image"
+    assert tracker.track(picture(CENTRES), CENTRES + (400.0, 0.0)).reasons[0] == "outside the image"
