@@ -29,8 +29,8 @@ def choose_renderer(needed: bool = True) -> None:
     for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
         if find_library(library):
             os.environ["MUJOCO_GL"] = name
-            if (chosen := sys.modules.get(_CHOICE)) is not None:
-                importlib.reload(chosen)
+            if "mujoco" in sys.modules and _CHOICE in sys.modules:
+                importlib.reload(sys.modules[_CHOICE])
             return
     if not needed:
         return
