@@ -1,0 +1,284 @@
+"""[Mezouar2001] section 6: planned paths, tracked plans, and how often each method arrives."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from vergence.cell import load_cell
+from vergence.planning import Path as PlannedPath
+from vergence.studies import mezouar2001_figures as figures
+from vergence.studies.check import Check, Progress, StudyResult, within
+from vergence.studies.ideal_loop import Ending, IdealLoop, Motion
+from vergence.studies.mezouar2001_methods import (
+    CLASSICAL_S,
+    LABELS,
+    METHODS,
+    image_based,
+    position_based,
+    position_based_on_object,
+)
+from vergence.studies.mezouar2001_run import Realised, plan_section6, run_section6
+from vergence.studies.mezouar2001_scene import Scene
+from vergence.studies.mezouar2001_trials import (
+    NOISE_PX,
+    ROLL_DEG,
+    End,
+    Trial,
+    endings,
+    processes,
+    random_starts,
+    wrong_beliefs,
+)
+
+TITLE = "Mezouar and Chaumette (2001): trajectories in the image inside view and joint limits"
+COUNTS = {"random": 200, "random_roll": 100, "perturbed": 100}
+COUNTS_QUICK = {"random": 60, "random_roll": 30, "perturbed": 40}
+AXIS_5 = 4
+
+
+def reproduce(
+    out: Path,
+    quick: bool,
+    progress: Progress = lambda _what, _share: None,
+    *,
+    counts: Mapping[str, int] | None = None,
+    workers: int | None = None,
+) -> StudyResult:
+    """Run section 6 and what follows from it; write the figures.
+
+    Args:
+        out: folder for the figures.
+        quick: exact projections instead of rendered images, fewer random starts.
+        progress: told what is being done.
+        counts: random starts and wrong beliefs to try, instead of the usual numbers.
+        workers: processes for those; see `processes`.
+    """
+    cell = load_cell("gantry")
+    counts = counts or (COUNTS_QUICK if quick else COUNTS)
+    progress("planning", 0.0)
+    section = plan_section6(cell, not quick)
+    runs = {}
+    for k, name in enumerate(("both", "optimised")):
+        progress(f"tracking, {name}", 0.05 + 0.1 * k)
+        runs[name] = run_section6(cell, section, name, not quick)
+    section = replace(section, runs=runs)
+    classical = servo_classically(section.scene)
+
+    def share(what: str, start: float, end: float) -> Callable[[float], None]:
+        progress(what, start)
+        return lambda done: progress(what, start + done * (end - start))
+
+    scene = section.scene
+    with processes(workers) as pool:
+        beliefs = wrong_beliefs(scene, counts["perturbed"], pool, share("wrong beliefs", 0.25, 0.4))
+        starts = {
+            "random": random_starts(
+                scene, None, counts["random"], pool, share("random starts", 0.4, 0.7)
+            ),
+            "random_roll": random_starts(
+                scene, ROLL_DEG, counts["random_roll"], pool, share("random rolls", 0.7, 0.95)
+            ),
+        }
+    checks = [
+        *_broken_paths(section.paths),
+        *_kept_paths(section.paths, runs),
+        *_tracking(runs),
+        *_classical(classical),
+        _perturbed(beliefs),
+        *(_random(name, trials) for name, trials in starts.items()),
+    ]
+    progress("figures", 0.97)
+    drawn = figures.draw(out, section, classical, starts)
+    return StudyResult(TITLE, tuple(checks), drawn)
+
+
+def servo_classically(scene: Scene) -> Mapping[str, Motion]:
+    """Servo from the section's start without a plan, on exact projections."""
+    loop = IdealLoop(scene.arm, scene.camera, scene.points_world, scene.goal_px)
+    laws = {
+        "image_based": image_based,
+        "position_based": position_based,
+        "position_based_on_object": position_based_on_object,
+    }
+    return {
+        name: loop.run(scene.q_start, law(scene), CLASSICAL_S, np.random.default_rng(0))
+        for name, law in laws.items()
+    }
+
+
+def _broken_paths(paths: Mapping[str, PlannedPath]) -> list[Check]:
+    straight, seen = paths["straight"], paths["visibility_only"]
+    out_px, kept_px = -straight.image_margin_px, seen.image_margin_px
+    axis5, axis5_seen = (_largest(path, AXIS_5) for path in (straight, seen))
+    return [
+        Check(
+            "straight.leaves_view",
+            "points get out largely of the field of view (Fig. 3c): more than 20 px",
+            out_px,
+            "px",
+            within(out_px, 20.0),
+            "how far outside; no potentials",
+        ),
+        Check(
+            "straight.joint5_limit",
+            "axis 5 attains its limit (Fig. 3d): beyond 1",
+            axis5,
+            "of range",
+            axis5 > 1.0,
+            "largest normalised position",
+        ),
+        Check(
+            "visibility_only.in_view",
+            "the visibility constraint is ensured (Fig. 4a)",
+            kept_px,
+            "px",
+            kept_px > 0.0,
+            "least distance to the border of the image",
+        ),
+        Check(
+            "visibility_only.joint5_limit",
+            "axis 5 reaches its limit (Fig. 4b): beyond 1",
+            axis5_seen,
+            "of range",
+            axis5_seen > 1.0,
+        ),
+    ]
+
+
+def _kept_paths(paths: Mapping[str, PlannedPath], runs: Mapping[str, Realised]) -> list[Check]:
+    checks = []
+    for name, said in (("both", "Fig. 5a-d"), ("optimised", "not in the paper")):
+        path, run = paths[name], runs[name]
+        planned_px, planned_joint = path.image_margin_px, path.joint_margin
+        px, joint = min(planned_px, run.image_margin_px), min(planned_joint, run.joint_margin)
+        checks += [
+            Check(
+                f"{name}.in_view",
+                f"the target remains in the field of view ({said})",
+                px,
+                "px",
+                px > 0.0,
+                f"least distance to the border: planned {planned_px:.1f}, "
+                f"realised {run.image_margin_px:.1f}",
+            ),
+            Check(
+                f"{name}.joint_margin",
+                f"all axes avoid their joint limits ({said})",
+                joint,
+                "of range",
+                joint > 0.0,
+                f"planned {planned_joint:.3f}, realised {run.joint_margin:.3f}; "
+                f"{path.camera_length_m:.2f} m in {run.trajectory.duration:.1f} s",
+            ),
+        ]
+    return checks
+
+
+def _tracking(runs: Mapping[str, Realised]) -> list[Check]:
+    error = {name: float(run.tracking_error_px.max()) for name, run in runs.items()}
+    final = {name: float(run.goal_error_px[-1].max()) for name, run in runs.items()}
+    pose = {name: run.final_pose_error for name, run in runs.items()}
+    completed = all(run.succeeded for run in runs.values())
+    worst_pose = max(metres for metres, _ in pose.values())
+    return [
+        Check(
+            "tracking.error_max_px",
+            "planned and realised almost similar: at most 5",
+            max(error.values()),
+            "px",
+            completed and within(max(error.values()), 0.0, 5.0),
+            f"true points; the paper's plan {error['both']:.2g}, ours {error['optimised']:.2g}",
+        ),
+        Check(
+            "tracking.final_error_px",
+            "converges to the desired value (Fig. 5f): below 0.5",
+            max(final.values()),
+            "px",
+            completed and within(max(final.values()), 0.0, 0.5),
+            f"true points; the paper's plan {final['both']:.2g}, ours {final['optimised']:.2g}",
+        ),
+        Check(
+            "tracking.final_pose_error_m",
+            "correct realization of the positioning task: at most 0.005",
+            worst_pose,
+            "m",
+            completed and within(worst_pose, 0.0, 0.005),
+            f"and {np.degrees(max(turn for _, turn in pose.values())):.2g} degrees",
+        ),
+    ]
+
+
+def _classical(motions: Mapping[str, Motion]) -> list[Check]:
+    image, pose = motions["image_based"], motions["position_based"]
+    other = motions["position_based_on_object"]
+    return [
+        Check(
+            "classical.image_based_fails",
+            "1: fails from the same start",
+            float(image.ending is not Ending.ARRIVED),
+            "",
+            image.ending is not Ending.ARRIVED,
+            f"{image.reason}; L at the current points, true depths",
+        ),
+        Check(
+            "classical.position_based_fails",
+            "1: fails from the same start",
+            float(pose.ending is not Ending.ARRIVED),
+            "",
+            Ending.ARRIVED not in (pose.ending, other.ending),
+            f"straight camera path: {pose.reason}; "
+            f"object straight in the image: {other.reason or 'arrives'}",
+        ),
+    ]
+
+
+def _perturbed(ends: Sequence[End]) -> Check:
+    rate = np.mean([end.ending is Ending.ARRIVED for end in ends])
+    reasons = Counter(end.reason for end in ends if end.ending is not Ending.ARRIVED)
+    again = sum(end.parts > 1 for end in ends)
+    return Check(
+        "perturbed.success_rate",
+        "robust with respect to modeling errors: at least 0.97",
+        float(rate),
+        "",
+        within(float(rate), 0.97),
+        f"{len(ends)} runs on projections with {NOISE_PX} px of noise: focal length ±5 %, "
+        f"principal point ±15 px, d* ±20 %; {again} planned again on the way{_listed(reasons)}",
+    )
+
+
+def _random(name: str, trials: Sequence[Trial]) -> Check:
+    feasible = [trial for trial in trials if not trial.infeasible]
+    rates = {method: success_rate(trials, method) for method in METHODS}
+    others = ", ".join(f"{LABELS[m]} {rates[m]:.3f}" for m in METHODS if m != "optimised")
+    ours = [trial.ends["optimised"] for trial in feasible]
+    again = sum(end.parts > 1 for end in ours)
+    reasons = Counter(end.reason for end in ours if end.ending is not Ending.ARRIVED)
+    return Check(
+        f"{name}.success_rate",
+        "convergence for all initial camera positions: at least 0.99 of the feasible",
+        rates["optimised"],
+        "",
+        within(rates["optimised"], 0.99),
+        f"{others}; {len(trials)} starts on projections with {NOISE_PX} px of noise, "
+        f"{len(trials) - len(feasible)} left out as proved infeasible (no chain of wrist "
+        f"orientations from which all marks can be seen joins start and any goal configuration); "
+        f"{again} of ours planned again on the way{_listed(reasons)}",
+    )
+
+
+def success_rate(trials: Sequence[Trial], method: str) -> float:
+    """Return the part of the feasible starts from which a method arrives."""
+    count = endings(trials, method)
+    return count[Ending.ARRIVED] / max(count.total(), 1)
+
+
+def _listed(reasons: Counter[str]) -> str:
+    return "".join(f"; {count} × {reason}" for reason, count in reasons.most_common(4))
+
+
+def _largest(path: PlannedPath, joint: int) -> float:
+    return float(np.abs(path.joints_normalized[:, joint]).max())

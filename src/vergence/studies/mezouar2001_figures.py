@@ -1,0 +1,206 @@
+"""Figures 3 to 5 of [Mezouar2001] from our paths and runs, and what the paper has no figure of."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vergence.drawing import COLORS, curve, legend, save
+from vergence.planning import Path as PlannedPath
+from vergence.studies.check import Figure
+from vergence.studies.ideal_loop import Ending, Motion
+from vergence.studies.mezouar2001_methods import LABELS, METHODS
+from vergence.studies.mezouar2001_run import Realised, Section6
+from vergence.studies.mezouar2001_scene import Scene
+from vergence.studies.mezouar2001_trials import Trial, endings
+from vergence.studies.path_panels import (
+    camera_paths,
+    grid,
+    image_paths,
+    joint_paths,
+    picture,
+    space,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_WIDTH = 8.6  # inches
+_PATHS = {
+    "straight": "no potentials",
+    "visibility_only": "visibility only",
+    "both": "both potentials",
+    "optimised": "ours",
+}
+_ENDINGS = {
+    Ending.ARRIVED: COLORS[2],
+    Ending.VIEW: COLORS[1],
+    Ending.JOINT: COLORS[5],
+    Ending.SHORT: "#999999",
+    Ending.NO_PLAN: COLORS[4],
+}
+
+
+def draw(
+    out: Path,
+    section: Section6,
+    classical: Mapping[str, Motion],
+    starts: Mapping[str, Sequence[Trial]],
+) -> tuple[Figure, ...]:
+    """Write every figure into a folder; return them in the paper's order."""
+    out.mkdir(parents=True, exist_ok=True)
+    drawn = {
+        "figure_03": (
+            _figure_3(section),
+            "Figure 3: initial and desired picture; paths without potentials in the image and "
+            "in the joints' ranges (limits at -1 and 1).",
+        ),
+        "figure_04": (
+            _figure_4(section),
+            "Figure 4: paths with the visibility potential alone.",
+        ),
+        "figure_05": (
+            _planned_and_realised(section, "both"),
+            "Figure 5: both potentials, planned and realised; velocities commanded of the camera; "
+            "distance of each mark from its desired place.",
+        ),
+        "figure_optimised": (
+            _planned_and_realised(section, "optimised"),
+            "The optimised path, planned and realised as in figure 5.",
+        ),
+        "figure_space": (
+            _in_space(section),
+            "The camera's way from start to goal; strokes show where it looks.",
+        ),
+        "figure_classical": (
+            _classical(section.scene, classical),
+            "Servoing from the same start without a plan, up to where it fails.",
+        ),
+        "figure_success": (
+            _success(starts),
+            "How servoing ends from random starts that are not proved infeasible.",
+        ),
+    }
+    files = []
+    for name, (drawing, caption) in drawn.items():
+        path = out / f"{name}.svg"
+        save(drawing, path)
+        files.append(Figure(path, caption))
+    return tuple(files)
+
+
+def _figure_3(section: Section6) -> Any:
+    scene, path = section.scene, section.paths["straight"]
+    drawing, axes = grid(_WIDTH, 6.2, 2, 2)
+    first = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
+    for place, name, px, image in (
+        (axes[0, 0], "(a) initial picture", first, section.pictures[0]),
+        (axes[0, 1], "(b) desired picture", scene.goal_px, section.pictures[1]),
+    ):
+        picture(place, scene.camera, px, image)
+        place.set_title(name, fontsize=9)
+    _planned(axes[1], path, "(c)", "(d)")
+    return drawing
+
+
+def _figure_4(section: Section6) -> Any:
+    drawing, axes = grid(_WIDTH, 3.1, 1, 2)
+    _planned(axes[0], section.paths["visibility_only"], "(a)", "(b)")
+    return drawing
+
+
+def _planned_and_realised(section: Section6, name: str) -> Any:
+    path, run, scene = section.paths[name], section.runs[name], section.scene
+    drawing, axes = grid(_WIDTH, 8.8, 3, 2)
+    _planned(axes[0], path, "(a)", "(b)")
+    trace = run.trace
+    image_paths(axes[1, 0], scene.camera, trace["points_px"])
+    axes[1, 0].set_title("(c) realised, in the image", fontsize=9)
+    joint_paths(axes[1, 1], trace["time"], run.joints_normalized, scene.arm.names)
+    axes[1, 1].set_title("(d) realised, joints", fontsize=9)
+    axes[1, 1].set_xlabel("time (s)")
+    legend(axes[1, 1])
+    _velocities(axes[2, 0], run)
+    axes[2, 0].set_title("(e) camera velocity", fontsize=9)
+    for index, errors in enumerate(run.goal_error_px.T):
+        axes[2, 1].plot(trace["time"], errors, label=f"mark {index + 1}", **curve(index))
+    axes[2, 1].set_title("(f) distance from the desired place", fontsize=9)
+    axes[2, 1].set_xlabel("time (s)")
+    axes[2, 1].set_ylabel("error (px)")
+    axes[2, 1].set_ylim(bottom=0.0)
+    axes[2, 1].set_xlim(left=0.0)
+    legend(axes[2, 1])
+    return drawing
+
+
+def _velocities(axes: "Axes", run: Realised) -> None:
+    time, v = run.trace["time"], run.trace["v_camera"]
+    for index, axis in enumerate("xyz"):
+        axes.plot(time, 100.0 * v[:, index], label=f"v{axis} (cm/s)", color=COLORS[index])
+    for index, axis in enumerate("xyz"):
+        axes.plot(
+            time,
+            np.degrees(v[:, 3 + index]),
+            label=f"ω{axis} (deg/s)",
+            color=COLORS[index],
+            linestyle="--",
+        )
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("cm/s, degrees/s")
+    axes.legend(ncols=2, fontsize=7, frameon=False)
+
+
+def _planned(axes: Any, path: PlannedPath, left: str, right: str) -> None:
+    arm = path.problem.arm
+    image_paths(axes[0], path.problem.camera, path.points_px)
+    axes[0].set_title(f"{left} planned, in the image", fontsize=9)
+    joint_paths(axes[1], np.linspace(0.0, 1.0, len(path.q)), path.joints_normalized, arm.names)
+    axes[1].set_title(f"{right} planned, joints", fontsize=9)
+    axes[1].set_xlabel("part of the path")
+    legend(axes[1])
+
+
+def _in_space(section: Section6) -> Any:
+    drawing, axes = space(_WIDTH, 5.4)
+    named = [(_PATHS[name], path.T_world_camera) for name, path in section.paths.items()]
+    camera_paths(axes, named, section.scene.points_world)
+    axes.view_init(elev=22, azim=-60)
+    axes.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), frameon=False, fontsize=8.5)
+    return drawing
+
+
+def _classical(scene: Scene, motions: Mapping[str, Motion]) -> Any:
+    titles = {
+        "image_based": "image-based",
+        "position_based": "position-based,\nstraight camera path",
+        "position_based_on_object": "position-based,\nobject straight in the image",
+    }
+    drawing, axes = grid(_WIDTH, 3.0, 1, len(titles))
+    for place, (name, title) in zip(axes[0], titles.items(), strict=True):
+        motion = motions[name]
+        image_paths(place, scene.camera, motion.points_px)
+        place.set_title(f"{title}\n{motion.reason or 'arrives'}", fontsize=8)
+    return drawing
+
+
+def _success(starts: Mapping[str, Sequence[Trial]]) -> Any:
+    drawing, axes = grid(_WIDTH, 2.6, 1, len(starts))
+    titles = {"random": "random starts", "random_roll": "roll of 120 to 180 degrees"}
+    for place, (name, trials) in zip(axes[0], starts.items(), strict=True):
+        feasible = sum(not trial.infeasible for trial in trials)
+        left = np.zeros(len(METHODS))
+        for ending, color in _ENDINGS.items():
+            share = np.array([100.0 * endings(trials, m)[ending] for m in METHODS]) / feasible
+            place.barh(range(len(METHODS)), share, left=left, color=color, label=ending.value)
+            left += share
+        names = [LABELS[m] for m in METHODS] if place is axes[0, 0] else [""] * len(METHODS)
+        place.set_yticks(range(len(METHODS)), names)
+        place.invert_yaxis()
+        place.set_xlim(0, 100)
+        place.set_xlabel("of the feasible starts (%)")
+        place.set_title(f"{titles[name]}: {feasible} of {len(trials)} feasible", fontsize=9)
+        place.grid(visible=False, axis="y")
+    legend(axes[0, -1])
+    return drawing

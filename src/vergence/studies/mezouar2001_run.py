@@ -1,0 +1,174 @@
+"""Section 6 of [Mezouar2001] on the gantry cell: plan from two pictures, then track the plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.cell import Cell, SimulatedDriver
+from vergence.cell.joint_positions import joint_positions
+from vergence.cell.schema import ReachTable
+from vergence.errors import VergenceError
+from vergence.geometry import se3_inverse, so3_log
+from vergence.outcome import Outcome
+from vergence.planning import Path, PotentialFieldPlanner, Trajectory
+from vergence.runtime import run_cell
+from vergence.runtime.assembly.reach import look_twice, plan_reach
+from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.studies.mezouar2001_scene import Scene
+
+SETTLE_S = 4.0  # after a plan's end
+PLANNERS = {"both": "potential_field", "optimised": "optimised"}  # of the paths that are run
+
+
+@dataclass(slots=True)
+class PathTrace:
+    """Listens to a run; a row for every picture.
+
+    Columns: time (s), q (n,), points_px (N, 2) true, wanted_px (N, 2), v_camera (6,) commanded,
+    T_world_camera (4, 4).
+    """
+
+    arm: str
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    outcome: Outcome | None = None
+
+    def begin(self, _info: RunInfo) -> None:
+        """Start with no rows."""
+        self.rows.clear()
+
+    def tick(self, record: TickRecord) -> None:
+        """Keep what was so when the picture was taken, and what was made of it."""
+        frame = next((f for f in record.sample.frames if f.truth is not None), None)
+        command = record.commands.get(self.arm)
+        if frame is None or frame.truth is None or record.reference is None or command is None:
+            return
+        self.rows.append(
+            {
+                "time": frame.time,
+                "q": frame.joints[self.arm],
+                "points_px": frame.truth.points_px,
+                "wanted_px": record.reference.points_px,
+                "v_camera": command.v_camera,
+                "T_world_camera": frame.truth.T_world_camera,
+            }
+        )
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Events are in the outcome's reason."""
+
+    def close(self, outcome: Outcome, _summary: Mapping[str, float | str]) -> None:
+        """Keep how it ended."""
+        self.outcome = outcome
+
+    def __getitem__(self, column: str) -> FloatArray:
+        """Return a column as an array, one row a picture."""
+        return np.array([row[column] for row in self.rows])
+
+
+@dataclass(frozen=True, slots=True)
+class Realised:
+    """A plan and what came of it."""
+
+    scene: Scene
+    trajectory: Trajectory
+    trace: PathTrace
+    succeeded: bool
+
+    @property
+    def tracking_error_px(self) -> FloatArray:
+        """Distance of each point from its place on the plan, (K, N)."""
+        return _distances(self.trace["points_px"] - self.trace["wanted_px"])
+
+    @property
+    def goal_error_px(self) -> FloatArray:
+        """Distance of each point from where the desired picture has it, (K, N)."""
+        return _distances(self.trace["points_px"] - self.scene.goal_px)
+
+    @property
+    def image_margin_px(self) -> float:
+        """Smallest distance of a point to the border of the image; negative outside."""
+        camera, px = self.scene.camera, self.trace["points_px"]
+        far = np.array([camera.width - 0.5, camera.height - 0.5]) - px
+        return float(min((px + 0.5).min(), far.min()))
+
+    @property
+    def joints_normalized(self) -> FloatArray:
+        """Joint positions with their limits at -1 and 1, (K, n)."""
+        return self.scene.arm.normalized(self.trace["q"])
+
+    @property
+    def joint_margin(self) -> float:
+        """Smallest distance to a joint limit, part of half the range."""
+        return float(1.0 - np.abs(self.joints_normalized).max())
+
+    @property
+    def final_pose_error(self) -> tuple[float, float]:
+        """How far the camera ends from where the desired picture was taken, m and rad."""
+        missing = se3_inverse(self.scene.T_world_goal.copy()) @ self.trace["T_world_camera"][-1]
+        turn = so3_log(np.ascontiguousarray(missing[:3, :3]))
+        return float(np.linalg.norm(missing[:3, 3])), float(np.linalg.norm(turn))
+
+
+@dataclass(frozen=True, slots=True)
+class Section6:
+    """The paths of the section, and the runs of those that can be run."""
+
+    scene: Scene
+    pictures: tuple[ImageArray | None, ImageArray | None]  # from start and goal
+    paths: Mapping[str, Path]  # straight, visibility_only, both, optimised
+    runs: Mapping[str, Realised]  # both, optimised
+
+
+def plan_section6(cell: Cell, images: bool) -> Section6:
+    """Look twice and plan every path of the section; nothing is run yet.
+
+    Raises:
+        VergenceError: if there is no plan that keeps every constraint.
+    """
+    task = cell.task
+    assert isinstance(task, ReachTable)
+    driver = SimulatedDriver(cell, images)
+    try:
+        pictures = look_twice(cell, task, driver, images)
+        plans = {
+            name: plan_reach(cell, task.model_copy(update={"planner": planner}), driver, pictures)
+            for name, planner in PLANNERS.items()
+        }
+        goal = joint_positions(cell, "task.goal_deg", task.goal_deg, driver.arms[task.arm])
+        shown = (
+            driver.first_frame(task.camera).image,
+            driver.frame_at(task.camera, task.arm, goal).image,
+        )
+    finally:
+        driver.close()
+    for plan in plans.values():
+        if not isinstance(plan, Path):
+            raise VergenceError(f"{cell.name}: {plan}")
+    kept = {name: plan for name, plan in plans.items() if isinstance(plan, Path)}
+    problem = kept["both"].problem
+    broken = {
+        "straight": PotentialFieldPlanner(gain_image=0.0, gain_joint=0.0).walk(problem),
+        "visibility_only": PotentialFieldPlanner(gain_joint=0.0).walk(problem),
+    }
+    return Section6(Scene.of(cell), shown, {**broken, **kept}, {})
+
+
+def run_section6(cell: Cell, planned: Section6, name: str, images: bool) -> Realised:
+    """Run a plan of the section, "both" or "optimised", as the cell does."""
+    task = cell.task
+    assert isinstance(task, ReachTable)
+    trajectory = Trajectory.of(planned.paths[name], task.camera_speed_m_s)
+    changed = cell.replace(
+        task={"planner": PLANNERS[name]}, duration_s=trajectory.duration + SETTLE_S
+    )
+    trace = PathTrace(task.arm)
+    result = run_cell(changed, [trace], images)
+    return Realised(planned.scene, trajectory, trace, result.outcome.succeeded)
+
+
+def _distances(differences: FloatArray) -> FloatArray:
+    sizes: FloatArray = np.linalg.norm(differences, axis=-1)
+    return sizes
