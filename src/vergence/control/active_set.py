@@ -21,7 +21,7 @@ class OrderedSolution(NamedTuple):
     solved: bool  # False: the steps ran out, x must not be used
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_ordered_qp(
     H_inverse: FloatArray, g: FloatArray, C: FloatArray, d: FloatArray, rank: IntArray
 ) -> OrderedSolution:
@@ -70,7 +70,7 @@ def solve_ordered_qp(
     return OrderedSolution(x, active, given_up, True)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _value(C: FloatArray, row: int, x: FloatArray) -> float:
     """Return the row's left-hand side at x."""
     value = 0.0
@@ -79,7 +79,7 @@ def _value(C: FloatArray, row: int, x: FloatArray) -> float:
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _best_value(
     H_inverse: FloatArray, C: FloatArray, d: FloatArray, rank: IntArray, row: int
 ) -> float:
@@ -89,7 +89,7 @@ def _best_value(
     return _value(C, row, x)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_qp(
     H_inverse: FloatArray,
     g: FloatArray,
@@ -120,11 +120,8 @@ def solve_qp(
             if rank[i] > up_to or active[i] or d[i] == -np.inf:
                 continue
             violation = d[i]
-            size = 0.0
             for j in range(n):
                 violation -= C[i, j] * x[j]
-                size += C[i, j] * C[i, j]
-            violation /= np.sqrt(size) + 1e-12
             if violation > worst:
                 p, worst = i, violation
         if p < 0:
@@ -170,7 +167,7 @@ def solve_qp(
     return x, active, -1, False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _directions(
     H_inverse: FloatArray,
     C: FloatArray,

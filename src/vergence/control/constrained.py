@@ -46,7 +46,7 @@ class ConstrainedRates(NamedTuple):
     solved: bool
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def constrained_rates(
     chain: Chain,
     limits: FloatArray,
@@ -70,14 +70,7 @@ def constrained_rates(
     n = len(q)
     m = manipulability(chain, q, limits[0], limits[1], avoidance.penalty_k, True, 1e-3)
     J = m.J_camera
-    H, g = avoidance.damping * np.eye(n), np.zeros(n)
-    HJ = H_twist @ J
-    for i in range(n):
-        for k in range(6):
-            g[i] += J[k, i] * g_twist[k]
-        for j in range(n):
-            for k in range(6):
-                H[i, j] += J[k, i] * HJ[k, j]
+    H, g = joint_objective(H_twist, g_twist, J, avoidance.damping)
     H_inverse = invert_spd_any(H)
     if avoidance.S > 0.0 and m.value > 0.0:
         pull = avoidance.S * period * period / (2.0 * m.value * m.value) * m.gradient_q
@@ -118,6 +111,27 @@ def constrained_rates(
     if not solved:
         rates = velocity - np.minimum(np.maximum(velocity, -limits[3] * period), limits[3] * period)
     return ConstrainedRates(rates, m.value, m.penalty, active, given_up, solved)
+
+
+@njit(cache=True, error_model="numpy")
+def joint_objective(
+    H_twist: FloatArray, g_twist: FloatArray, J: FloatArray, damping: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return Jᵀ H J + μ I (n, n) and Jᵀ g (n,): a twist objective in joint rates."""
+    n = J.shape[1]
+    H, g, HJ = np.zeros((n, n)), np.zeros(n), np.zeros(6)
+    for j in range(n):
+        for r in range(6):
+            HJ[r] = 0.0
+            for k in range(6):
+                HJ[r] += H_twist[r, k] * J[k, j]
+            g[j] += J[r, j] * g_twist[r]
+        for i in range(j + 1):
+            for r in range(6):
+                H[i, j] += J[r, i] * HJ[r]
+            H[j, i] = H[i, j]
+        H[j, j] += damping
+    return H, g
 
 
 class ConstrainedLaw:

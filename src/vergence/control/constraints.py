@@ -33,7 +33,7 @@ class ConstraintRows(NamedTuple):
     kind: IntArray  # (m,)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def constraint_rows(
     q: FloatArray,
     velocity: FloatArray,
@@ -91,25 +91,25 @@ def constraint_rows(
             margin = settings.joint_margin * span
             C[row, i], d[row] = -1.0, -gamma * (limits[1, i] - margin - q[i])
             C[row + 1, i], d[row + 1] = 1.0, -gamma * (q[i] - limits[0, i] - margin)
+    near, far = 1.0 / settings.depth_low, 1.0 / settings.depth_high
     for j in range(M):
         for a in range(2):
-            for side in range(2):
-                sign = 1.0 if side == 0 else -1.0
-                border = settings.view_low[a] if side == 0 else settings.view_high[a]
-                h = sign * (points[j, a] - border)
-                for depth in range(2):
-                    inverse = 1.0 / (settings.depth_low if depth == 0 else settings.depth_high)
-                    row = 4 * n + 8 * j + 4 * a + 2 * side + depth
-                    kind[row] = VIEW
-                    if not np.isfinite(h):
-                        continue
-                    for i in range(n):
-                        image = 0.0
-                        for k in range(3):
-                            image += inverse * L_translation[2 * j + a, k] * J_camera[k, i]
-                            image += L_rotation[2 * j + a, k] * J_camera[k + 3, i]
-                        C[row, i] = sign * image
-                    d[row] = -gamma * h - sign * flow[j, a]
+            row = 4 * n + 8 * j + 4 * a
+            below = points[j, a] - settings.view_low[a]
+            above = settings.view_high[a] - points[j, a]
+            kind[row : row + 4] = VIEW
+            for i in range(n):
+                moved, turned = 0.0, 0.0  # image motion by the camera's translation and rotation
+                for k in range(3):
+                    moved += L_translation[2 * j + a, k] * J_camera[k, i]
+                    turned += L_rotation[2 * j + a, k] * J_camera[k + 3, i]
+                C[row, i], C[row + 1, i] = near * moved + turned, far * moved + turned
+                C[row + 2, i], C[row + 3, i] = -C[row, i], -C[row + 1, i]
+            d[row] = d[row + 1] = -gamma * below - flow[j, a]
+            d[row + 2] = d[row + 3] = -gamma * above + flow[j, a]
+            for side in range(4):
+                if not np.isfinite(d[row + side]):
+                    d[row + side] = -np.inf
     kind[m - 1] = SINGULARITY
     if settings.manipulability_min > 0.0:
         C[m - 1] = yoshikawa_gradient

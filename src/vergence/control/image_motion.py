@@ -103,7 +103,7 @@ def _seen_from(
     return seen
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> FloatArray:
     """Return motionless points as another camera pose sees them, (M, 2).
 

@@ -58,7 +58,7 @@ def seen_only(
     return state, found[found], depth[found], kept
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def least_squares_objective(
     E: FloatArray, wanted: FloatArray, weight: FloatArray, R: FloatArray
 ) -> TwistObjective:

@@ -1,0 +1,96 @@
+"""One constrained tick: six and seven joints, four and nine points, every constraint in force."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from harness import calls, loops, row
+from peer_programs import visp
+from vergence.arrays import FloatArray
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control.constrained import ConstrainedLaw, constrained_rates
+from vergence.control.image_based import ImageBased
+from vergence.control.objective import least_squares_objective
+from vergence.features import interaction_matrix_points
+from vergence.robot import Arm, yoshikawa_measure
+
+GAIN, PERIOD = 2.0, 1 / 30
+
+
+class Tick(NamedTuple):
+    """What one tick is made from; the same every time."""
+
+    arm: Arm
+    law: ConstrainedLaw
+    q: FloatArray
+    points: FloatArray
+    wanted: FloatArray
+    depth: FloatArray
+
+
+def tick_of(cell: str, count: int) -> Tick:
+    """Make a tick in which a corner of the picture and a soft joint limit are near."""
+    driver = SimulatedDriver(load_cell(cell), images=False)
+    task = driver.cell.task
+    arm, camera = driver.world.arm_to_camera(task.camera), driver.cameras[task.camera]
+    q = np.array(driver.read().joints[task.arm].position)
+    side = int(np.ceil(np.sqrt(count)))
+    grid = np.linspace(-0.09, 0.13, side)
+    points = np.array([(x, y) for x in grid for y in grid])[:count]
+    depth = np.linspace(0.9, 1.1, count)
+    law = ConstrainedLaw(
+        arm,
+        camera,
+        ImageBased(camera, GAIN),
+        depth,
+        manipulability_min=0.5 * yoshikawa_measure(arm.jacobian(q)),
+        S=1e-3,
+    )
+    return Tick(arm, law, q, points, points + np.array([0.06, -0.04]), depth)
+
+
+@njit
+def one_tick(chain, limits, q, points, wanted, depth, R, settings, avoidance):  # type: ignore[no-untyped-def]
+    """From features and joints to joint rates, image-based under every constraint."""
+    L = interaction_matrix_points(points, depth)
+    error = -GAIN * (points - wanted)
+    twist = least_squares_objective(L, error.ravel(), np.ones(len(L)), R)
+    still, rest = np.zeros_like(points), np.zeros(len(q))
+    return constrained_rates(
+        chain, limits, q, rest, twist.H, twist.g, points, still, depth, PERIOD, settings, avoidance
+    ).rates
+
+
+@njit
+def repeat(count, chain, limits, q, points, wanted, depth, R, settings, avoidance):  # type: ignore[no-untyped-def]
+    q, total = q.copy(), 0.0
+    for _ in range(count):
+        q[0] += 1e-9
+        total += one_tick(chain, limits, q, points, wanted, depth, R, settings, avoidance)[0]
+    return total
+
+
+def arguments(tick: Tick) -> tuple[Any, ...]:
+    law, R = tick.law, np.full(6, 1e-6)
+    before = (tick.arm.chain, law._limits, tick.q, tick.points, tick.wanted, tick.depth, R)
+    return (*before, law._settings, law._avoidance)
+
+
+def from_python(tick: Tick) -> Callable[[], object]:
+    packed = arguments(tick)
+    return lambda: one_tick(*packed)
+
+
+def run() -> list[dict[str, Any]]:
+    rows = []
+    for cell, joints, count in (("puma560", 6, 4), ("puma560", 6, 9), ("lippiello2005", 7, 9)):
+        tick = tick_of(cell, count)
+        packed = arguments(tick)
+        name = f"constrained tick: {joints} joints, {count} points"
+        peer = visp("tick_joint_limits") if count == 4 else None
+        rows.append(row(name, calls(from_python(tick)), peer, value_aim=12.0))
+        inside = loops(lambda n, packed=packed: repeat(n, *packed))
+        rows.append(row(f"{name}, inside a kernel", inside, value_aim=8.0))
+    return rows
