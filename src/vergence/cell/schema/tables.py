@@ -57,7 +57,7 @@ ArmMotion = Annotated[JointMotion | PoseMotion, Field(discriminator="kind")]
 class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
-    model: Path  # MJCF or URDF
+    model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
     body: str  # the last body: cameras are mounted on it unless they name another
     start_deg: tuple[float, ...]  # at the start: degrees; metres for sliding joints
     rate_max_deg_s: Positive | tuple[Positive, ...] = 180.0  # m/s·(180/π) for sliding joints
