@@ -113,6 +113,36 @@ def report(
         say(f"report  {path}")
 
 
+@app.command(epilog="Example: vergence plan gantry --planner potential_field")
+def plan(
+    cell: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a built-in cell, a cell file or folder, whose task is to reach.",
+            autocompletion=_cell_names,
+        ),
+    ],
+    planner: Annotated[
+        str | None, typer.Option(help="optimised or potential_field, instead of the cell's.")
+    ] = None,
+    out: Out = None,
+    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
+    images: Annotated[
+        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
+    ] = True,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Plan the way between two pictures and draw it; nothing moves."""
+    from vergence.app.plan import Request
+    from vergence.app.plan import plan as command
+
+    raise typer.Exit(command(Request(cell, planner, images, seed, settings or ()), out, as_json))
+
+
 @app.command(epilog="Example: vergence reproduce nelson1995 --quick")
 def reproduce(
     paper: Annotated[

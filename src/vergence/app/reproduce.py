@@ -11,7 +11,7 @@ from vergence.errors import InputError, nearest
 if TYPE_CHECKING:
     from vergence.studies import StudyResult
 
-PAPERS = ("nelson1995", "lippiello2005", "guarantees")
+PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees")
 QUICK = "quick: on exact projections instead of images"
 
 

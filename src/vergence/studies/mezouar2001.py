@@ -35,7 +35,7 @@ from vergence.studies.mezouar2001_trials import (
 
 TITLE = "Mezouar and Chaumette (2001): trajectories in the image inside view and joint limits"
 COUNTS = {"random": 200, "random_roll": 100, "perturbed": 100}
-COUNTS_QUICK = {"random": 60, "random_roll": 30, "perturbed": 40}
+COUNTS_QUICK = {"random": 100, "random_roll": 50, "perturbed": 50}
 AXIS_5 = 4
 
 

@@ -74,7 +74,11 @@ def image_paths(axes: "Axes", camera: Camera, points_px: FloatArray) -> None:
 
 
 def joint_paths(
-    axes: "Axes", along: FloatArray, normalized: FloatArray, names: Sequence[str]
+    axes: "Axes",
+    along: FloatArray,
+    normalized: FloatArray,
+    names: Sequence[str],
+    label: str = "joint position (share of its range)",
 ) -> None:
     """Draw joint positions (K, n) with their limits at -1 and 1 over time or place (K,)."""
     for index, name in enumerate(names):
@@ -86,7 +90,7 @@ def joint_paths(
     axes.set_ylim(-reach, reach)
     axes.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     axes.set_xlim(along[0], along[-1])
-    axes.set_ylabel("joint position (share of its range)")
+    axes.set_ylabel(label)
 
 
 def camera_paths(

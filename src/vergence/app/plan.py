@@ -1,0 +1,99 @@
+"""`vergence plan`: plan the way of a cell whose task is to reach, draw it, move nothing."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.errors import InputError
+
+if TYPE_CHECKING:
+    from vergence.cell import Cell
+    from vergence.cell.schema import ReachTable
+    from vergence.planning import Path as PlannedPath
+    from vergence.planning import PlanFailure, Trajectory
+    from vergence.vision.two_view import TwoViewFailure
+
+
+class Request(NamedTuple):
+    """What was asked for."""
+
+    cell: str
+    planner: str | None  # instead of the cell's
+    images: bool
+    seed: int | None
+    settings: Sequence[str]
+
+
+def plan(request: Request, out: Path | None, as_json: bool) -> int:
+    """Plan, draw and say what came of it; return the exit code.
+
+    Raises:
+        InputError: if the cell cannot be read, or its task is not to reach.
+    """
+    from vergence.app.plan_page import write_plan_page
+    from vergence.app.progress import working
+    from vergence.app.run import overrides
+    from vergence.cell import load_cell
+    from vergence.cell.schema import ReachTable
+    from vergence.planning import Path as PlannedPath
+    from vergence.planning import Trajectory
+
+    changes = overrides(request.settings)
+    if request.planner is not None:
+        changes["task.planner"] = request.planner
+    cell = load_cell(request.cell, changes, request.seed)
+    if not isinstance(cell.task, ReachTable):
+        raise InputError(str(cell.path), "task.kind", cell.task.kind, "reach")
+    with working("planning"):
+        found = _planned(cell, cell.task, request.images)
+    answer: dict[str, object] = {"command": "plan", "cell": cell.name, "found": bool(found)}
+    if not isinstance(found, PlannedPath):
+        reason = str(found)
+        emit({**answer, "reason": reason}) if as_json else say(f"no path: {reason}")
+        return FAILURE
+    trajectory = Trajectory.of(found, cell.task.camera_speed_m_s)
+    folder = out or new_folder(f"{cell.name}-plan")
+    numbers = _numbers(found, trajectory)
+    with working("drawing"):
+        report = write_plan_page(folder, cell.name, trajectory, numbers)
+    if as_json:
+        emit({**answer, "planner": found.planner, "summary": numbers, "report": report})
+    else:
+        _tell(found, numbers, report)
+    return SUCCESS
+
+
+def _planned(
+    cell: "Cell", task: "ReachTable", images: bool
+) -> "PlannedPath | PlanFailure | TwoViewFailure":
+    """Look at the object twice and plan."""
+    from vergence.cell import SimulatedDriver
+    from vergence.runtime.assembly.reach import look_twice, plan_reach
+
+    driver = SimulatedDriver(cell, images)
+    try:
+        pictures = look_twice(cell, task, driver, images)
+        return plan_reach(cell, task, driver, pictures)
+    finally:
+        driver.close()
+
+
+def _numbers(path: "PlannedPath", trajectory: "Trajectory") -> Mapping[str, float]:
+    return {
+        "duration_s": trajectory.duration,
+        "camera_length_m": path.camera_length_m,
+        "image_margin_px": path.image_margin_px,
+        "joint_margin": path.joint_margin,
+    }
+
+
+def _tell(path: "PlannedPath", numbers: Mapping[str, float], report: Path) -> None:
+    say(f"path found by the {path.planner} planner")
+    say(
+        f"  camera  {numbers['camera_length_m']:.2f} m in {numbers['duration_s']:.1f} s"
+        f" · image border {numbers['image_margin_px']:.1f} px away at least"
+        f" · joint limits {100 * numbers['joint_margin']:.1f} % of half the range"
+    )
+    say(f"  report  {report}")
+    say(f"  joints  {report.parent / 'joints.csv'}")
