@@ -14,7 +14,17 @@ from vergence.app.main import main
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
 COMPARE = ["compare", "puma560", "--laws", "image_based,constrained", "--starts", "2", *QUICK]
-MAP = ["map", "puma560", "--law", "constrained", "--extent", "0.05", "--steps", "2", *QUICK]
+MAP = [
+    "map",
+    "puma560",
+    "--laws",
+    "image_based,constrained",
+    "--extent",
+    "0.05",
+    "--steps",
+    "2",
+    *QUICK,
+]
 
 
 @pytest.fixture
@@ -77,9 +87,11 @@ def test_a_region_is_mapped_to_a_picture_and_a_table(
 ) -> None:
     assert command(*MAP, "--over", over, "--speeds", speeds, "--json", "--out", "m") == 0
     answer = json.loads(capsys.readouterr().out)
-    assert answer["runs"] == runs == sum(answer["endings"].values())
+    assert [law["law"] for law in answer["laws"]] == ["image_based", "constrained"]
+    for law in answer["laws"]:
+        assert law["runs"] == runs == sum(law["endings"].values())
     rows = rows_of(answer["data"])
-    assert len(rows) == runs
+    assert len(rows) == 2 * runs
     assert columns <= rows[0].keys()
     assert cv2.imread(answer["picture"]) is not None
     assert "Where it works" in Path(answer["report"]).read_text(encoding="utf-8")

@@ -64,13 +64,10 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         from vergence.app.campaign import prepare
         from vergence.app.compare import compare as command
 
-        names = list(dict.fromkeys(name.strip() for name in laws.split(",") if name.strip()))
-        if not names:
-            raise InputError("--laws", "", laws, "names with commas between")
         source, how = prepare(
             "compare", cell, settings or (), out, tolerance_px, workers, scheduler
         )
-        raise typer.Exit(command(source, names, starts, seed, spread, how, as_json))
+        raise typer.Exit(command(source, _names(laws), starts, seed, spread, how, as_json))
 
     @app.command(
         name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2"
@@ -90,7 +87,9 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         speeds: Annotated[
             str, typer.Option(help="Of the target, m/s, with commas; places take the first.")
         ] = "0.1",
-        law: Annotated[str, typer.Option(help="Its name, as for `vergence compare`.")] = "own",
+        laws: Annotated[
+            str, typer.Option(help="One or several, as for `vergence compare`.")
+        ] = "own",
         tolerance_px: _Tolerance = 2.0,
         workers: _Workers = None,
         scheduler: _Scheduler = None,
@@ -105,9 +104,16 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
 
         if over not in ("places", "headings"):
             raise InputError("--over", "", over, "places, headings")
-        region = Region(over, extent, steps, _speeds(speeds), law)
+        region = Region(over, extent, steps, _speeds(speeds), _names(laws))
         source, how = prepare("map", cell, settings or (), out, tolerance_px, workers, scheduler)
         raise typer.Exit(command(source, region, how, as_json))
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise InputError("--laws", "", text, "names with commas between")
+    return names
 
 
 def _speeds(text: str) -> tuple[float, ...]:

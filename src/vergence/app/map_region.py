@@ -1,6 +1,5 @@
 """`vergence map`: where, how far and how fast a cell's law follows the target."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
     from vergence.app.figures import Panels
     from vergence.cell import Cell
-    from vergence.runtime.campaign import CellSource, Trial, TrialResult
+    from vergence.runtime.campaign import CellSource, Score, Trial, TrialResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,58 +31,76 @@ class Region:
     extent_m: float  # half a side of the square of places, or the way in each direction
     steps: int  # places along a side, or directions
     speeds_m_s: tuple[float, ...]  # of the target; places are mapped at the first
-    law: str  # see `vergence.runtime.campaign.law_table`
+    laws: tuple[str, ...]  # see `vergence.runtime.campaign.law_table`
 
 
 def map_region(source: "CellSource", region: Region, how: Running, as_json: bool) -> int:
     """Map a region; write picture, data and page into the run folder; return the exit code."""
+    from vergence.runtime.campaign import scores
+
     cell = source.load()
     results = run(source, _trials(cell, region), how)
     data = write_table(how.folder / "map.csv", results)
     report, picture = _write_page(cell, region, results, how)
-    counts = Counter(result.ending.value for result in results)
+    found = scores(results)
     if as_json:
-        answer = {"command": "map", "cell": cell.name, "over": region.over, "law": region.law}
-        ends = {name.replace(" ", "_"): count for name, count in counts.items()}
+        answer = {"command": "map", "cell": cell.name, "over": region.over}
         files = {"run": how.folder, "data": data, "picture": picture, "report": report}
-        emit({**answer, "runs": len(results), "endings": ends, **files})
+        emit({**answer, "laws": [_as_json(score) for score in found], **files})
         return SUCCESS
-    say(f"{cell.name}, law {region.law}: " + _in_words(counts, len(results)))
+    for score in found:
+        say(f"{cell.name}, law {score.law}: {_in_words(score)}")
     say(f"  report   {report}")
     say(f"  picture  {picture}")
     say(f"  data     {data}")
     return SUCCESS
 
 
-def _in_words(counts: "Counter[str]", total: int) -> str:
-    return f"{total} runs, " + ", ".join(f"{n} {name}" for name, n in counts.most_common())
+def _as_json(score: "Score") -> dict[str, object]:
+    return {"law": score.law, "runs": score.trials, "endings": _counts(score, "_")}
+
+
+def _in_words(score: "Score") -> str:
+    counts = ", ".join(f"{count} {name}" for name, count in _counts(score, " ").items())
+    return f"{score.trials} runs, {counts}"
+
+
+def _counts(score: "Score", gap: str) -> dict[str, int]:
+    """Return how many runs came to each ending that occurred, by its name."""
+    from vergence.runtime.campaign import Ending
+
+    return {e.value.replace(" ", gap): score.count(e) for e in Ending if score.count(e)}
 
 
 def _trials(cell: "Cell", region: Region) -> "list[Trial]":
     from vergence.runtime.campaign import heading_trials, place_trials
 
-    if region.over == "places":
-        speed = region.speeds_m_s[0]
-        return place_trials(cell, region.extent_m, region.steps, speed, region.law)
-    return heading_trials(cell, region.extent_m, region.steps, region.speeds_m_s, region.law)
+    extent, steps, speeds = region.extent_m, region.steps, region.speeds_m_s
+    trials = []
+    for law in region.laws:
+        if region.over == "places":
+            trials += place_trials(cell, extent, steps, speeds[0], law)
+        else:
+            trials += heading_trials(cell, extent, steps, speeds, law)
+    return trials
 
 
 def _write_page(
     cell: "Cell", region: Region, results: "Sequence[TrialResult]", how: Running
 ) -> "tuple[Path, Path]":
     from vergence.drawing import save
+    from vergence.runtime.campaign import scores
 
     panels, caption, name = _picture(cell, region, results)
     picture = how.folder / "map.png"
     save(panels.figure, picture)
-    counts = Counter(result.ending.value for result in results)
-    rows = [[ending, str(count)] for ending, count in counts.most_common()]
+    rows = [[score.law, _in_words(score)] for score in scores(results)]
     parts = [
         markup.section("Where it works", markup.figure(panels, caption)),
-        markup.section("Endings", html_table(("ending", "runs"), rows)),
+        markup.section("Endings", html_table(("law", "endings"), rows)),
         markup.section("Why", reasons_table(results, name)),
     ]
-    title = f"{cell.name}: where does the law {region.law} work?"
+    title = f"{cell.name}: where does {' and '.join(region.laws)} work?"
     remark = (
         f"{len(results)} runs on exact projections; converged: every feature within "
         f"{how.tolerance_px:g} px at the end."
@@ -101,7 +118,7 @@ def _picture(
         caption = (
             "How far the target came in each direction before what the colour says, for each speed."
         )
-        return headings_figure(results), caption, "{heading_deg:g}° at {speed_m_s:g} m/s"
+        return headings_figure(results), caption, "{law}, {heading_deg:g}° at {speed_m_s:g} m/s"
     bases = {
         name: (
             arm.position_m[0] - cell.target.position_m[0],
@@ -113,4 +130,4 @@ def _picture(
         f"The target goes from the cross to each place at {region.speeds_m_s[0]:g} m/s. A full "
         "square: it arrived; a smaller one: the share of the way it had made when the run ended."
     )
-    return places_figure(results, bases), caption, "to ({x_m:.2f}, {y_m:.2f}) m"
+    return places_figure(results, bases), caption, "{law}, to ({x_m:.2f}, {y_m:.2f}) m"

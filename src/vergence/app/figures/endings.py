@@ -54,7 +54,7 @@ def starts_figure(
         desired_px: the middle of the features where they should be.
         size_px: width and height of the picture.
     """
-    laws = list(dict.fromkeys(str(result.labels["law"]) for result in results))
+    laws = _laws(results)
     drawn, grid = _grid(len(laws), 2, width=7.6, height=2.9)
     begun = [result for result in results if result.ending is not Ending.REFUSED]
     corners = np.array([place[:2] for r in begun for place in (r.start_m, r.end_m)] or [(0, 0)])
@@ -89,48 +89,63 @@ def places_figure(
         results: of a map over places.
         bases: where the arms stand, by name, relative to the target's start.
     """
-    drawn, axes = figure(6.6, 5.2)
-    plane: Axes = axes[0]
+    laws = _laws(results)
     xs = sorted({float(result.labels["x_m"]) for result in results})
-    side = xs[1] - xs[0] if len(xs) > 1 else 0.1
-    for result in results:
-        x, y = float(result.labels["x_m"]), float(result.labels["y_m"])
-        plane.add_patch(_square(x, y, side, color=_LOOKS[result.ending][0], alpha=0.25))
-        share = _share(result, float(np.hypot(x, y)))
-        plane.add_patch(_square(x, y, side * share, color=_LOOKS[result.ending][0]))
-    reach = max(map(abs, xs)) + side
+    side = xs[1] - xs[0]
+    drawn, grid = _grid(1, len(laws), 1.0 + 4.2 * len(laws), 4.9)
+    for plane, law in zip(grid[0], laws, strict=True):
+        for result in (result for result in results if result.labels["law"] == law):
+            x, y = float(result.labels["x_m"]), float(result.labels["y_m"])
+            color, share = _LOOKS[result.ending][0], _share(result, float(np.hypot(x, y)))
+            plane.add_patch(_square(x, y, side, color=color, alpha=0.25))
+            plane.add_patch(_square(x, y, side * share, color=color))
+        _mark_bases(plane, bases, reach=xs[-1] + side)
+        plane.set_title(law, loc="left", fontsize=10)
+        plane.set_xlabel("target's way: x (m)")
+    grid[0, 0].set_ylabel("y (m)")
+    _legend(drawn, grid[0, 0], dict.fromkeys(result.ending for result in results))
+    return Panels(drawn, tuple(grid[0]))
+
+
+def _mark_bases(plane: "Axes", bases: Mapping[str, tuple[float, float]], reach: float) -> None:
+    """Frame the square, and mark the target's start and the arms that stand in it."""
     plane.plot(0.0, 0.0, "+", color=INK, markersize=12, zorder=5)
     for name, (x, y) in bases.items():
-        if max(abs(x), abs(y)) < 2.5 * reach:
+        if max(abs(x), abs(y)) < reach:
             plane.plot(x, y, "s", color=INK, markersize=9)
             plane.annotate(name, (x, y), textcoords="offset points", xytext=(8, -3), color=INK)
     plane.set_xlim(-reach, reach)
     plane.set_ylim(-reach, reach)
     plane.set_aspect("equal")
     plane.grid(visible=False)
-    plane.set_xlabel("target's way: x (m)")
-    plane.set_ylabel("y (m)")
-    _legend(drawn, plane, dict.fromkeys(result.ending for result in results))
-    return Panels(drawn, tuple(axes))
 
 
 def headings_figure(results: Sequence[TrialResult]) -> Panels:
-    """Draw how far the target came in each direction, a circle for each speed."""
+    """Draw how far the target came in each direction: a row for each law, a column a speed."""
+    laws = _laws(results)
     speeds = sorted({float(result.labels["speed_m_s"]) for result in results})
-    drawn, grid = _grid(1, len(speeds), 3.4 * len(speeds), 4.0, {"projection": "polar"})
+    longest = max(float(result.labels["distance_m"]) for result in results)
+    width = 3.4 * len(speeds)
+    drawn, grid = _grid(len(laws), len(speeds), width, 4.0, {"projection": "polar"})
     layout: Any = drawn.get_layout_engine()
     layout.set(h_pad=0.3)
-    for axes, speed in zip(grid[0], speeds, strict=True):
-        own = [result for result in results if result.labels["speed_m_s"] == speed]
-        for result in own:
-            angle = np.deg2rad(float(result.labels["heading_deg"]))
-            color, _ = _LOOKS[result.ending]
-            axes.bar(angle, result.target_m, width=5.6 / len(own), color=color, alpha=0.9)
-        axes.set_xlabel(f"{speed:g} m/s", fontsize=10)
-        axes.set_rmax(1.05 * max(float(result.labels["distance_m"]) for result in own))
-        axes.tick_params(labelsize=7.5)
+    for row, law in zip(grid, laws, strict=True):
+        for axes, speed in zip(row, speeds, strict=True):
+            wanted = {"law": law, "speed_m_s": speed}
+            own = [result for result in results if wanted.items() <= result.labels.items()]
+            for result in own:
+                angle = np.deg2rad(float(result.labels["heading_deg"]))
+                color, _ = _LOOKS[result.ending]
+                axes.bar(angle, result.target_m, width=5.6 / len(own), color=color, alpha=0.9)
+            axes.set_xlabel(f"{law}, {speed:g} m/s", fontsize=10)
+            axes.set_rmax(1.05 * longest)
+            axes.tick_params(labelsize=7.5)
     _legend(drawn, grid[0, -1], dict.fromkeys(result.ending for result in results))
     return Panels(drawn, tuple(grid.ravel()))
+
+
+def _laws(results: Sequence[TrialResult]) -> list[str]:
+    return list(dict.fromkeys(str(result.labels["law"]) for result in results))
 
 
 def _share(result: TrialResult, distance_m: float) -> float:

@@ -28,9 +28,14 @@ def place_trials(
     marks = np.linspace(-extent_m, extent_m, steps)
     return [
         Trial(
-            f"place/{i}/{j}",
+            f"{law}/place/{i}/{j}",
             merged(fixed, _going(x, y, speed_m_s)),
-            {"x_m": round(float(x), 9), "y_m": round(float(y), 9), "speed_m_s": speed_m_s},
+            {
+                "law": law,
+                "x_m": round(float(x), 9),
+                "y_m": round(float(y), 9),
+                "speed_m_s": speed_m_s,
+            },
         )
         for j, y in enumerate(marks)
         for i, x in enumerate(marks)
@@ -56,11 +61,12 @@ def heading_trials(
             angle = 2 * np.pi * k / headings
             x, y = distance_m * np.cos(angle), distance_m * np.sin(angle)
             labels = {
+                "law": law,
                 "heading_deg": 360.0 * k / headings,
                 "speed_m_s": speed,
                 "distance_m": distance_m,
             }
-            key = f"heading/{speed:g}/{k}"
+            key = f"{law}/heading/{speed:g}/{k}"
             trials.append(Trial(key, merged(fixed, _going(x, y, speed)), labels))
     return trials
 
