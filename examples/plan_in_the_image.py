@@ -1,0 +1,32 @@
+"""Two pictures of an object nobody has a model of: plan a path between them and look at it."""
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.planning import OptimisedPlanner, PlanningProblem, Trajectory
+from vergence.vision import estimate_two_view
+
+
+def main() -> None:
+    driver = SimulatedDriver(load_cell("gantry"), images=False)
+    camera, arm = driver.cameras["eye"], driver.world.arm_to_camera("eye")
+    now = driver.first_frame("eye").truth
+    wanted = driver.frame_at(
+        "eye", "gantry", [-0.26443, 0.305428, 0.159083, 0.0751, 0.1157, -0.1297]
+    )
+    assert now is not None
+    assert wanted.truth is not None
+    view = estimate_two_view(now.points_px, wanted.truth.points_px, camera)
+    if not view:
+        raise SystemExit(str(view))
+    q = driver.read().joints["gantry"].position
+    plan = OptimisedPlanner().plan(PlanningProblem.from_two_view(view, 0.615, arm, camera, q))
+    if not plan:
+        raise SystemExit(str(plan))
+    trajectory = Trajectory.of(plan, camera_speed=0.25)
+    print(f"{len(plan.q)} waypoints, {plan.camera_length_m:.2f} m, {trajectory.duration:.1f} s")
+    print(f"never nearer than {plan.image_margin_px:.0f} px to the border of the picture")
+    halfway = trajectory.reference(trajectory.duration / 2)
+    print("halfway the first mark should be at", halfway.points_px[0].round(1))
+
+
+if __name__ == "__main__":
+    main()
