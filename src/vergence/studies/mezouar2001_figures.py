@@ -149,7 +149,7 @@ def _velocities(axes: "Axes", run: Realised) -> None:
     axes.set_xlim(left=0.0)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("cm/s, degrees/s")
-    axes.legend(ncols=2, fontsize=7, frameon=False)
+    legend(axes)
 
 
 def _planned(axes: Any, path: PlannedPath, left: str, right: str) -> None:
