@@ -10,6 +10,7 @@ import cv2
 import pytest
 
 from vergence.app.main import main
+from vergence.runtime.campaign import Ledger, TrialResult
 
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
@@ -73,6 +74,26 @@ def test_a_second_run_in_the_same_folder_goes_on_and_says_the_same(
     assert Path("c/results.jsonl").read_bytes() == results
     assert command(*COMPARE, "--seed", "5", "--out", "c") == 2
     assert "another campaign" in capsys.readouterr().err
+
+
+def test_what_is_done_is_kept_when_the_user_stops_it(
+    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add, done = Ledger.add, []
+
+    def stop_at_the_third(ledger: Ledger, result: TrialResult) -> None:
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        done.append(result.key)
+        add(ledger, result)
+
+    monkeypatch.setattr(Ledger, "add", stop_at_the_third)
+    assert command(*COMPARE, "--out", "c") == 1
+    assert "--out c goes on from here" in capsys.readouterr().err
+    assert len(Path("c/results.jsonl").read_text().splitlines()) == 3
+    monkeypatch.setattr(Ledger, "add", add)
+    assert command(*COMPARE, "--out", "c") == 0
+    assert len(Path("c/results.jsonl").read_text().splitlines()) == 5
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ import pytest
 
 from vergence.cell import load_cell
 from vergence.errors import InputError
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.runtime import RunResult
 from vergence.runtime.campaign import (
     OWN,
     PRESETS,
@@ -102,6 +104,14 @@ def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
     result = run_trial(source, away, 2.0)
     assert result.ending is Ending.REFUSED
     assert "does not see" in result.reason
+
+
+def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
+    stopped = RunResult(Outcome(OutcomeKind.STOPPED, "stopped by the user", 0.5))
+    module = sys.modules["vergence.runtime.campaign.run_trial"]
+    monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_trial(source, trials[0], 2.0)
 
 
 def test_endings_are_told_apart(source):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vergence.app import markup
+from vergence.app.output import FAILURE, warn
 from vergence.app.progress import bar
 from vergence.app.report import REPORT
 
@@ -49,7 +50,7 @@ def prepare(
 
 
 def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
-    """Run a campaign with a progress bar."""
+    """Run a campaign with a progress bar; Ctrl-C keeps what is done."""
     from vergence.runtime.campaign import Crew, run_campaign
 
     with bar("{task.completed} of {task.total} runs") as progress:
@@ -58,14 +59,18 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
         def show(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total)
 
-        return run_campaign(
-            source,
-            trials,
-            how.folder,
-            crew=Crew(how.workers, how.scheduler),
-            tolerance_px=how.tolerance_px,
-            progress=show,
-        )
+        try:
+            return run_campaign(
+                source,
+                trials,
+                how.folder,
+                crew=Crew(how.workers, how.scheduler),
+                tolerance_px=how.tolerance_px,
+                progress=show,
+            )
+        except KeyboardInterrupt:
+            warn(f"interrupted: the same command with --out {how.folder} goes on from here")
+            raise SystemExit(FAILURE) from None
 
 
 _COLUMNS = (

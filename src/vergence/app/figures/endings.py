@@ -126,9 +126,9 @@ def headings_figure(results: Sequence[TrialResult]) -> Panels:
     speeds = sorted({float(result.labels["speed_m_s"]) for result in results})
     longest = max(float(result.labels["distance_m"]) for result in results)
     width = 3.4 * len(speeds)
-    drawn, grid = _grid(len(laws), len(speeds), width, 4.0, {"projection": "polar"})
+    drawn, grid = _grid(len(laws), len(speeds), width, 3.7, {"projection": "polar"})
     layout: Any = drawn.get_layout_engine()
-    layout.set(h_pad=0.3)
+    layout.set(h_pad=0.2)
     for row, law in zip(grid, laws, strict=True):
         for axes, speed in zip(row, speeds, strict=True):
             wanted = {"law": law, "speed_m_s": speed}

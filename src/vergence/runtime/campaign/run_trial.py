@@ -1,6 +1,7 @@
 """One trial, in whatever process."""
 
 from vergence.errors import InputError
+from vergence.outcome import OutcomeKind
 from vergence.runtime.campaign.source import CellSource
 from vergence.runtime.campaign.trace import TrialTrace
 from vergence.runtime.campaign.trial import Ending, Trial, TrialResult
@@ -14,6 +15,9 @@ def run_trial(source: CellSource, trial: Trial, tolerance_px: float) -> TrialRes
         source: of the cell.
         trial: what to change in it.
         tolerance_px: up to which error of the farthest feature a run has converged.
+
+    Raises:
+        KeyboardInterrupt: if the user stopped it.
     """
     try:
         cell = source.load().replace(**trial.changes)
@@ -21,6 +25,8 @@ def run_trial(source: CellSource, trial: Trial, tolerance_px: float) -> TrialRes
         result = run_cell(cell, [trace], images=False)
     except InputError as error:
         return _refused(trial, str(error))
+    if result.outcome.kind is OutcomeKind.STOPPED:  # no result of the trial, but Ctrl-C
+        raise KeyboardInterrupt
     return trace.result(trial, result.outcome, tolerance_px)
 
 
