@@ -13,10 +13,10 @@ from vergence.planning import Path as PlannedPath
 from vergence.studies.ideal_loop import ARRIVED_PX, PERIOD, Ending, IdealLoop
 from vergence.studies.mezouar2001 import reproduce, success_rate
 from vergence.studies.mezouar2001_methods import (
+    CLASSICAL,
     METHODS,
     Belief,
     Method,
-    image_based,
     plan_between_pictures,
     position_based,
     position_based_on_object,
@@ -93,7 +93,7 @@ def test_random_starts_are_far_and_see_everything_at_both_ends(
         np.testing.assert_array_equal(again.q_start, start.q_start)
 
 
-@pytest.mark.parametrize("law", [image_based, position_based, position_based_on_object])
+@pytest.mark.parametrize("law", CLASSICAL.values())
 def test_classical_laws_arrive_from_close_by(near: Scene, law: object) -> None:
     motion = loop_of(near).run(near.q_start, law(near), 30.0, np.random.default_rng(0))
     assert motion.ending is Ending.ARRIVED

@@ -13,13 +13,11 @@ from vergence.studies import mezouar2001_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.ideal_loop import Ending, IdealLoop, Motion
 from vergence.studies.mezouar2001_methods import (
+    CLASSICAL,
     CLASSICAL_S,
     LABELS,
     METHODS,
     ROOM,
-    image_based,
-    position_based,
-    position_based_on_object,
 )
 from vergence.studies.mezouar2001_run import Realised, plan_section6, run_section6
 from vergence.studies.mezouar2001_scene import Scene
@@ -99,14 +97,9 @@ def reproduce(
 def servo_classically(scene: Scene) -> Mapping[str, Motion]:
     """Servo from the section's start without a plan, on exact projections."""
     loop = IdealLoop(scene.arm, scene.camera, scene.points_world, scene.goal_px)
-    laws = {
-        "image_based": image_based,
-        "position_based": position_based,
-        "position_based_on_object": position_based_on_object,
-    }
     return {
         name: loop.run(scene.q_start, law(scene), CLASSICAL_S, np.random.default_rng(0))
-        for name, law in laws.items()
+        for name, law in CLASSICAL.items()
     }
 
 
@@ -213,16 +206,17 @@ def _tracking(runs: Mapping[str, Realised]) -> list[Check]:
 
 
 def _classical(motions: Mapping[str, Motion]) -> list[Check]:
-    image, pose = motions["image_based"], motions["position_based"]
-    other = motions["position_based_on_object"]
+    image, mean = motions["image_based"], motions["image_based_mean"]
+    pose, other = motions["position_based"], motions["position_based_on_object"]
     return [
         Check(
             "classical.image_based_fails",
             "1: fails from the same start",
             float(image.ending is not Ending.ARRIVED),
             "",
-            image.ending is not Ending.ARRIVED,
-            f"{image.reason}; L at the current points, true depths",
+            Ending.ARRIVED not in (image.ending, mean.ending),
+            f"L at the current points: {image.reason}; mean of current and desired: "
+            f"{mean.reason or 'arrives'}; true depths",
         ),
         Check(
             "classical.position_based_fails",

@@ -173,20 +173,21 @@ def _in_space(section: Section6) -> Any:
 
 def _classical(scene: Scene, motions: Mapping[str, Motion]) -> Any:
     titles = {
-        "image_based": "image-based",
-        "position_based": "position-based,\nstraight camera path",
-        "position_based_on_object": "position-based,\nobject straight in the image",
+        "image_based": "image-based, current L",
+        "image_based_mean": "image-based, mean L",
+        "position_based": "position-based, straight camera path",
+        "position_based_on_object": "position-based, object straight in the image",
     }
-    drawing, axes = grid(_WIDTH, 3.0, 1, len(titles))
-    for place, (name, title) in zip(axes[0], titles.items(), strict=True):
+    drawing, axes = grid(_WIDTH, 5.6, 2, 2)
+    for place, (name, title) in zip(axes.flat, titles.items(), strict=True):
         motion = motions[name]
         image_paths(place, scene.camera, motion.points_px)
-        place.set_title(f"{title}\n{motion.reason or 'arrives'}", fontsize=8)
+        place.set_title(f"{title}\n{motion.reason or 'arrives'}", fontsize=9)
     return drawing
 
 
 def _success(starts: Mapping[str, Sequence[Trial]]) -> Any:
-    drawing, axes = grid(_WIDTH, 2.6, 1, len(starts))
+    drawing, axes = grid(_WIDTH, 3.2, 1, len(starts))
     titles = {"random": "random starts", "random_roll": "roll of 120 to 180 degrees"}
     for place, (name, trials) in zip(axes[0], starts.items(), strict=True):
         feasible = sum(not trial.infeasible for trial in trials)

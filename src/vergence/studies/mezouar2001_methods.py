@@ -1,4 +1,4 @@
-"""Four ways of getting there: image-based, position-based, the paper's planner, ours."""
+"""Ways of getting there: image-based and position-based servoing, the paper's planner, ours."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -8,9 +8,9 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.control.path_tracking import PathTrackingLaw
+from vergence.control.path_tracking import PathTrackingLaw, tracking_twist
 from vergence.control.redundancy import resolve_redundant
-from vergence.features import ImagePoints, Observation
+from vergence.features import ImagePoints, Observation, interaction_matrix_points
 from vergence.geometry import se3_compose, se3_inverse, so3_log, transform_points
 from vergence.planning import (
     OptimisedPlanner,
@@ -26,11 +26,20 @@ from vergence.studies.ideal_loop import PERIOD, Ending, IdealLoop, Motion, Steer
 from vergence.studies.mezouar2001_scene import Scene
 from vergence.vision.two_view import TwoView, estimate_two_view
 
-Method = Literal["image_based", "position_based", "potential_field", "optimised"]
+Method = Literal[
+    "image_based",
+    "image_based_mean",
+    "position_based",
+    "position_based_on_object",
+    "potential_field",
+    "optimised",
+]
 METHODS: tuple[Method, ...] = get_args(Method)
 LABELS: dict[Method, str] = {
-    "image_based": "image-based",
-    "position_based": "position-based",
+    "image_based": "image-based (current L)",
+    "image_based_mean": "image-based (mean L)",
+    "position_based": "position-based (camera straight)",
+    "position_based_on_object": "position-based (object straight)",
     "potential_field": "the paper's planner",
     "optimised": "ours",
 }
@@ -79,10 +88,8 @@ class Belief:
 def servo(scene: Scene, method: Method, belief: Belief, random: np.random.Generator) -> Motion:
     """Servo to the goal by a method, in closed loop."""
     loop = IdealLoop(scene.arm, scene.camera, scene.points_world, scene.goal_px, belief.noise_px)
-    if method == "image_based":
-        return loop.run(scene.q_start, image_based(scene), CLASSICAL_S, random)
-    if method == "position_based":
-        return loop.run(scene.q_start, position_based(scene), CLASSICAL_S, random)
+    if method in CLASSICAL:
+        return loop.run(scene.q_start, CLASSICAL[method](scene), CLASSICAL_S, random)
     return _follow_plans(scene, method, belief, random, loop)
 
 
@@ -169,13 +176,28 @@ def _true_distance(scene: Scene, normal: FloatArray) -> float:
 
 def image_based(scene: Scene) -> Steer:
     """Return v = -λ L⁺ (s - s*), L at the current points with their true depths."""
-    law = PathTrackingLaw(scene.arm, scene.camera, CLASSICAL_GAIN, "current")
+    return _image_based(scene, 1.0)
 
-    def steer(time: float, q: FloatArray, px: FloatArray) -> FloatArray:
+
+def image_based_mean(scene: Scene) -> Steer:
+    """Return the same with the mean of L at the current and at the desired points."""
+    return _image_based(scene, 0.5)
+
+
+def _image_based(scene: Scene, current: float) -> Steer:
+    T_goal_world = se3_inverse(scene.T_world_goal.copy())
+    goal = scene.camera.normalize(scene.goal_px)
+    goal_depth = transform_points(T_goal_world, scene.points_world)[:, 2].copy()
+    L_goal = interaction_matrix_points(goal, goal_depth)
+    rest = np.zeros(2 * len(goal))
+
+    def steer(_time: float, q: FloatArray, px: FloatArray) -> FloatArray:
         T_camera_world = se3_inverse(scene.arm.forward_kinematics(q))
-        depth = transform_points(T_camera_world, scene.points_world)[:, 2]
-        goal = Reference(time, scene.goal_px, None, depth)
-        return law.command(_seen(time, px), goal, JointState(time, q, np.zeros(len(q)))).velocity
+        depth = transform_points(T_camera_world, scene.points_world)[:, 2].copy()
+        seen = scene.camera.normalize(px)
+        L = current * interaction_matrix_points(seen, depth) + (1.0 - current) * L_goal
+        twist = tracking_twist(L, (seen - goal).ravel(), rest, CLASSICAL_GAIN, 1e-6)
+        return _resolved(scene.arm, q, twist)
 
     return steer
 
@@ -214,6 +236,14 @@ def position_based_on_object(scene: Scene) -> Steer:
         return _resolved(scene.arm, q, -CLASSICAL_GAIN * twist)
 
     return steer
+
+
+CLASSICAL: dict[str, Callable[[Scene], Steer]] = {
+    "image_based": image_based,
+    "image_based_mean": image_based_mean,
+    "position_based": position_based,
+    "position_based_on_object": position_based_on_object,
+}
 
 
 def tracking(law: PathTrackingLaw, trajectory: Trajectory) -> Steer:
