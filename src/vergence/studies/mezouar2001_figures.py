@@ -149,7 +149,9 @@ def _velocities(axes: "Axes", run: Realised) -> None:
     axes.set_xlim(left=0.0)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("cm/s, degrees/s")
-    legend(axes)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.35 * (high - low))  # room for the legend
+    axes.legend(loc="upper center", ncols=2, fontsize=7.5, frameon=False)
 
 
 def _planned(axes: Any, path: PlannedPath, left: str, right: str) -> None:
@@ -178,7 +180,7 @@ def _classical(scene: Scene, motions: Mapping[str, Motion]) -> Any:
         "position_based": "position-based, straight camera path",
         "position_based_on_object": "position-based, object straight in the image",
     }
-    drawing, axes = grid(_WIDTH, 5.6, 2, 2)
+    drawing, axes = grid(7.2, 5.8, 2, 2)
     for place, (name, title) in zip(axes.flat, titles.items(), strict=True):
         motion = motions[name]
         image_paths(place, scene.camera, motion.points_px)
@@ -188,7 +190,7 @@ def _classical(scene: Scene, motions: Mapping[str, Motion]) -> Any:
 
 def _success(starts: Mapping[str, Sequence[Trial]]) -> Any:
     drawing, axes = grid(_WIDTH, 3.2, 1, len(starts))
-    titles = {"random": "random starts", "random_roll": "roll of 120 to 180 degrees"}
+    titles = {"random": "random starts", "random_roll": "roll 120 to 180°"}
     for place, (name, trials) in zip(axes[0], starts.items(), strict=True):
         feasible = sum(not trial.infeasible for trial in trials)
         left = np.zeros(len(METHODS))
