@@ -77,7 +77,7 @@ def test_points_stay_within_0_3_px_of_the_truth_while_the_view_recedes_and_tilts
         inverse = np.linalg.inv(tracks.covariance_px)
         normalised.append(np.einsum("ki,kij,kj->k", error, inverse, error) / 2.0)
     assert worst < 0.3
-    assert 0.05 < np.mean(normalised) < 1.5  # the stated covariance is honest, and not timid
+    assert 0.5 < np.mean(normalised) < 1.5  # the stated covariance is honest, and not timid
 
 
 def test_point_that_something_else_covers_is_lost_with_reason_and_found_again() -> None:
@@ -123,3 +123,25 @@ def test_real_pictures_are_tracked_as_lucas_kanade_does(name: str, last: int) ->
     assert (PICTURES / name).is_dir(), f"pictures missing: install the Debian package {PACKAGE}"
     ours, _ = evaluate(name, range(0, last, 6), (1,))
     assert ours >= 99.0
+
+
+def test_real_pictures_are_tracked_over_gaps_no_worse_than_one_step_of_lucas_kanade() -> None:
+    assert (PICTURES / "mire-2").is_dir(), f"pictures missing: install the Debian package {PACKAGE}"
+    ours, peers = evaluate("mire-2", range(5, 490, 20), (2, 5, 10))
+    assert ours >= peers
+
+
+@pytest.mark.parametrize("gap", [5, 10])
+def test_points_are_found_over_a_gap_of_many_images(gap: int) -> None:
+    rng = np.random.default_rng(11)
+    plane, views = texture(rng), list(backing_off(240))
+    right, total = 0, 0
+    for start in range(100, 190, 30):
+        before, after = views[start], views[start + gap]
+        first = render(plane, before, rng)
+        points = pick_features(first[70:-70, 90:-90], 12, apart_px=12.0).points_px + (90.0, 70.0)
+        truth = seen(after, seen(np.linalg.inv(before), points))
+        tracks = SsdTracker(first, points).track(render(plane, after, rng))
+        right += int((tracks.found & (np.linalg.norm(tracks.points_px - truth, axis=1) < 1)).sum())
+        total += len(points)
+    assert right >= 0.97 * total

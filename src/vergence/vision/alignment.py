@@ -15,14 +15,14 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.pyramid import Patch, load_window
 
 PATCH_PX = 24  # side of the patch that is aligned
-AREA_PX = 64  # side of the part of the image that it is looked for in
+AREA_PX = 48  # side of the part of the image that it is looked for in
 FREE, RIGID = 0, 1  # whether the affine matrix may change
 WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
-CONVERGED_PX = 0.02  # a step; what is left after it is a tenth
-NOISE_GREY = 4.0  # grey levels; scales the prior on the affine matrix, nothing else
-FORM_DEVIATION = 0.05  # how far the affine matrix strays from what is expected
+CONVERGED_PX = 0.06  # a step; what is left after it is a tenth
+NOISE_GREY = 16.0  # grey levels; scales the prior on the affine matrix, nothing else
+FORM_DEVIATION = 0.02  # how far the affine matrix strays from what is expected
 
 
 def _root_weights() -> Patch:
@@ -41,6 +41,7 @@ class AlignmentTemplate(NamedTuple):
     jacobian: Patch  # (8, n) by x, y, a11, …, a22, gain, bias; n = 24 × 24; weighted
     inverse: FloatArray  # (2, 8, 8) inverse of JᵀJ + prior; and with a rigid affine matrix
     facts: FloatArray  # (4,) feature point less patch centre x and y, px; mean; sum of squares
+    spread: FloatArray  # (2, 2) covariance of x, y, px², for noise of one grey level
 
 
 class Alignment(NamedTuple):
@@ -57,7 +58,7 @@ class Alignment(NamedTuple):
 class Resampling(NamedTuple):
     """Memory that an alignment writes to."""
 
-    area: Patch  # (64, 64) the part of the image that is resampled
+    area: Patch  # (48, 48) the part of the image that is resampled
     sample: Patch  # (n,) the resampled patch, less the template's mean; weighted
     weight_x: Patch  # (24,)
     weight_y: Patch  # (24,)
@@ -71,10 +72,10 @@ RESAMPLING_SIZE = AREA_PX * AREA_PX + PATCH_PX * PATCH_PX + 2 * PATCH_PX
 def make_resampling(memory: Patch, index: NDArray[np.int32]) -> Resampling:
     """Lay the parts out in flat memory of RESAMPLING_SIZE."""
     return Resampling(
-        memory[:4096].reshape(64, 64),
-        memory[4096:4672],
-        memory[4672:4696],
-        memory[4696:4720],
+        memory[:2304].reshape(48, 48),
+        memory[2304:2880],
+        memory[2880:2904],
+        memory[2904:2928],
         index,
     )
 
@@ -110,6 +111,8 @@ def fill_template(
     for k in range(UNKNOWNS):
         normal[k, k] += 1e-3  # keeps a patch without texture invertible
     out.inverse[FREE] = np.linalg.inv(normal)
+    lever = out.inverse[FREE, :2] @ (J * ROOT_WEIGHTS).astype(np.float64)
+    out.spread[:] = lever @ lever.T
     for k in range(2, 6):
         normal[k, :], normal[:, k], normal[k, k] = 0.0, 0.0, 1.0
     out.inverse[RIGID] = np.linalg.inv(normal)

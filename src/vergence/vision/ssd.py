@@ -3,9 +3,9 @@
 Coarse, middle and full resolution, on windows of the image alone. Departures from the paper, each
 because it makes the search right more often: the mean of template and window is taken out, so that
 a change of brightness costs nothing; a level of half the coarse resolution and twice its window
-joins the coarse level, so that one of many equal marks is told by its surroundings; the best few
-minima of the coarse level are followed to full resolution; a far window has to match a little
-better than a near one.
+joins the coarse level, so that one of many equal marks is told by its surroundings; where several
+minima of the coarse level come near the best, all are followed to full resolution and compared
+there; a far window has to match a little better than a near one.
 """
 
 from collections.abc import Callable
@@ -22,12 +22,13 @@ COARSE, MIDDLE = 4, 2  # pixels averaged along each axis
 SIDE = 8  # entries along a side of the averaged templates
 POSITIONS = 2 * RANGE_PX // COARSE + 1  # along each axis of the coarse level
 WIDE_POSITIONS = RANGE_PX // COARSE + 1
-CANDIDATES = 3  # minima of the coarse level that are followed
+MINIMA = 5  # of the coarse level that are followed at most
 MIDDLE_REACH = 3  # middle pixels searched around each of them
 FULL_REACH = 2  # pixels searched around the middle minimum
 WIDE_SHARE = 1.0  # weight of the surroundings against the coarse template
 DISTANCE_COST = 0.6  # at 32 px, in units of the template's variance
-WORTH_FOLLOWING = 2.0  # times the best sum so far: candidates followed to full resolution
+WORTH_FOLLOWING = 2.0  # times the lowest: minima that are followed
+STRUCK_OUT = 1e30
 
 SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None]
 
@@ -68,10 +69,10 @@ class SsdWorkspace(NamedTuple):
     wide_surface: Patch  # (9, 9)
     small: Patch  # (7, 7) SSD of the middle level
     tiny: Patch  # (5, 5) SSD at full resolution
-    candidates: Patch  # (3, 3) displacement x, y and score at the middle level
+    candidates: Patch  # (6, 2) displacement x, y of the minima that were followed
 
 
-WORKSPACE_SIZE = 3433
+WORKSPACE_SIZE = 3436
 
 
 @njit(cache=True)
@@ -88,7 +89,7 @@ def make_workspace(memory: Patch) -> SsdWorkspace:
         memory[3269:3350].reshape(9, 9),
         memory[3350:3399].reshape(7, 7),
         memory[3399:3424].reshape(5, 5),
-        memory[3424:3433].reshape(3, 3),
+        memory[3424:3436].reshape(6, 2),
     )
 
 
@@ -147,14 +148,18 @@ ssd_surface_8 = _surface_kernel(8)
 ssd_surface_16 = _surface_kernel(16)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def lowest(surface: Patch, rows: int, columns: int) -> tuple[int, int]:
-    """Row and column of the smallest entry."""
-    best, y, x = np.float32(np.inf), 0, 0
+    """Row and column of the smallest entry: first the row, as vector code."""
+    best, y, x = surface[0, 0], 0, 0
     for i in range(rows):
+        row, least = surface[i], surface[i, 0]
         for j in range(columns):
-            if surface[i, j] < best:
-                best, y, x = surface[i, j], i, j
+            least = min(least, row[j])
+        if least < best:
+            best, y = least, i
+    while x < columns - 1 and surface[y, x] > best:
+        x += 1
     return y, x
 
 
@@ -163,7 +168,7 @@ def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
     """Take a minimum and its eight neighbours out of a surface."""
     for i in range(max(y - 1, 0), min(y + 2, rows)):
         for j in range(max(x - 1, 0), min(x + 2, columns)):
-            surface[i, j] = np.float32(np.inf)
+            surface[i, j] = np.float32(STRUCK_OUT)
 
 
 @njit(cache=True)
@@ -185,9 +190,14 @@ def coarse_scores(
     # The area is 64 px wider than the window that is looked for; the coarse one is 32 px smaller.
     ssd_surface_8(work.coarse, 4, template.coarse, POSITIONS, work.strip, work.surface)
     ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
-    middle = POSITIONS // 2
-    cost = DISTANCE_COST * SIDE * SIDE / middle**2 * np.var(template.coarse)
-    add_surroundings(work.surface, work.wide_surface, float(cost))
+    cost = SIDE * SIDE * COARSE * COARSE * distance_cost(template)
+    add_surroundings(work.surface, work.wide_surface, cost)
+
+
+@njit(cache=True)
+def distance_cost(template: SsdTemplate) -> float:
+    """What a window pays for lying away from where it is expected, grey levels² a px²."""
+    return float(DISTANCE_COST / RANGE_PX**2 * np.var(template.coarse))
 
 
 @njit(cache=True, fastmath=True)
@@ -207,59 +217,104 @@ def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
 @njit(cache=True)
 def search(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
-) -> tuple[float, float, float]:
+) -> tuple[float, float]:
     """Find a template within ±32 px of an anchor.
+
+    Of several candidates the best is the one with the lowest SSD over all levels at its very
+    place: on the grid of the coarse level marks of few pixels cannot be compared.
 
     Returns:
         The displacement x and y of the best window from the anchor, px, with the vertex of a
-        parabola as fraction; and its score, grey levels² a pixel summed over the levels.
+        parabola as fraction.
     """
-    coarse_scores(image, anchor_x, anchor_y, template, work)
-    entries, middle, first = SIDE * SIDE, POSITIONS // 2, np.inf
-    work.candidates[:, 2] = np.inf
-    for k in range(CANDIDATES):
-        row, column = lowest(work.surface, POSITIONS, POSITIONS)
-        score = work.surface[row, column] / entries
-        if k > 0 and score > WORTH_FOLLOWING * first:
-            break
-        first = min(first, score)
-        strike_out(work.surface, POSITIONS, POSITIONS, row, column)
-        dx, dy = COARSE * (column - middle), COARSE * (row - middle)
-        move_x, move_y, value = search_middle(image, anchor_x + dx, anchor_y + dy, template, work)
-        found = work.candidates[k]
-        found[0], found[1], found[2] = dx + move_x, dy + move_y, score + value / entries
-    limit = WORTH_FOLLOWING * work.candidates[:, 2].min()
+    count = follow_minima(image, anchor_x, anchor_y, template, work)
     best, best_x, best_y = np.inf, 0.0, 0.0
-    for k in range(CANDIDATES):
+    for k in range(count):
         found = work.candidates[k]
-        if found[2] <= limit:
-            dx, dy = int(found[0]), int(found[1])
-            fine_x, fine_y, value = search_full(image, anchor_x + dx, anchor_y + dy, template, work)
-            total = found[2] + value / (4 * entries)
-            if total < best:
-                best, best_x, best_y = total, dx + fine_x, dy + fine_y
-    return best_x, best_y, best
+        x, y = anchor_x + int(found[0]), anchor_y + int(found[1])
+        fine_x, fine_y, score = search_full(image, x, y, template, work)
+        found[0] += fine_x
+        found[1] += fine_y
+        if count > 1:
+            x, y = anchor_x + int(np.rint(found[0])), anchor_y + int(np.rint(found[1]))
+            score += surroundings(image, x, y, template, work)
+            score += distance_cost(template) * (found[0] ** 2 + found[1] ** 2)
+        if score < best:
+            best, best_x, best_y = score, found[0], found[1]
+    return best_x, best_y
+
+
+@njit(cache=True)
+def follow_minima(
+    image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
+) -> int:
+    """Follow the best minima of the coarse level, and that of the surroundings; how many."""
+    coarse_scores(image, anchor_x, anchor_y, template, work)
+    around_y, around_x = lowest(work.wide_surface, WIDE_POSITIONS, WIDE_POSITIONS)
+    count, limit = 0, np.inf
+    while count < MINIMA:
+        row, column = lowest(work.surface, POSITIONS, POSITIONS)
+        if work.surface[row, column] > limit:
+            break
+        limit = min(limit, WORTH_FOLLOWING * work.surface[row, column])
+        follow(image, anchor_x, anchor_y, row, column, template, work, count)
+        count += 1
+    if work.surface[2 * around_y, 2 * around_x] <= limit:
+        follow(image, anchor_x, anchor_y, 2 * around_y, 2 * around_x, template, work, count)
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def follow(
+    image: ImageArray,
+    anchor_x: int,
+    anchor_y: int,
+    row: int,
+    column: int,
+    template: SsdTemplate,
+    work: SsdWorkspace,
+    k: int,
+) -> None:
+    """Make a place of the coarse level, refined at the middle level, candidate k."""
+    strike_out(work.surface, POSITIONS, POSITIONS, row, column)
+    dx, dy = COARSE * (column - POSITIONS // 2), COARSE * (row - POSITIONS // 2)
+    move_x, move_y = search_middle(image, anchor_x + dx, anchor_y + dy, template, work)
+    work.candidates[k, 0], work.candidates[k, 1] = dx + move_x, dy + move_y
+
+
+@njit(cache=True)
+def surroundings(
+    image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
+) -> float:
+    """SSD of the coarse template and of the surroundings at an anchor, grey levels² an entry."""
+    area, around = work.window[:16, :16], work.middle[:8, :8]
+    load_quarter(image, anchor_x, anchor_y, area)
+    halve(area, around)
+    ssd_surface_8(area, 4, template.coarse, 1, work.strip, work.tiny)
+    coarse = work.tiny[0, 0]
+    ssd_surface_8(around, 0, template.wide, 1, work.strip, work.tiny)
+    return float(coarse + WIDE_SHARE * work.tiny[0, 0]) / (SIDE * SIDE)
 
 
 @njit(cache=True)
 def search_middle(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
-) -> tuple[int, int, float]:
-    """Search the middle level around an anchor: displacement x and y in px, and the SSD there."""
+) -> tuple[int, int]:
+    """Search the middle level around an anchor: displacement x and y in px."""
     count = 2 * MIDDLE_REACH + 1
     load_window(image, anchor_x, anchor_y, work.window)
     halve(work.window, work.middle)
     ssd_surface_8(work.middle, 0, template.middle, count, work.strip, work.small)
     row, column = lowest(work.small, count, count)
-    value = float(work.small[row, column])
-    return MIDDLE * (column - MIDDLE_REACH), MIDDLE * (row - MIDDLE_REACH), value
+    return MIDDLE * (column - MIDDLE_REACH), MIDDLE * (row - MIDDLE_REACH)
 
 
 @njit(cache=True)
 def search_full(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[float, float, float]:
-    """Search full resolution around an anchor: displacement with fraction, and the SSD there."""
+    """Search full resolution around an anchor: displacement, and SSD in grey levels² an entry."""
     count, tiny = 2 * FULL_REACH + 1, work.tiny
     load_window(image, anchor_x, anchor_y, work.full)
     ssd_surface_16(work.full, 0, template.full, count, work.strip, tiny)
@@ -269,4 +324,4 @@ def search_full(
         x += vertex(tiny[row, column - 1], tiny[row, column], tiny[row, column + 1])
     if 0 < row < count - 1:
         y += vertex(tiny[row - 1, column], tiny[row, column], tiny[row + 1, column])
-    return x, y, float(tiny[row, column])
+    return x, y, float(tiny[row, column]) / (4 * SIDE * SIDE)

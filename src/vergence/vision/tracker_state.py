@@ -29,7 +29,6 @@ from vergence.vision.alignment import (
 )
 from vergence.vision.pyramid import Patch, anchor_of, load_window
 from vergence.vision.ssd import (
-    FULL_REACH,
     RANGE_PX,
     TEMPLATE_SIZE,
     WORKSPACE_SIZE,
@@ -42,15 +41,15 @@ from vergence.vision.ssd import (
 KEYS = 16  # key templates kept for each point
 REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or shrunk by this
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
-LOST_CORRELATION = 0.7
-LOST_SHIFT_PX = 2.5  # search and alignment must agree within this
+LOST_CORRELATION = 0.75
+LOST_SHIFT_PX = 4.0  # search and alignment must agree within this
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
 AT_BORDER_PX = 20.0  # a point lost when expected so near the border has probably left
 FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
 CONSENSUS = 3  # points found that say where the others may have gone
 LOOK_AGAIN_PX = 6.0  # if they moved this far at least
-FLOOR_PX = 0.02  # standard deviation that no alignment beats: interpolation, quantised grey levels
+FLOOR_PX = 0.01  # standard deviation that no alignment beats: interpolation, quantised grey levels
 
 FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(8)
 
@@ -66,8 +65,8 @@ class TrackerState(NamedTuple):
     search: Patch  # (M, 448) search template
     jacobian: Patch  # (M, K, 8, n) of the key templates
     inverse: FloatArray  # (M, K, 2, 8, 8) of the key templates
-    facts: FloatArray  # (M, K, 12) of the key templates: 4 of the alignment; affine 2 × 2 from the
-    # first image to the template's; covariance 2 × 2 of the point's place in it, px²
+    facts: FloatArray  # (M, K, 16) of the key templates: 4 of the alignment; affine 2 × 2 from the
+    # first image to the template's; covariance 2 × 2 of the point's place in it, px²; spread 2 × 2
     keys: IntArray  # (M, 2) how many key templates there are, and which one is in use
     memory: Patch  # what the kernels write to
     corner: NDArray[np.int32]  # likewise
@@ -89,7 +88,7 @@ def empty_state(count: int) -> TrackerState:
         np.zeros((count, TEMPLATE_SIZE), f4),
         np.zeros((count, KEYS, UNKNOWNS, n), f4),
         np.zeros((count, KEYS, 2, UNKNOWNS, UNKNOWNS)),
-        np.zeros((count, KEYS, 12)),
+        np.zeros((count, KEYS, 16)),
         np.zeros((count, 2), np.int64),
         np.zeros(WORKSPACE_SIZE + RESAMPLING_SIZE, f4),
         np.zeros(PATCH_PX, np.int32),
@@ -117,7 +116,10 @@ def key_covariance_of(state: TrackerState, k: int, key: int) -> FloatArray:
 @njit(cache=True)
 def key_template_of(state: TrackerState, k: int, key: int) -> AlignmentTemplate:
     """Key template of point k."""
-    return AlignmentTemplate(state.jacobian[k, key], state.inverse[k, key], state.facts[k, key, :4])
+    facts = state.facts[k, key]
+    return AlignmentTemplate(
+        state.jacobian[k, key], state.inverse[k, key], facts[:4], facts[12:].reshape(2, 2)
+    )
 
 
 @njit(cache=True)
@@ -226,7 +228,7 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
     """Find point k, expected at out[PLACE], in an image; returns the verdict.
 
     Where the best window of the search turns out not to be the point, the place where it was
-    expected and the other minima of the coarse level are tried too.
+    expected is tried too.
     """
     height, width = image.shape
     x, y = out[0], out[1]
@@ -235,7 +237,7 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
     offset_x, offset_y = state.places[k, 6], state.places[k, 7]
     anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
     work = make_workspace(state.memory[:WORKSPACE_SIZE])
-    dx, dy, _ = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    dx, dy = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
     start_x, start_y = anchor_x - 0.5 + offset_x, anchor_y - 0.5 + offset_y
     verdict = settle(image, start_x + dx, start_y + dy, k, state, out)
     if verdict == FOUND:
@@ -243,12 +245,6 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
     answer = out.copy()
     if settle(image, x, y, k, state, out) == FOUND:
         return FOUND
-    for other in work.candidates:
-        tried = np.hypot(other[0] - dx, other[1] - dy) <= FULL_REACH
-        if tried or not np.isfinite(other[2]):
-            continue
-        if settle(image, start_x + other[0], start_y + other[1], k, state, out) == FOUND:
-            return FOUND
     out[:] = answer
     border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
     if border < AT_BORDER_PX:
@@ -300,13 +296,11 @@ def place_covariance(
 ) -> FloatArray:
     """Covariance of a found place: of this alignment, and of the key template's own place.
 
-    σ² A (JᵀJ)⁻¹ Aᵀ / g² + A C_key Aᵀ, with σ from the residual.
+    σ² A S Aᵀ / g² + A C_key Aᵀ, with σ from the residual and S the template's spread.
     """
     inner = key_covariance_of(state, k, key).copy()
-    scale = (found.residual / found.gain) ** 2
-    for i in range(2):
-        for j in range(2):
-            inner[i, j] += scale * state.inverse[k, key, FREE, i, j]
+    spread = key_template_of(state, k, key).spread
+    inner += (found.residual / found.gain) ** 2 * spread
     out = product2(product2(A, inner), A.T)
     out[0, 0] += FLOOR_PX**2
     out[1, 1] += FLOOR_PX**2
