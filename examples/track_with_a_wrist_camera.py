@@ -20,6 +20,7 @@ def main() -> None:
         depth_m=[1.0] * len(points),
         axes=("x", "y", "rx", "ry"),
         avoidance_axes=("x", "y"),
+        Q=2e-6 / len(points),
         S=0.001,
     )
     seen = TrackedPoints("wrist", SsdTracker(image, points))

@@ -13,7 +13,7 @@ class OptimalTrackingTable(Table):
     kind: Literal["optimal_tracking"]
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
     avoidance_axes: tuple[Axis, ...] = ()
-    Q: Positive = 2e-6  # 1/px²
+    Q: Positive = 2e-6  # 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 10.0  # one for all controlled axes, or one each
     S: Annotated[float, Field(ge=0)] = 0.0
     penalty: Literal["product", "per_joint"] = "product"
@@ -44,7 +44,7 @@ class ConstrainedTable(Table):
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
-    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
+    Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
     S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
     depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
@@ -69,7 +69,7 @@ class PlainTable(Table):
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
-    Q: Positive = 2e-6  # of optimal_tracking, 1/px²
+    Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
     depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
     flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the target stands if absent

@@ -1,20 +1,14 @@
 """The task `follow`: the hand kept at a wanted pose relative to the target."""
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from vergence.arrays import FloatArray
-from vergence.camera import Frame
 from vergence.cell import Cell, SimulatedDriver, placement_pose
 from vergence.cell.schema import FollowTable, Placement
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_inverse
 from vergence.planning import FixedReference, Reference
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
-from vergence.runtime.assembly.pose import FollowedPose, follow_pose, target_shape
+from vergence.runtime.assembly.pose import follow_pose, target_shape
 
 
 def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images: bool) -> Parts:
@@ -27,33 +21,8 @@ def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images:
     driver.look_for(model.corners)
     _require_sight(cell, driver)
     planner = FixedReference(Reference(0.0, T_camera_target=_wanted_pose(task, driver)))
-    perception = FoundOrNothing(follow_pose(cell, driver, model, images))
+    perception = follow_pose(cell, driver, model, images)
     return Parts(perception, planner, build_law(cell, driver))
-
-
-class FoundOrNothing:
-    """Calls every point not found while the target is lost, so that the loop holds the arm.
-
-    Args:
-        perception: estimates the target's pose.
-    """
-
-    def __init__(self, perception: FollowedPose) -> None:
-        self._perception = perception
-
-    def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the frames show, or None if none of them concerns it."""
-        observation = self._perception.observe(frames)
-        if observation is None or observation.target is not None:
-            return observation
-        views = tuple(_nothing_found(view, self._perception.lost) for view in observation.views)
-        return Observation(observation.time, views)
-
-
-def _nothing_found(view: ImagePoints, why: str) -> ImagePoints:
-    none = np.zeros(len(view.found), dtype=np.bool_)
-    reasons = (why,) * len(none)
-    return ImagePoints(view.camera, view.time, view.points_px, view.covariance_px, none, reasons)
 
 
 def _wanted_pose(task: FollowTable, driver: SimulatedDriver) -> FloatArray:

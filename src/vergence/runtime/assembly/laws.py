@@ -81,13 +81,14 @@ def _optimal_tracking(
         raise InputError(
             str(cell.path), "law.avoidance_axes", ", ".join(sorted(extra)), "a subset of law.axes"
         )
+    depth = _depth(driver, name, table.depth_m)
     return OptimalTrackingLaw(
         _arm(cell, driver),
         driver.cameras[name],
-        _depth(driver, name, table.depth_m),
+        depth,
         axes=table.axes,
         avoidance_axes=table.avoidance_axes,
-        Q=table.Q,
+        Q=table.Q / len(depth),  # shared: the loop gain must not grow with the features
         R=table.R,
         S=table.S,
         period=1.0 / cell.cameras[name].rate_hz,
@@ -146,7 +147,8 @@ def _objective(
         return ImageBased(camera, table.gain, table.interaction)
     _check_weights(cell, table)
     period = 1.0 / cell.cameras[cell.task.camera].rate_hz
-    return OptimalTracking(camera, table.axes, table.Q, table.R, period)
+    count = len(_depth(driver, cell.task.camera, table.depth_m))
+    return OptimalTracking(camera, table.axes, table.Q / count, table.R, period)
 
 
 def _check_weights(cell: Cell, table: OptimalTrackingTable | ConstrainedTable | PlainTable) -> None:
