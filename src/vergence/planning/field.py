@@ -190,7 +190,10 @@ def descend(
             end = STUCK
             break
         direction = force / size
-        if np.sum(direction * before) < 0.0:
+        if np.sum(before**2) > 0.0:  # half of the last direction: force alone flutters at a wall
+            direction = 0.5 * (direction + before)
+            direction /= max(np.sqrt(np.sum(direction**2)), 1e-12)
+        if np.sum(force * before) < 0.0:
             epsilon *= 0.5
         else:
             epsilon = min(1.2 * epsilon, step)
