@@ -24,7 +24,7 @@ from vergence.planning import (
 from vergence.robot import Arm, JointState
 from vergence.studies.ideal_loop import PERIOD, Ending, IdealLoop, Motion, Steer
 from vergence.studies.mezouar2001_scene import Scene
-from vergence.vision.two_view import TwoView, estimate_two_view
+from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view
 
 Method = Literal[
     "image_based",
@@ -55,6 +55,7 @@ PLANS = 6  # at most, one after the other
 ROOM = 0.003  # to a joint limit, of half the range; with less the arm stops and plans again
 CAMERA_SPEED = 0.25  # m/s
 PICTURES = 25  # averaged at either end before planning
+LOOKS = 3  # at most, where one picture's marks do not agree with the other's
 REFERENCE = np.array([0, 1, 2])  # the marks of the middle plane span the reference plane
 
 
@@ -139,22 +140,11 @@ def plan_between_pictures(
     scene: Scene, method: Method, belief: Belief, random: np.random.Generator
 ) -> Path | str:
     """Plan from the pictures at start and goal and the believed d*; or say why there is no path."""
-    here, there = (
-        scene.seen_px(T) for T in (scene.arm.forward_kinematics(scene.q_start), scene.T_world_goal)
-    )
-    spread = belief.noise_px / np.sqrt(PICTURES)
-    here, there = (px + spread * random.normal(size=px.shape) for px in (here, there))
-    view = estimate_two_view(
-        here,
-        there,
-        belief.camera,
-        noise_px=belief.misfit_px or max(spread, 0.05),
-        reference=REFERENCE,
-    )
+    view = _two_views(scene, belief, random)
     if not isinstance(view, TwoView):
         return str(view)
     if not view.inliers.all():
-        return "matches were taken for wrong ones"
+        return f"{int((~view.inliers).sum())} right matches were taken for wrong ones"
     problem = PlanningProblem.from_two_view(
         view,
         belief.distance_scale * _true_distance(scene, view.normal),
@@ -166,6 +156,23 @@ def plan_between_pictures(
     )
     plan = PLANNERS[method]().plan(problem)
     return str(plan) if isinstance(plan, PlanFailure) else plan
+
+
+def _two_views(
+    scene: Scene, belief: Belief, random: np.random.Generator
+) -> TwoView | TwoViewFailure:
+    """Reconstruct from start and goal; look again if the noise was larger than it mostly is."""
+    poses = (scene.arm.forward_kinematics(scene.q_start), scene.T_world_goal)
+    spread = belief.noise_px / np.sqrt(PICTURES)
+    noise = belief.misfit_px or max(spread, 0.05)
+    for _ in range(LOOKS):
+        here, there = (
+            scene.seen_px(T) + spread * random.normal(size=scene.goal_px.shape) for T in poses
+        )
+        view = estimate_two_view(here, there, belief.camera, noise_px=noise, reference=REFERENCE)
+        if isinstance(view, TwoView) and view.inliers.all():
+            break
+    return view
 
 
 def _true_distance(scene: Scene, normal: FloatArray) -> float:

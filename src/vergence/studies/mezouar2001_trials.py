@@ -19,6 +19,7 @@ from vergence.studies.mezouar2001_scene import Scene
 NOISE_PX = 0.3
 ROLL_DEG = (120.0, 180.0)
 SEED_START, SEED_NOISE, SEED_WRONG = 0, 1, 2  # of the draws
+CELLS = 256  # of the proof's grid along each turning joint, at most
 GOALS = 50  # goal configurations asked for; the gantry's wrist has a handful at most
 
 
@@ -63,7 +64,7 @@ def is_infeasible(scene: Scene) -> bool:
     """Return whether no motion inside view and limits joins start and goal, by proof."""
     problem = scene.problem()
     goals = goal_configurations(scene.arm, scene.T_world_goal, scene.q_start, GOALS)
-    return proves_no_path(problem, goals)
+    return proves_no_path(problem, goals, CELLS)
 
 
 def try_belief(scene: Scene, method: Method, index: int) -> End:
