@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from vergence.arrays import FloatArray
-from vergence.drawing import COLORS, curve, figure, legend, save
+from vergence.drawing import COLORS, curve, figure, legend
 from vergence.studies.check import Figure
+from vergence.studies.figure_files import save_figures
 
 _WIDTH = 7.6  # inches
 
@@ -19,17 +20,11 @@ def draw(out: Path, ends: Counter[tuple[str, str]], singular: FloatArray) -> tup
         ends: how many runs of a law ended how.
         singular: rows of time (s), smallest singular value, error (px), (K, 3).
     """
-    out.mkdir(parents=True, exist_ok=True)
-    drawn = (
-        ("ends", _ends(ends), "How random runs end, law by law; none passed a joint limit."),
-        ("singularity", _singular(singular), "Through the wrist's singularity with the target."),
-    )
-    files = []
-    for name, drawing, caption in drawn:
-        path = out / f"{name}.svg"
-        save(drawing, path)
-        files.append(Figure(path, caption))
-    return tuple(files)
+    drawn = {
+        "ends": (_ends(ends), "How random runs end, law by law; none passed a joint limit."),
+        "singularity": (_singular(singular), "Through the wrist's singularity with the target."),
+    }
+    return save_figures(out, drawn)
 
 
 def _ends(ends: Counter[tuple[str, str]]) -> Any:

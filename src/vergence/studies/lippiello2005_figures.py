@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.drawing import curve, figure, legend, save
+from vergence.drawing import curve, figure, legend
 from vergence.geometry import matrix_to_rpy
 from vergence.studies.check import Figure
+from vergence.studies.figure_files import save_figures
 from vergence.studies.lippiello2005_trials import Trial
 
 _WIDTH, _HEIGHT = 7.6, 4.6  # inches
@@ -17,7 +18,6 @@ _WIDTH, _HEIGHT = 7.6, 4.6  # inches
 
 def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
     """Write every figure into a folder; return them in the paper's order."""
-    out.mkdir(parents=True, exist_ok=True)
     hybrid, fixed, ours = trials["hybrid"], trials["fixed"], trials["ours"]
     drawn = {
         "figure_05": (
@@ -42,12 +42,7 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
             "Figure 8: error of the estimated pose, the fixed camera alone, the paper's settings.",
         ),
     }
-    files = []
-    for name, (drawing, caption) in drawn.items():
-        path = out / f"{name}.svg"
-        save(drawing, path)
-        files.append(Figure(path, caption))
-    return tuple(files)
+    return save_figures(out, drawn)
 
 
 def _trajectory(trial: Trial) -> Any:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vergence.drawing import COLORS, curve, legend, save
+from vergence.drawing import COLORS, curve, legend
 from vergence.planning import Path as PlannedPath
 from vergence.studies.check import Figure
+from vergence.studies.figure_files import save_figures
 from vergence.studies.ideal_loop import Ending, Motion
 from vergence.studies.mezouar2001_methods import LABELS, METHODS
 from vergence.studies.mezouar2001_run import Realised, Section6
@@ -49,7 +50,6 @@ def draw(
     starts: Mapping[str, Sequence[Trial]],
 ) -> tuple[Figure, ...]:
     """Write every figure into a folder; return them in the paper's order."""
-    out.mkdir(parents=True, exist_ok=True)
     drawn = {
         "figure_03": (
             _figure_3(section),
@@ -82,12 +82,7 @@ def draw(
             "How servoing ends from random starts that are not proved infeasible.",
         ),
     }
-    files = []
-    for name, (drawing, caption) in drawn.items():
-        path = out / f"{name}.svg"
-        save(drawing, path)
-        files.append(Figure(path, caption))
-    return tuple(files)
+    return save_figures(out, drawn)
 
 
 def _figure_3(section: Section6) -> Any:

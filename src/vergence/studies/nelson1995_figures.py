@@ -8,9 +8,10 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
 from vergence.cell.schema import OptimalTrackingTable
-from vergence.drawing import COLORS, curve, figure, legend, save
+from vergence.drawing import COLORS, curve, figure, legend
 from vergence.robot import Arm, joint_limit_penalty, manipulability
 from vergence.studies.check import Figure
+from vergence.studies.figure_files import save_figures
 from vergence.studies.trial import Trial, Trials
 
 _WIDTH, _HEIGHT = 7.6, 3.0  # inches
@@ -23,7 +24,6 @@ _LABELS = {
 
 def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
     """Write every figure into a folder; return them in the paper's order."""
-    out.mkdir(parents=True, exist_ok=True)
     driver = SimulatedDriver(cell, images=False)
     arm = driver.world.arm_to_camera(cell.task.camera)
     start = driver.read().joints[cell.task.arm].position
@@ -69,12 +69,7 @@ def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
             "Figure 15: feature error, motion along −x, two and four axes.",
         ),
     }
-    files = []
-    for name, (drawing, caption) in drawn.items():
-        path = out / f"{name}.svg"
-        save(drawing, path)
-        files.append(Figure(path, caption))
-    return tuple(files)
+    return save_figures(out, drawn)
 
 
 def _axes(x_label: str, y_label: str) -> tuple[Any, Any]:
