@@ -101,7 +101,7 @@ def filter_steps() -> tuple[Block, Block]:
         np.eye(4),
         velocity,
         P,
-        C,
+        np.tile(C, (8, 1, 1)),
         np.array(BOX.points),
         seen[:, :2] / seen[:, 2:],
         np.tile(np.eye(2) / CAMERA.fx**2, (8, 1, 1)),

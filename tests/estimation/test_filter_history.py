@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from estimation_scene import HAND, WALL, moving, pose_error, view
 
 from vergence.estimation import FilterHistory, PoseFilter, Verdict
@@ -90,3 +91,74 @@ def test_past_is_asked_from_the_pictures_until_then():
         np.testing.assert_array_equal(
             history.at(time).T_world_target, early.at(time).T_world_target
         )
+
+
+def in_step(rng, ticks=12):
+    """Two cameras that expose together, with some wrong matches."""
+    return [
+        view(rng, k / 26, moving(k / 26), pose, name, outliers=0.1)
+        for k in range(1, ticks + 1)
+        for name, pose in (("hand", HAND), ("wall", WALL))
+    ]
+
+
+class Counting(PoseFilter):
+    """Notes how many points each update took in."""
+
+    sizes: list = []  # noqa: RUF012
+
+    def update(self, belief, seen):
+        self.sizes.append(seen.size)
+        return super().update(belief, seen)
+
+
+def test_pictures_of_one_exposure_are_one_update():
+    views = in_step(np.random.default_rng(7), ticks=3)
+    filter_ = Counting()
+    filter_.sizes.clear()
+    history = FilterHistory(filter_, filter_.start(0.0, moving(0.0)))
+    history, updates = history.add_all(views)
+    assert filter_.sizes == [2 * len(views[0].points)] * 3
+    assert [len(u.kept) for u in updates] == [v.size for v in views]
+    assert len(history.entries) == 3
+
+
+def test_together_or_one_after_the_other_or_late_the_belief_is_the_same_to_the_bit():
+    rng = np.random.default_rng(8)
+    views = in_step(rng)
+    singly, _ = fed(views)
+    shuffled, _ = fed([views[i] for i in rng.permutation(len(views))])
+    filter_ = PoseFilter()
+    together = FilterHistory(filter_, filter_.start(0.0, moving(0.0)))
+    for k in range(0, len(views), 2):
+        together, _ = together.add_all(views[k : k + 2][::-1])
+    for other in (singly, shuffled):
+        np.testing.assert_array_equal(other.belief.covariance, together.belief.covariance)
+        np.testing.assert_array_equal(other.belief.T_world_target, together.belief.T_world_target)
+        assert other.belief.consistency == together.belief.consistency
+
+
+def test_camera_that_contradicts_all_others_is_told_apart():
+    rng = np.random.default_rng(9)
+    right = [view(rng, 0.1, moving(0.1), pose, name) for name, pose in (("a", HAND), ("b", WALL))]
+    wrong = view(rng, 0.1, moving(0.1), WALL, "c", features=[0, 3, 6])
+    wrong = wrong._replace(measured=wrong.measured + 0.2)
+    filter_ = PoseFilter()
+    history = FilterHistory(filter_, filter_.start(0.0, moving(0.0)))
+    history, updates = history.add_all([wrong, *right])
+    assert [u.verdict for u in updates] == [Verdict.CONTRADICTED, Verdict.USED, Verdict.USED]
+    assert history.belief.doubts == 0
+    alone, _ = FilterHistory(filter_, filter_.start(0.0, moving(0.0))).add_all(right)
+    assert pose_error(history.belief.T_world_target, alone.belief.T_world_target) == pytest.approx(
+        np.zeros(6), abs=1e-12
+    )
+
+
+def test_picture_twice_at_once_counts_once():
+    picture = view(np.random.default_rng(10), 0.1, moving(0.1))
+    filter_ = PoseFilter()
+    start = FilterHistory(filter_, filter_.start(0.0, moving(0.0)))
+    twice, updates = start.add_all([picture, picture])
+    once, _ = start.add(picture)
+    assert [u.verdict for u in updates] == [Verdict.USED, Verdict.REPEATED]
+    np.testing.assert_array_equal(twice.belief.covariance, once.belief.covariance)

@@ -10,6 +10,11 @@ from vergence.geometry import se3_inverse
 STEP = 1e-6
 
 
+def of_each(T_world_camera) -> np.ndarray:
+    """The inverse pose of the camera that sees each corner of the box, (8, 4, 4)."""
+    return np.repeat(se3_inverse(T_world_camera)[None], len(BOX), axis=0)
+
+
 def random_covariance(rng, scale=None) -> np.ndarray:
     A = rng.standard_normal((12, 12)) * (np.ones(12) if scale is None else scale)[:, None]
     return A @ A.T
@@ -20,7 +25,7 @@ def test_measurement_jacobian_matches_finite_differences(T_world_camera):
     T = moving(0.7)
     measured = np.zeros((len(BOX), 2))
     unit = np.tile(np.eye(2), (len(BOX), 1, 1))
-    rows = whitened_rows(T, se3_inverse(T_world_camera), BOX, measured, unit)
+    rows = whitened_rows(T, of_each(T_world_camera), BOX, measured, unit)
     numeric = np.empty((2 * len(BOX), 6))
     for i, d in enumerate(np.eye(12)[:6] * STEP):
         ahead = project(T_world_camera, correct_pose(T, d))
@@ -34,7 +39,7 @@ def test_whitened_noise_is_the_identity():
     rng = np.random.default_rng(5)
     A = rng.standard_normal((len(BOX), 2, 2))
     covariance = A @ A.transpose(0, 2, 1) + 0.1 * np.eye(2)
-    T, C = moving(0.2), se3_inverse(WALL)
+    T, C = moving(0.2), of_each(WALL)
     zero = np.zeros((len(BOX), 2))
     plain = whitened_rows(T, C, BOX, zero, np.tile(np.eye(2), (len(BOX), 1, 1)))
     rows = whitened_rows(T, C, BOX, zero, covariance)
@@ -58,7 +63,7 @@ def test_a_point_behind_the_camera_is_infinitely_far():
     behind = WALL.copy()
     behind[:3, 3] = -WALL[:3, 3]
     unit = np.tile(np.eye(2), (len(BOX), 1, 1))
-    rows = whitened_rows(np.eye(4), se3_inverse(behind), BOX, np.zeros((len(BOX), 2)), unit)
+    rows = whitened_rows(np.eye(4), of_each(behind), BOX, np.zeros((len(BOX), 2)), unit)
     assert np.isinf(mahalanobis_squared(rows, np.eye(12))).all()
 
 

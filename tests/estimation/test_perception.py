@@ -184,6 +184,9 @@ def test_lost_target_is_admitted_and_found_again():
             continue
         if observation.target is None:
             assert "not seen for" in perception.lost
+            for points in observation.views:
+                assert not points.found.any()
+                assert set(points.reasons) == {perception.lost}
             lost_at = lost_at or observation.time
         elif lost_at and not found_at:
             found_at = observation.time

@@ -7,6 +7,7 @@ from estimation_scene import BOX, HAND, WALL, moving, pose_error, view
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, Verdict
 from vergence.estimation.motion import correct_pose, predict_pose
+from vergence.estimation.view import together
 
 SMALL_START = np.diag(np.repeat([0.01, 0.03, 0.05, 0.1], 3) ** 2)
 
@@ -201,3 +202,17 @@ def test_paper_start_without_uncertainty_trusts_the_first_pose():
     update = filter_.update(certain, view(rng, 0.0, np.eye(4)))
     np.testing.assert_allclose(update.belief.T_world_target, np.eye(4), atol=1e-15)
     assert replace(update.belief, time=0.0).covariance.max() == 0.0
+
+
+def test_cameras_taken_together_agree_with_one_after_the_other():
+    # The same information; only the point of linearisation differs.
+    rng = np.random.default_rng(11)
+    filter_ = PoseFilter()
+    start = filter_.start(0.0, moving(0.0), covariance=0.01 * SMALL_START)
+    views = [view(rng, 0.0, moving(0.0), pose) for pose in (WALL, HAND)]
+    joint = filter_.update(start, together(views)).belief
+    turns = filter_.update(filter_.update(start, views[0]).belief, views[1]).belief
+    difference = pose_error(joint.T_world_target, turns.T_world_target)
+    spread = np.sqrt(np.diag(joint.covariance)[:6])
+    assert (np.abs(difference) < 0.02 * spread).all()
+    np.testing.assert_allclose(np.diag(joint.covariance), np.diag(turns.covariance), rtol=1e-2)

@@ -1,35 +1,42 @@
 """Late and out-of-order pictures: a short history that is replayed."""
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
-from vergence.estimation.target_filter import B, TargetFilter, Update, Verdict, unused
-from vergence.estimation.view import View
+from vergence.estimation.target_filter import (
+    B,
+    TargetFilter,
+    Update,
+    Verdict,
+    of_each_picture,
+    unused,
+)
+from vergence.estimation.view import Seen, View, together
 
 
 class _Entry(NamedTuple, Generic[B]):
-    view: View
+    time: float  # s
+    views: tuple[View, ...]  # of that time, by the names of their cameras
+    seen: Seen  # all their points
     after: B
-
-    @property
-    def key(self) -> tuple[float, str]:
-        return self.view.time, self.view.camera
 
 
 @dataclass(frozen=True, slots=True)
 class FilterHistory(Generic[B]):
     """The pictures of the last moments in order of exposure, with the belief after each; a value.
 
-    A picture that arrives late is put in its place and the later ones are used again on top of it.
-    So the belief depends on which pictures arrived, never on the order they arrived in.
+    The pictures of one exposure correct the belief together. One that arrives late is put in its
+    place, beside those of its exposure that were there before it, and all is used again from there
+    on. So the belief depends on which pictures arrived, never on the order they arrived in.
     """
 
     filter: TargetFilter[B]
     base: B  # before the first entry
     horizon: float = 0.5  # s, how long a picture may be under way
     entries: tuple[_Entry[B], ...] = ()
-    closed: tuple[float, str] = (-float("inf"), "")  # exposure and camera of the newest one pruned
+    closed: float = -float("inf")  # s, the newest exposure pruned
 
     @property
     def belief(self) -> B:
@@ -39,39 +46,82 @@ class FilterHistory(Generic[B]):
     def at(self, time: float) -> B:
         """Return the belief predicted to a time from the pictures up to that time."""
         place = len(self.entries)
-        if place and time < self.entries[-1].view.time:
-            place = bisect_right(self.entries, time, key=lambda entry: entry.view.time)
+        if place and time < self.entries[-1].time:
+            place = bisect_right(self.entries, time, key=lambda entry: entry.time)
         return self.filter.predict(self._before(place), time)
 
     def add(self, view: View) -> tuple["FilterHistory[B]", Update]:
         """Return the history with one more picture, and what was made of that picture."""
-        key = (view.time, view.camera)
-        place = self._place(key)
-        if place < len(self.entries) and self.entries[place].key == key:
-            return self, unused(self.belief, view, Verdict.REPEATED)
-        if key <= self.closed or view.time < self.base.time:
-            return self, unused(self.belief, view, Verdict.TOO_LATE)
-        update = self.filter.update(self._before(place), view)
-        replayed = [*self.entries[:place], _Entry(view, update.belief)]
-        for entry in self.entries[place:]:
-            again = self.filter.update(replayed[-1].after, entry.view)
-            replayed.append(_Entry(entry.view, again.belief))
-        return self._pruned(replayed), update
+        history, updates = self.add_all([view])
+        return history, updates[0]
 
-    def _place(self, key: tuple[float, str]) -> int:
-        if not self.entries or key > self.entries[-1].key:
+    def add_all(self, views: Sequence[View]) -> tuple["FilterHistory[B]", list[Update]]:
+        """Return the history with more pictures, of any times, and what was made of each."""
+        made: list[Update | None] = [self._refused(view) for view in views]
+        new: dict[tuple[float, str], int] = {}  # time and camera: number of the picture
+        for n, view in enumerate(views):
+            if made[n] is None and new.setdefault((view.time, view.camera), n) != n:
+                made[n] = unused(self.belief, view.size, Verdict.REPEATED)
+        history = self
+        if new:
+            history, updates = self._replayed([views[n] for n in new.values()])
+            made = [
+                given or updates[view.time, view.camera]
+                for given, view in zip(made, views, strict=True)
+            ]
+        return history, [update for update in made if update is not None]
+
+    def _refused(self, view: View) -> Update | None:
+        """Return why a picture cannot be used, or None if it can."""
+        if view.time <= self.closed or view.time < self.base.time:
+            return unused(self.belief, view.size, Verdict.TOO_LATE)
+        if not self.entries or view.time > self.entries[-1].time:
+            return None
+        place = self._place(view.time)
+        there = self.entries[place]
+        if there.time == view.time and any(view.camera == other.camera for other in there.views):
+            return unused(self.belief, view.size, Verdict.REPEATED)
+        return None
+
+    def _replayed(
+        self, views: Sequence[View]
+    ) -> tuple["FilterHistory[B]", dict[tuple[float, str], Update]]:
+        """Return the history with pictures in their places, and all updates made for it."""
+        place = self._place(min(view.time for view in views))
+        groups = {entry.time: (entry.views, entry.seen) for entry in self.entries[place:]}
+        new: dict[float, list[View]] = {}
+        for view in views:
+            new.setdefault(view.time, []).append(view)
+        for time, added in new.items():
+            before = groups[time][0] if time in groups else ()
+            there = tuple(sorted((*before, *added), key=lambda view: view.camera))
+            groups[time] = there, together(there)
+        entries, belief = list(self.entries[:place]), self._before(place)
+        made = {}
+        for time in sorted(groups):
+            there, seen = groups[time]
+            update = self.filter.update(belief, seen)
+            belief = update.belief
+            entries.append(_Entry(time, there, seen, belief))
+            for view, part in zip(there, of_each_picture(update, there), strict=True):
+                made[time, view.camera] = part
+        return self._pruned(entries), made
+
+    def _place(self, time: float) -> int:
+        """Return where an exposure is, or would have to be put."""
+        if not self.entries or time > self.entries[-1].time:
             return len(self.entries)
-        return bisect_left(self.entries, key, key=lambda entry: entry.key)
+        return bisect_left(self.entries, time, key=lambda entry: entry.time)
 
     def _before(self, place: int) -> B:
         return self.entries[place - 1].after if place else self.base
 
     def _pruned(self, entries: list[_Entry[B]]) -> "FilterHistory[B]":
-        oldest = entries[-1].view.time - self.horizon
+        oldest = entries[-1].time - self.horizon
         first = 0
-        while entries[first].view.time < oldest:  # rarely more than once or twice
+        while entries[first].time < oldest:  # rarely more than once or twice
             first += 1
         base, closed = self.base, self.closed
         if first:
-            base, closed = entries[first - 1].after, entries[first - 1].key
+            base, closed = entries[first - 1].after, entries[first - 1].time
         return FilterHistory(self.filter, base, self.horizon, tuple(entries[first:]), closed)

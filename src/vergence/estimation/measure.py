@@ -1,6 +1,7 @@
 """What perception asks of others: the poses of its cameras, and points inside windows."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -49,11 +50,23 @@ class Measure(Protocol):
         ...
 
 
-def no_points(camera: str, time: float) -> ImagePoints:
-    """Return the image points of a picture in which nothing was measured."""
-    return ImagePoints(
-        camera, time, np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0, dtype=np.bool_), ()
-    )
+def nothing_measured(
+    camera: str, time: float, expected_px: FloatArray, sight: SightArray, widest_px: float
+) -> ImagePoints:
+    """Return image points of all M features of a picture that was not looked at.
+
+    Args:
+        camera: whose picture.
+        time: of its exposure, s.
+        expected_px: predicted places, (M, 2).
+        sight: a `Sight` each, (M,).
+        widest_px: half the widest window.
+    """
+    reasons = tuple([UNSEEN[value] for value in sight.tolist()])
+    none = np.zeros(len(reasons), dtype=np.bool_)
+    covariance = np.zeros((len(reasons), 2, 2))
+    covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
+    return ImagePoints(camera, time, expected_px, covariance, none, reasons)
 
 
 def spread_out(
@@ -89,3 +102,9 @@ def spread_out(
     places[features[agreeing]] = found.points_px[agreeing]
     covariance[features[agreeing]] = found.covariance_px[agreeing]
     return ImagePoints(found.camera, found.time, places, covariance, seen, tuple(reasons))
+
+
+def nothing_found(points: ImagePoints, why: str) -> ImagePoints:
+    """Return the same points, none of them found, all for one reason."""
+    none = np.zeros(len(points.found), dtype=np.bool_)
+    return replace(points, found=none, reasons=(why,) * len(none))

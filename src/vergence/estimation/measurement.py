@@ -63,13 +63,13 @@ def whitened_rows(
     measured: FloatArray,
     covariance: FloatArray,
 ) -> FloatArray:
-    """Return the whitened measurement of one picture, (2M, 7).
+    """Return the whitened measurement of points in any number of pictures, (2M, 7).
 
     A point behind the camera gets an infinite residual, which no gate lets through.
 
     Args:
         T_world_target: the predicted pose, (4, 4).
-        T_camera_world: inverse pose of the camera at the exposure, (4, 4).
+        T_camera_world: inverse pose of each point's camera at the exposure, (M, 4, 4).
         points: in the target's frame, (M, 3), m.
         measured: normalized coordinates, (M, 2).
         covariance: of the measured points, normalized, (M, 2, 2), positive definite.
@@ -77,7 +77,7 @@ def whitened_rows(
     rows = np.empty((2 * len(points), POSE + 1))
     for n in range(len(points)):
         pair = rows[2 * n : 2 * n + 2]
-        depth = point_rows(T_world_target, T_camera_world, points[n], pair)
+        depth = point_rows(T_world_target, T_camera_world[n], points[n], pair)
         pair[0, POSE] = measured[n, 0] - pair[0, POSE]
         pair[1, POSE] = measured[n, 1] - pair[1, POSE]
         whiten(pair, covariance[n])

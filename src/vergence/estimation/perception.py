@@ -10,7 +10,15 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Frame
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
-from vergence.estimation.measure import CameraPose, Find, Joints, Measure, no_points, spread_out
+from vergence.estimation.measure import (
+    CameraPose,
+    Find,
+    Joints,
+    Measure,
+    nothing_found,
+    nothing_measured,
+    spread_out,
+)
 from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import HEIGHT, WIDTH, CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
@@ -45,6 +53,15 @@ class PerceptionSettings:
     lost_doubts: int = 8  # contradicting pictures in a row
 
 
+class _Expected(NamedTuple):
+    """What is expected at an exposure."""
+
+    T_world_target: FloatArray  # (4, 4) predicted
+    covariance: FloatArray  # (12, 12) of that prediction
+    doubt: float  # share of the last points that disagreed
+    certain: bool  # whether the filter is consistent
+
+
 class _Picture(NamedTuple):
     """A picture with what is expected of it."""
 
@@ -58,16 +75,27 @@ class _Picture(NamedTuple):
     certain: bool  # whether the filter is consistent
 
 
+class _Look(NamedTuple):
+    """What was measured in a picture."""
+
+    number: int  # of the picture
+    features: IntArray  # (K,) chosen, one at least
+    found: ImagePoints  # K points
+    view: View  # of those that are usable
+
+
 class PosePerception(Generic[B]):
     """Follows one target with any number of cameras; a stage of the loop.
 
     For every picture that arrives: the target's pose is predicted to its exposure, the features the
     camera will see are worked out, the few worth measuring chosen over all cameras together, and
-    only small windows around them looked at; what is found there corrects the pose.
+    only small windows around them looked at; what is found there corrects the pose, the pictures of
+    one exposure together.
     [Lippiello2005] section IV, Fig. 3.
 
     A target that is lost is looked for around the place where it was seen last, with the widest
-    windows, and over whole pictures if `find` is given; while it is lost no pose is reported.
+    windows, and over whole pictures if `find` is given; while it is lost no pose is reported, and
+    no point counts as found.
     """
 
     def __init__(
@@ -136,36 +164,34 @@ class PosePerception(Generic[B]):
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
             return None
+        beliefs = {time: self._expected(time) for time in {frame.time for frame in known}}
         pictures = [
-            self._expect(frame) for frame in sorted(known, key=lambda f: (f.time, f.camera))
+            self._expect(frame, beliefs[frame.time])
+            for frame in sorted(known, key=lambda f: (f.time, f.camera))
         ]
         visibility = self._see(pictures)
         chosen = self._choose(pictures, visibility)
-        points, views = [], []
-        for n, picture in enumerate(pictures):
-            view, seen = self._look(picture, chosen[n], visibility, n)
-            points.append(seen)
-            if view is not None:
-                views.append(view)
+        looks = [
+            self._look(pictures[n], n, chosen[n], visibility.points_px[n])
+            for n in np.flatnonzero(chosen.any(axis=1)).tolist()  # no other is even touched
+        ]
+        agreeing = self._correct(looks)
         time = pictures[-1].frame.time
-        self._judge(time, views, [picture.frame for picture in pictures])
-        return Observation(time, tuple(points), None if self._lost else self.belief.state())
+        self._judge(time, [look.view for look in looks], [picture.frame for picture in pictures])
+        points = self._points(pictures, visibility, looks, agreeing)
+        return Observation(time, points, None if self._lost else self.belief.state())
 
-    def _expect(self, frame: Frame) -> _Picture:
-        require_size(frame, self._rig)
-        T_world_camera = self._camera_pose(frame.camera, frame.joints)
-        belief = self._last_seen if self._lost else self._history.at(frame.time)
+    def _expected(self, time: float) -> _Expected:
+        belief = self._last_seen if self._lost else self._history.at(time)
         doubt = belief.disagreeing
-        return _Picture(
-            frame,
-            self._rig.numbers[frame.camera],
-            T_world_camera,
-            se3_inverse(T_world_camera),
-            belief.T_world_target,
-            belief.honest_covariance,
-            doubt,
-            belief.consistency.holds and doubt < DOUBT,
-        )
+        certain = belief.consistency.holds and doubt < DOUBT
+        return _Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
+
+    def _expect(self, frame: Frame, expected: _Expected) -> _Picture:
+        require_size(frame, self._rig)
+        number = self._rig.numbers[frame.camera]
+        T_world_camera = self._camera_pose(frame.camera, frame.joints)
+        return _Picture(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
 
     def _see(self, pictures: list[_Picture]) -> Visibility:
         T_camera_target = np.array(
@@ -208,16 +234,9 @@ class PosePerception(Generic[B]):
             self._held[picture.frame.camera] = mask
         return chosen
 
-    def _look(
-        self, picture: _Picture, chosen: BoolArray, visibility: Visibility, n: int
-    ) -> tuple[View | None, ImagePoints]:
-        """Measure inside windows, correct the pose, and say what became of every feature."""
+    def _look(self, picture: _Picture, n: int, chosen: BoolArray, expected: FloatArray) -> _Look:
+        """Measure the features chosen inside windows."""
         features = np.flatnonzero(chosen)
-        expected, sight = visibility.points_px[n], visibility.sight[n]
-        widest = self._windows.most_px
-        if not len(features):  # not even the picture is touched
-            nothing = no_points(picture.frame.camera, picture.frame.time)
-            return None, spread_out(nothing, features, features, expected, sight, widest)
         found = self._measure(
             picture.frame,
             features,
@@ -227,12 +246,41 @@ class PosePerception(Generic[B]):
         )
         camera = self._rig.cameras[picture.number]
         view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
-        kept = view.features
-        if not self._lost:
-            self._history, update = self._history.add(view)
-            if update.verdict in JUDGED:
-                kept = view.features[update.kept]
-        return view, spread_out(found, features, kept, expected, sight, widest)
+        return _Look(n, features, found, view)
+
+    def _correct(self, looks: list[_Look]) -> list[IntArray]:
+        """Correct the pose by all pictures; return which features of each agree with it."""
+        if self._lost or not looks:
+            return [look.view.features for look in looks]
+        self._history, updates = self._history.add_all([look.view for look in looks])
+        return [
+            look.view.features[update.kept] if update.verdict in JUDGED else look.view.features
+            for look, update in zip(looks, updates, strict=True)
+        ]
+
+    def _points(
+        self,
+        pictures: list[_Picture],
+        visibility: Visibility,
+        looks: list[_Look],
+        agreeing: list[IntArray],
+    ) -> tuple[ImagePoints, ...]:
+        """Say what became of every feature; of a target that is lost, none is found."""
+        expected, sight, widest = visibility.points_px, visibility.sight, self._windows.most_px
+        points = {
+            look.number: spread_out(
+                look.found, look.features, kept, expected[look.number], sight[look.number], widest
+            )
+            for look, kept in zip(looks, agreeing, strict=True)
+        }
+        for n, picture in enumerate(pictures):
+            if n not in points:
+                frame = picture.frame
+                points[n] = nothing_measured(
+                    frame.camera, frame.time, expected[n], sight[n], widest
+                )
+        every = (points[n] for n in range(len(pictures)))
+        return tuple(nothing_found(p, self._lost) for p in every) if self._lost else tuple(every)
 
     def _half_sizes(self, picture: _Picture, features: IntArray) -> FloatArray:
         if self._lost:

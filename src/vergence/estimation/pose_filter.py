@@ -20,7 +20,7 @@ from vergence.estimation.target_filter import (
     require_finite,
     unused,
 )
-from vergence.estimation.view import View
+from vergence.estimation.view import Seen
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
 CONSENSUS = 5  # points that must agree to overrule the prediction: any three agree on some pose
@@ -36,6 +36,7 @@ class Correction(NamedTuple):
     square: float  # normalised innovation squared of the points kept
     kept: BoolArray  # (M,)
     squares: FloatArray  # (M,)
+    agreeing: int  # how many points were kept
 
 
 @njit(cache=True)
@@ -49,7 +50,7 @@ def correct(
     covariance: FloatArray,
     gate: float,
 ) -> Correction:
-    """Correct a predicted state by one picture, without the points beyond the gate.
+    """Correct a predicted state by the points of an exposure, without those beyond the gate.
 
     A point must pass the gate twice: against the prediction, and against what the prediction and
     all other points say together. While the pose is uncertain only the second finds wrong matches.
@@ -58,7 +59,7 @@ def correct(
         T_world_target: predicted pose, (4, 4).
         velocity: predicted (v, ω), (6,).
         P: predicted covariance, (12, 12).
-        T_camera_world: inverse pose of the camera at the exposure, (4, 4).
+        T_camera_world: inverse pose of each point's camera at the exposure, (M, 4, 4).
         points: in the target's frame, (M, 3), m.
         measured: normalized coordinates, (M, 2).
         covariance: of the measured points, (M, 2, 2).
@@ -83,7 +84,27 @@ def correct(
         square + rest,
         kept,
         squares,
+        int(np.sum(kept)),
     )
+
+
+@njit(cache=True)
+def predict_and_correct(
+    T_world_target: FloatArray,
+    velocity: FloatArray,
+    P: FloatArray,
+    dt: float,
+    densities: tuple[float, float],
+    poses: FloatArray,
+    points: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+    gate: float,
+) -> Correction:
+    """Predict by dt seconds, then `correct`: in one call, since calls cost more than sums."""
+    predicted = predict_covariance(P, velocity, abs(dt), np.array(densities))
+    pose = predict_pose(T_world_target, velocity, dt)
+    return correct(pose, velocity, predicted, poses, points, measured, covariance, gate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +116,13 @@ class PoseFilter:
     [Lippiello2005] eq. (7) to (18), which is singular at pitch ±90°. The filter itself is a value;
     what it knows about a target is a `Belief`, handed in and returned.
 
-    A point beyond the gate is left out only while the prediction agrees with most of its picture.
-    Where the gate would throw out the majority, not the points but the prediction is in doubt: then
-    the covariance is enlarged until the median point has its expected distance, and the picture is
-    used if one pose then explains the majority, five points at least. A smaller picture proves
-    nothing by itself: it is left out, and if most of the points before it were outside the gate,
-    too, the covariance grows until points are let in again.
+    Pictures of one exposure enter as one measurement, whose cost depends on its points alone. A
+    point beyond the gate is left out only while the prediction agrees with most of them. Where the
+    gate would throw out the majority, not the points but the prediction is in doubt: then the
+    covariance is enlarged until the median point has its expected distance, and the points are used
+    if one pose then explains the majority, five at least. Fewer points prove nothing by themselves:
+    they are left out, and if most of the points before them were outside the gate, too, the
+    covariance grows until points are let in again.
     """
 
     acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
@@ -154,80 +176,102 @@ class PoseFilter:
         dt = time - belief.time
         if dt == 0.0:
             return belief
-        scale = belief.consistency.scale
-        density = np.array(
-            [scale * self.acceleration_density, scale * self.angular_acceleration_density]
-        )
         return Belief(
             time,
             predict_pose(belief.T_world_target, belief.velocity, dt),
             belief.velocity,
-            predict_covariance(belief.covariance, belief.velocity, abs(dt), density),
+            predict_covariance(
+                belief.covariance,
+                belief.velocity,
+                abs(dt),
+                np.array(self._densities(belief)),
+            ),
             belief.consistency,
             belief.seen,
             belief.doubts,
             belief.disagreeing,
         )
 
-    def update(self, belief: Belief, view: View) -> Update:
-        """Predict to the exposure of a picture and correct by its points."""
-        belief = self.predict(belief, view.time)
-        if view.size == 0:
-            return unused(belief, view, Verdict.EMPTY)
-        found = self._correct(belief, belief.covariance, view, belief.consistency.scale)
-        disagreeing = fading_share(belief.disagreeing, found.kept)
-        if 2 * np.count_nonzero(found.kept) >= view.size:
-            return self._used(belief, found, Verdict.USED, disagreeing)
-        return self._overruled(replace(belief, disagreeing=disagreeing), view, found)
+    def _densities(self, belief: Belief) -> tuple[float, float]:
+        scale = belief.consistency.scale
+        return scale * self.acceleration_density, scale * self.angular_acceleration_density
 
-    def _correct(
-        self, belief: Belief, covariance: FloatArray, view: View, scale: float
-    ) -> Correction:
+    def update(self, belief: Belief, seen: Seen) -> Update:
+        """Predict to an exposure and correct by its points, of one picture or of several."""
+        if seen.size == 0:
+            return unused(self.predict(belief, seen.time), 0, Verdict.EMPTY)
+        found = self._correct(belief, seen)
+        disagreeing = fading_share(belief.disagreeing, found.agreeing, seen.size)
+        if 2 * found.agreeing >= seen.size:
+            return self._used(belief, seen, found, Verdict.USED, disagreeing)
+        predicted = replace(self.predict(belief, seen.time), disagreeing=disagreeing)
+        return self._overruled(predicted, seen, found)
+
+    def _correct(self, belief: Belief, seen: Seen) -> Correction:
+        corrected: Correction = predict_and_correct(
+            belief.T_world_target,
+            belief.velocity,
+            belief.covariance,
+            seen.time - belief.time,
+            self._densities(belief),
+            seen.poses,
+            seen.points,
+            seen.measured,
+            seen.covariance,
+            self.gate * belief.consistency.scale,
+        )
+        return corrected
+
+    def _recorrect(self, belief: Belief, enlarged: float, seen: Seen) -> Correction:
+        """Correct what is predicted already, its covariance so many times larger."""
         corrected: Correction = correct(
             belief.T_world_target,
             belief.velocity,
-            covariance,
-            view.T_camera_world,
-            view.points,
-            view.measured,
-            view.covariance,
-            self.gate * scale,
+            enlarged * belief.covariance,
+            seen.poses,
+            seen.points,
+            seen.measured,
+            seen.covariance,
+            self.gate,
         )
         return corrected
 
     def _used(
         self,
         belief: Belief,
+        seen: Seen,
         found: Correction,
         verdict: Verdict,
         disagreeing: float,
         enlarged: float = 1.0,
     ) -> Update:
-        freedom = 2 * int(np.count_nonzero(found.kept))
-        # One picture counts as if its points were at the gate at most, to be forgotten in time.
+        freedom = 2 * found.agreeing
+        # An exposure counts as if its points were at the gate at most, to be forgotten in time.
         square = min(enlarged * found.square, 0.5 * self.gate * freedom)
         after = Belief(
-            belief.time,
+            seen.time,
             found.T_world_target,
             found.velocity,
             found.covariance,
-            belief.consistency.add(square, freedom, self.fading),
-            seen=belief.time,
+            belief.consistency.add(square, freedom, self.fading**seen.pictures),
+            seen=seen.time,
             disagreeing=disagreeing,
         )
         return Update(after, verdict, found.kept, found.squares)
 
-    def _overruled(self, belief: Belief, view: View, first: Correction) -> Update:
-        """Believe the picture rather than the prediction, if its majority agrees on a pose."""
+    def _overruled(self, belief: Belief, seen: Seen, first: Correction) -> Update:
+        """Believe the pictures rather than the prediction, if their majority agrees on a pose."""
         median = float(np.median(first.squares))
-        needed = max(CONSENSUS, (view.size + 1) // 2)
-        if view.size >= needed and np.isfinite(median):
+        needed = max(CONSENSUS, (seen.size + 1) // 2)
+        if seen.size >= needed and np.isfinite(median):
             enlarged = max(1.0, median / MEDIAN)
-            found = self._correct(belief, enlarged * belief.covariance, view, 1.0)
-            if np.count_nonzero(found.kept) >= needed:
-                update = self._used(belief, found, Verdict.RECOVERED, belief.disagreeing, enlarged)
+            found = self._recorrect(belief, enlarged, seen)
+            if found.agreeing >= needed:
+                disagreeing = belief.disagreeing
+                update = self._used(belief, seen, found, Verdict.RECOVERED, disagreeing, enlarged)
                 return update._replace(squares=first.squares)
         if belief.disagreeing > 0.5:
             belief = replace(belief, covariance=GROWTH * belief.covariance)
-        refused = unused(replace(belief, doubts=belief.doubts + 1), view, Verdict.CONTRADICTED)
+        doubting = replace(belief, doubts=belief.doubts + seen.pictures)
+        refused = unused(doubting, seen.size, Verdict.CONTRADICTED)
         return refused._replace(squares=first.squares)

@@ -8,7 +8,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.estimation.measurement import POSE, mahalanobis_squared, whitened_rows
 from vergence.estimation.motion import correct_pose
-from vergence.estimation.view import View
+from vergence.estimation.view import Seen, View, together
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp
 
 GATE = 13.8  # χ² with 2 degrees of freedom, one in a thousand
@@ -59,8 +59,9 @@ def pose_from_points(views: Sequence[View]) -> PoseFit | NoPose:
     main = max(views, key=lambda view: view.size)
     if main.size < LEAST_POINTS:
         return NoPose(f"{main.size} points in the fullest picture, {LEAST_POINTS} needed")
-    fits = [fit for start in _candidates(main) if (fit := _refine(start, views)) is not None]
-    total = sum(view.size for view in views)
+    seen = together(views)
+    fits = [fit for start in _candidates(main) if (fit := _refine(start, seen)) is not None]
+    total = seen.size
     if not fits:
         return NoPose("no pose explains the points")
     fits.sort(key=lambda fit: (-fit.inliers, fit.square))
@@ -141,11 +142,11 @@ def _perspective_n_point(points: FloatArray, normalized: FloatArray) -> list[Flo
     return poses
 
 
-def _refine(T_world_target: FloatArray, views: Sequence[View], rounds: int = 8) -> _Fit | None:
+def _refine(T_world_target: FloatArray, seen: Seen, rounds: int = 8) -> _Fit | None:
     """Gauss-Newton over the points that agree; at first agreeing as the better three in five do."""
-    pose = T_world_target
+    pose, poses = T_world_target, seen.poses
     for k in range(rounds + 1):
-        rows = np.vstack([_rows(pose, view) for view in views])
+        rows = whitened_rows(pose, poses, seen.points, seen.measured, seen.covariance)
         squares = mahalanobis_squared(rows, np.zeros((POSE, POSE)))
         better = np.sort(squares)[(3 * len(squares)) // 5]
         gate = GATE if k == rounds else max(GATE, 4.0 * better)
@@ -162,10 +163,3 @@ def _refine(T_world_target: FloatArray, views: Sequence[View], rounds: int = 8) 
             correction[:POSE] = np.linalg.solve(information, H.T @ r)
             pose = correct_pose(pose, correction)
     return _Fit(pose, information, inliers, float(r @ r))
-
-
-def _rows(pose: FloatArray, view: View) -> FloatArray:
-    rows: FloatArray = whitened_rows(
-        pose, view.T_camera_world, view.points, view.measured, view.covariance
-    )
-    return rows

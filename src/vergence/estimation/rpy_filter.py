@@ -18,7 +18,7 @@ from vergence.estimation.target_filter import (
     require_finite,
     unused,
 )
-from vergence.estimation.view import View
+from vergence.estimation.view import Seen
 from vergence.geometry import matrix_to_rpy, rpy_rates_to_omega, rpy_to_matrix, se3
 
 PAPER_NOISE = 1e-6 * np.repeat([0.0, 0.0, 5.0, 20.0], 3)  # Q per frame, section V
@@ -129,24 +129,25 @@ class RpyPoseFilter:
         w, P = predict_rpy(belief.vector, belief.vector_covariance, dt, noise)
         return replace(belief, time=time, vector=w, vector_covariance=P)
 
-    def update(self, belief: RpyBelief, view: View) -> Update:
-        """Predict to the exposure of a picture and correct by its points, eq. (11) to (13)."""
-        belief = self.predict(belief, view.time)
-        if view.size == 0:
-            return unused(belief, view, Verdict.EMPTY)
+    def update(self, belief: RpyBelief, seen: Seen) -> Update:
+        """Predict to an exposure and correct by its points, eq. (11) to (13)."""
+        belief = self.predict(belief, seen.time)
+        if seen.size == 0:
+            return unused(belief, seen.size, Verdict.EMPTY)
         w, P = belief.vector, belief.vector_covariance
-        rows = rpy_rows(w, view.T_camera_world, view.points, view.measured, view.covariance)
+        rows = rpy_rows(w, seen.poses, seen.points, seen.measured, seen.covariance)
         squares = mahalanobis_squared(rows, P)
         kept = np.isfinite(squares) & (squares <= self.gate)
-        disagreeing = fading_share(belief.disagreeing, kept)
+        count = int(np.count_nonzero(kept))
+        disagreeing = fading_share(belief.disagreeing, count, seen.size)
         belief = replace(belief, disagreeing=disagreeing)
-        if not kept.any():
-            doubting = replace(belief, doubts=belief.doubts + 1)
-            return unused(doubting, view, Verdict.CONTRADICTED)._replace(squares=squares)
+        if not count:
+            doubting = replace(belief, doubts=belief.doubts + seen.pictures)
+            return unused(doubting, seen.size, Verdict.CONTRADICTED)._replace(squares=squares)
         rows = keep_rows(rows, kept)
         rest = compress(rows)
         correction, P, square = joseph_update(P, rows)
-        freedom = 2 * int(np.count_nonzero(kept))
-        consistency = belief.consistency.add(square + rest, freedom, self.fading)
-        after = RpyBelief(view.time, w + correction, P, consistency, view.time, 0, disagreeing)
+        fading = self.fading**seen.pictures
+        consistency = belief.consistency.add(square + rest, 2 * count, fading)
+        after = RpyBelief(seen.time, w + correction, P, consistency, seen.time, 0, disagreeing)
         return Update(after, Verdict.USED, kept, squares)

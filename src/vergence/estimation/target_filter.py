@@ -1,5 +1,6 @@
 """What every filter of a target's pose offers, and what it says about a picture."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -8,7 +9,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray
 from vergence.errors import InputError
 from vergence.estimation.consistency import Consistency
-from vergence.estimation.view import View
+from vergence.estimation.view import Seen, View
 from vergence.features import TargetState
 
 
@@ -70,7 +71,7 @@ B = TypeVar("B", bound=TargetBelief)
 
 
 class Update(NamedTuple):
-    """The belief after a picture, and what was made of the picture."""
+    """The belief after the pictures of one exposure, and what was made of them."""
 
     belief: Any  # of the filter's own kind
     verdict: Verdict
@@ -95,26 +96,48 @@ class TargetFilter(Protocol[B]):
         """Return the belief at another time."""
         ...
 
-    def update(self, belief: B, view: View) -> Update:
-        """Predict to the exposure of a picture and correct by its points."""
+    def update(self, belief: B, seen: Seen) -> Update:
+        """Predict to an exposure and correct by its points, of one picture or of several."""
         ...
 
 
-def unused(belief: TargetBelief, view: View, verdict: Verdict) -> Update:
-    """Return the update by a picture of which nothing was used."""
-    return Update(belief, verdict, np.zeros(view.size, np.bool_), np.full(view.size, np.nan))
+def unused(belief: TargetBelief, size: int, verdict: Verdict) -> Update:
+    """Return the update by so many points of which none was used."""
+    return Update(belief, verdict, np.zeros(size, np.bool_), np.full(size, np.nan))
 
 
-def fading_share(share: float, kept: BoolArray, fading: float = 0.93) -> float:
-    """Return the share of points outside the gate with those of one more picture, (M,).
+def of_each_picture(update: Update, views: Sequence[View]) -> list[Update]:
+    """Return what an update by several pictures made of each.
+
+    A picture without a point contributed nothing; one of whose points none was kept, while others
+    were, contradicts them.
+    """
+    if len(views) == 1:
+        return [update]
+    parts, start = [], 0
+    for view in views:
+        own = slice(start, start + view.size)
+        kept, verdict = update.kept[own], update.verdict
+        if view.size == 0:
+            verdict = Verdict.EMPTY
+        elif not kept.any():
+            verdict = Verdict.CONTRADICTED
+        parts.append(Update(update.belief, verdict, kept, update.squares[own]))
+        start += view.size
+    return parts
+
+
+def fading_share(share: float, kept: int, count: int, fading: float = 0.93) -> float:
+    """Return the share of points outside the gate, with those of one more exposure.
 
     Args:
         share: before.
-        kept: points that passed the gate.
+        kept: how many points of the exposure passed the gate.
+        count: how many there were, above zero.
         fading: weight of the past for each point; 0.93 looks back over some thirty points.
     """
-    weight = fading ** len(kept)
-    return weight * share + (1.0 - weight) * (1.0 - np.count_nonzero(kept) / len(kept))
+    weight: float = fading**count
+    return weight * share + (1.0 - weight) * (1.0 - kept / count)
 
 
 def require_covariance(covariance: FloatArray, source: str) -> None:

@@ -1,5 +1,6 @@
 """What one picture says, in the form the filters take it in."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,51 @@ class View(NamedTuple):
     def size(self) -> int:
         """How many points there are."""
         return len(self.points)
+
+    @property
+    def pictures(self) -> int:
+        """How many pictures have points: this one or none."""
+        return 1 if len(self.points) else 0
+
+    @property
+    def poses(self) -> FloatArray:
+        """T_camera_world for each point, (M, 4, 4)."""
+        return np.repeat(self.T_camera_world[None], len(self.points), axis=0)
+
+
+class Exposure(NamedTuple):
+    """The points of all pictures taken at one time, one after the other."""
+
+    time: float  # s
+    pictures: int  # how many of them have points
+    poses: FloatArray  # (M, 4, 4) T_camera_world of each point's camera
+    points: FloatArray  # (M, 3) in the target's frame, m
+    measured: FloatArray  # (M, 2) normalized coordinates
+    covariance: FloatArray  # (M, 2, 2) of `measured`, positive definite
+
+    @property
+    def size(self) -> int:
+        """How many points there are."""
+        return len(self.points)
+
+
+Seen = View | Exposure  # what a filter takes in
+
+
+def together(views: Sequence[View]) -> Seen:
+    """Put the points of pictures one after the other, as if all were taken when the first was."""
+    filled = [view for view in views if view.size]
+    if len(filled) < 2:
+        return filled[0] if filled else views[0]
+    cameras = np.array([view.T_camera_world for view in filled])
+    return Exposure(
+        filled[0].time,
+        len(filled),
+        np.repeat(cameras, [view.size for view in filled], axis=0),
+        np.concatenate([view.points for view in filled]),
+        np.concatenate([view.measured for view in filled]),
+        np.concatenate([view.covariance for view in filled]),
+    )
 
 
 def view_of(
