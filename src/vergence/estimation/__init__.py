@@ -17,7 +17,7 @@ from vergence.estimation.selection import Candidates, InformationSelection, Sele
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.tracked_points import TrackedPoints
-from vergence.estimation.view import View, view_of
+from vergence.estimation.view import Exposure, Seen, View, view_of
 from vergence.estimation.visibility import (
     Blocked,
     Sight,
@@ -35,6 +35,7 @@ __all__ = [
     "Candidates",
     "Consistency",
     "ExactPoints",
+    "Exposure",
     "FilterHistory",
     "Find",
     "IndexSelection",
@@ -48,6 +49,7 @@ __all__ = [
     "PosePerception",
     "RpyBelief",
     "RpyPoseFilter",
+    "Seen",
     "Selection",
     "Sight",
     "TargetBelief",
