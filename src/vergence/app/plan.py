@@ -69,11 +69,14 @@ def _planned(
 ) -> "PlannedPath | PlanFailure | TwoViewFailure":
     """Look at the object twice and plan."""
     from vergence.cell import SimulatedDriver
+    from vergence.planning import PlanFailure
     from vergence.runtime.assembly.reach import look_twice, plan_reach
 
     driver = SimulatedDriver(cell, images)
     try:
         pictures = look_twice(cell, task, driver, images)
+        if isinstance(pictures, PlanFailure):
+            return pictures
         return plan_reach(cell, task, driver, pictures)
     finally:
         driver.close()

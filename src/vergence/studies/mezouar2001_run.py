@@ -13,7 +13,7 @@ from vergence.cell.schema import ReachTable
 from vergence.errors import VergenceError
 from vergence.geometry import se3_inverse, so3_log
 from vergence.outcome import Outcome
-from vergence.planning import Path, PotentialFieldPlanner, Trajectory
+from vergence.planning import Path, PlanFailure, PotentialFieldPlanner, Trajectory
 from vergence.runtime import run_cell
 from vergence.runtime.assembly.reach import look_twice, plan_reach
 from vergence.runtime.recording import RunInfo, TickRecord
@@ -133,6 +133,8 @@ def plan_section6(cell: Cell, images: bool) -> Section6:
     driver = SimulatedDriver(cell, images)
     try:
         pictures = look_twice(cell, task, driver, images)
+        if isinstance(pictures, PlanFailure):
+            raise VergenceError(f"{cell.name}: {pictures}")
         plans = {
             name: plan_reach(cell, task.model_copy(update={"planner": planner}), driver, pictures)
             for name, planner in PLANNERS.items()

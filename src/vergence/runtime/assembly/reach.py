@@ -5,14 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Frame
 from vergence.cell import Cell, SimulatedDriver
 from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
-from vergence.errors import InputError
 from vergence.estimation import ExactPoints, TrackedPoints
 from vergence.outcome import Outcome, OutcomeKind
-from vergence.planning.failure import PlanFailure
+from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
@@ -40,6 +38,8 @@ def reach_parts(
 ) -> Parts | Outcome:
     """Put together what plans a path in the image and tracks it; or why there is none."""
     pictures = look_twice(cell, task, driver, images)
+    if isinstance(pictures, PlanFailure):
+        return pictures.outcome(0.0)
     plan = plan_reach(cell, task, driver, pictures)
     if isinstance(plan, TwoViewFailure):
         return Outcome(OutcomeKind.INFEASIBLE, str(plan), 0.0)
@@ -75,23 +75,30 @@ def plan_reach(
     return PotentialFieldPlanner().plan(problem)
 
 
-def look_twice(cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool) -> TwoPictures:
+def look_twice(
+    cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool
+) -> TwoPictures | PlanFailure:
     """Measure the marks from the start and from where the desired picture was taken.
 
     Which mark is which in the two pictures is taken from the simulation, to the nearest pixel, as a
     person would click on them; where they are is measured.
 
+    Returns:
+        The two pictures, or which mark is out of sight in one of them.
+
     Raises:
-        InputError: if a mark is out of sight in either picture.
+        InputError: if the arm cannot stand at the goal's joint positions.
     """
     arm = driver.arms[task.arm]
     goal = joint_positions(cell, "task.goal_deg", task.goal_deg, arm)
     now = driver.first_frame(task.camera)
     then = driver.frame_at(task.camera, task.arm, goal)
-    _require_sight(cell, now, "the start")
-    _require_sight(cell, then, "task.goal_deg")
     assert now.truth is not None
     assert then.truth is not None
+    for where, picture in (("the start", now.truth), ("task.goal_deg", then.truth)):
+        if not picture.visible.all():
+            mark = int(np.flatnonzero(~picture.visible)[0]) + 1
+            return _unseen(task.camera, mark, where, "out of sight")
     if not images:
         rng = np.random.default_rng([cell.seed, 3])
         perception = ExactPoints(task.camera, rng=rng)
@@ -101,17 +108,13 @@ def look_twice(cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bo
     tracker = MarkTracker(now.image, np.round(now.truth.points_px))
     seen = tracker.track(now.image, now.truth.points_px)
     wanted = MarkTracker(then.image, np.round(then.truth.points_px)).track(then.image)
-    for picture, tracks in (("the start", seen), ("task.goal_deg", wanted)):
+    for where, tracks in (("the start", seen), ("task.goal_deg", wanted)):
         if not tracks:
             mark = int(np.flatnonzero(~tracks.found)[0])
-            given = f"mark {mark + 1} is not found from {picture}: {tracks.reasons[mark]}"
-            raise InputError(str(cell.path), "target", given, "marks that can be measured")
+            return _unseen(task.camera, mark + 1, where, tracks.reasons[mark])
     return TwoPictures(seen.points_px, wanted.points_px, TrackedPoints(task.camera, tracker))
 
 
-def _require_sight(cell: Cell, frame: Frame, where: str) -> None:
-    assert frame.truth is not None
-    if not frame.truth.visible.all():
-        hidden = ", ".join(str(j + 1) for j in np.flatnonzero(~frame.truth.visible))
-        given = f"camera {frame.camera} does not see feature {hidden} from {where}"
-        raise InputError(str(cell.path), "target", given, "poses from which all are in sight")
+def _unseen(camera: str, mark: int, where: str, why: str) -> PlanFailure:
+    obstacle = Obstacle.START if where == "the start" else Obstacle.VISIBILITY
+    return PlanFailure(obstacle, f"camera {camera} does not see mark {mark} from {where}: {why}")
