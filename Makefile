@@ -42,7 +42,7 @@ demo: setup
 	$(BIN)/vergence run puma560
 
 test: setup test-images
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
 lint: lint-format lint-rules lint-types
 
