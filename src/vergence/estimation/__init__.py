@@ -7,7 +7,8 @@ from vergence.estimation.extrapolation import extrapolate
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure
-from vergence.estimation.perception import PerceptionSettings, PosePerception
+from vergence.estimation.perception import PosePerception
+from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.pose_filter import PoseFilter
 from vergence.estimation.recovery import NoPose, PoseFit, pose_from_points
 from vergence.estimation.rig import CameraRig

@@ -1,8 +1,7 @@
 """The inner circle of perception: predict, see, choose, open windows, measure, update."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Generic, NamedTuple
+from typing import Generic
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Frame
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
+from vergence.estimation.looks import Expected, Look, Picture
 from vergence.estimation.measure import (
     CameraPose,
     Find,
@@ -19,6 +19,7 @@ from vergence.estimation.measure import (
     nothing_measured,
     spread_out,
 )
+from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import HEIGHT, WIDTH, CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
@@ -37,51 +38,6 @@ from vergence.geometry import se3_compose, se3_inverse, transform_points
 
 DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
 JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
-
-
-@dataclass(frozen=True, slots=True)
-class PerceptionSettings:
-    """How the inner circle looks."""
-
-    budget: int = 8  # features measured a tick, over all cameras
-    budget_in_doubt: int = 32  # the same while the filter is inconsistent
-    doubt_widens: float = 4.0  # windows by 1 + this · share of the last points that disagreed
-    margin_px: float = 8.0  # from the border of a picture
-    least_cosine: float = 0.1  # between a face's normal and the line of sight
-    horizon: float = 0.5  # s, how late a picture may arrive
-    lost_after: float = 1.0  # s without a picture that was used
-    lost_doubts: int = 8  # contradicting pictures in a row
-
-
-class _Expected(NamedTuple):
-    """What is expected at an exposure."""
-
-    T_world_target: FloatArray  # (4, 4) predicted
-    covariance: FloatArray  # (12, 12) of that prediction
-    doubt: float  # share of the last points that disagreed
-    certain: bool  # whether the filter is consistent
-
-
-class _Picture(NamedTuple):
-    """A picture with what is expected of it."""
-
-    frame: Frame
-    number: int  # of its camera in the rig
-    T_world_camera: FloatArray  # (4, 4)
-    T_camera_world: FloatArray  # (4, 4)
-    T_world_target: FloatArray  # (4, 4) predicted for the exposure
-    covariance: FloatArray  # (12, 12) of that prediction
-    doubt: float  # share of the last points that disagreed
-    certain: bool  # whether the filter is consistent
-
-
-class _Look(NamedTuple):
-    """What was measured in a picture."""
-
-    number: int  # of the picture
-    features: IntArray  # (K,) chosen, one at least
-    found: ImagePoints  # K points
-    view: View  # of those that are usable
 
 
 class PosePerception(Generic[B]):
@@ -181,19 +137,19 @@ class PosePerception(Generic[B]):
         points = self._points(pictures, visibility, looks, agreeing)
         return Observation(time, points, None if self._lost else self.belief.state())
 
-    def _expected(self, time: float) -> _Expected:
+    def _expected(self, time: float) -> Expected:
         belief = self._last_seen if self._lost else self._history.at(time)
         doubt = belief.disagreeing
         certain = belief.consistency.holds and doubt < DOUBT
-        return _Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
+        return Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
 
-    def _expect(self, frame: Frame, expected: _Expected) -> _Picture:
+    def _expect(self, frame: Frame, expected: Expected) -> Picture:
         require_size(frame, self._rig)
         number = self._rig.numbers[frame.camera]
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
-        return _Picture(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
+        return Picture(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
 
-    def _see(self, pictures: list[_Picture]) -> Visibility:
+    def _see(self, pictures: list[Picture]) -> Visibility:
         T_camera_target = np.array(
             [se3_compose(p.T_camera_world, p.T_world_target) for p in pictures]
         )
@@ -211,7 +167,7 @@ class PosePerception(Generic[B]):
                 add_obstacles(sight, blocked, p.T_world_camera[:3, 3], world)
         return visibility
 
-    def _choose(self, pictures: list[_Picture], visibility: Visibility) -> BoolArray:
+    def _choose(self, pictures: list[Picture], visibility: Visibility) -> BoolArray:
         if self._lost:
             return visibility.visible
         none = np.zeros(len(self._shape.points), dtype=np.bool_)
@@ -234,7 +190,7 @@ class PosePerception(Generic[B]):
             self._held[picture.frame.camera] = mask
         return chosen
 
-    def _look(self, picture: _Picture, n: int, chosen: BoolArray, expected: FloatArray) -> _Look:
+    def _look(self, picture: Picture, n: int, chosen: BoolArray, expected: FloatArray) -> Look:
         """Measure the features chosen inside windows."""
         features = np.flatnonzero(chosen)
         found = self._measure(
@@ -246,9 +202,9 @@ class PosePerception(Generic[B]):
         )
         camera = self._rig.cameras[picture.number]
         view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
-        return _Look(n, features, found, view)
+        return Look(n, features, found, view)
 
-    def _correct(self, looks: list[_Look]) -> list[IntArray]:
+    def _correct(self, looks: list[Look]) -> list[IntArray]:
         """Correct the pose by all pictures; return which features of each agree with it."""
         if self._lost or not looks:
             return [look.view.features for look in looks]
@@ -260,9 +216,9 @@ class PosePerception(Generic[B]):
 
     def _points(
         self,
-        pictures: list[_Picture],
+        pictures: list[Picture],
         visibility: Visibility,
-        looks: list[_Look],
+        looks: list[Look],
         agreeing: list[IntArray],
     ) -> tuple[ImagePoints, ...]:
         """Say what became of every feature; of a target that is lost, none is found."""
@@ -282,7 +238,7 @@ class PosePerception(Generic[B]):
         every = (points[n] for n in range(len(pictures)))
         return tuple(nothing_found(p, self._lost) for p in every) if self._lost else tuple(every)
 
-    def _half_sizes(self, picture: _Picture, features: IntArray) -> FloatArray:
+    def _half_sizes(self, picture: Picture, features: IntArray) -> FloatArray:
         if self._lost:
             return np.full((len(features), 2), self._windows.most_px)
         spread = innovation_spread(

@@ -1,0 +1,39 @@
+"""What the inner circle keeps of a picture while it works on it."""
+
+from typing import NamedTuple
+
+from vergence.arrays import FloatArray, IntArray
+from vergence.camera import Frame
+from vergence.estimation.view import View
+from vergence.features import ImagePoints
+
+
+class Expected(NamedTuple):
+    """What is expected at an exposure."""
+
+    T_world_target: FloatArray  # (4, 4) predicted
+    covariance: FloatArray  # (12, 12) of that prediction
+    doubt: float  # share of the last points that disagreed
+    certain: bool  # whether the filter is consistent
+
+
+class Picture(NamedTuple):
+    """A picture with what is expected of it."""
+
+    frame: Frame
+    number: int  # of its camera in the rig
+    T_world_camera: FloatArray  # (4, 4)
+    T_camera_world: FloatArray  # (4, 4)
+    T_world_target: FloatArray  # (4, 4) predicted for the exposure
+    covariance: FloatArray  # (12, 12) of that prediction
+    doubt: float  # share of the last points that disagreed
+    certain: bool  # whether the filter is consistent
+
+
+class Look(NamedTuple):
+    """What was measured in a picture."""
+
+    number: int  # of the picture
+    features: IntArray  # (K,) chosen, one at least
+    found: ImagePoints  # K points
+    view: View  # of those that are usable
