@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.cell import Cell, load_cell
 from vergence.studies import lippiello2005_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, within
-from vergence.studies.lippiello2005_cost import BUDGET, Cost, measure_cost
+from vergence.studies.lippiello2005_cost import BUDGET, Cost, measure_costs
 from vergence.studies.lippiello2005_trials import (
     BLIND_S,
     FIXED,
@@ -58,7 +58,7 @@ def reproduce(
         _outliers(trials),
         _singular_pitch(pitch),
         _four_features(trials),
-        *_cost(measure_cost(cell, 2), measure_cost(cell, 64)),
+        *_cost(*measure_costs(cell, (2, 64))),
     ]
     progress("figures", 0.97)
     return StudyResult(TITLE, tuple(checks), figures.draw(out, trials))
@@ -176,19 +176,19 @@ def _slave(trials: Trials) -> list[Check]:
         ),
         Check(
             "slave.paper_position_error_max_m",
-            delayed,
+            f"{delayed}; aim at 0.017",
             paper_m,
             "m",
-            paper_m > paper.position().max(),
-            f"the paper's settings; {'within' if paper_m <= 0.017 else 'beyond'} 0.017",
+            paper_m > paper.position().max() and within(paper_m, 0.0, 0.017),
+            "the paper's settings",
         ),
         Check(
             "slave.paper_orientation_error_max_deg",
-            delayed,
+            f"{delayed}; aim at 2.5",
             paper_deg,
             "deg",
-            paper_deg > paper.orientation_deg().max(),
-            f"the paper's settings; {'within' if paper_deg <= 2.5 else 'beyond'} 2.5",
+            paper_deg > paper.orientation_deg().max() and within(paper_deg, 0.0, 2.5),
+            "the paper's settings",
         ),
     ]
 

@@ -1,13 +1,12 @@
 """What a tick of perception costs as cameras are added, [Lippiello2005] sections I and IV."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vergence.camera import Frame
 from vergence.cell import Cell, SimulatedDriver
 from vergence.estimation import (
     CameraRig,
@@ -61,50 +60,55 @@ class _TimedFilter:
         self.update = watch.timed(self._filter.update)
 
 
-def measure_cost(cell: Cell, count: int) -> Cost:
-    """Time perception with many cameras at a fixed budget of features.
-
-    The cameras are copies of the cell's fixed one, which all look at one rendered picture.
+class _TimedPerception:
+    """Perception with copies of one camera, which all look at the same picture.
 
     Args:
         cell: with a camera `fixed`.
+        driver: of that cell.
         count: how many copies.
+    """
+
+    def __init__(self, cell: Cell, driver: SimulatedDriver, count: int) -> None:
+        model = target_shape(cell, driver)
+        driver.look_for(model.corners)
+        T_world_camera = driver.world.camera_pose("fixed")
+        self._picture = driver.first_frame("fixed")
+        self._names = [f"camera {n}" for n in range(count)]
+        self._extraction, self._update = _Stopwatch(), _Stopwatch()
+        cameras = dict.fromkeys(self._names, driver.cameras["fixed"])
+        timed: Any = _TimedFilter(self._update)
+        self._perception: PosePerception[Any] = PosePerception(
+            CameraRig.of(cameras, cell.perception.noise_px),
+            TargetShape.from_mesh(model.corners, model.vertices, model.triangles),
+            lambda _camera, _joints: T_world_camera,
+            self._extraction.timed(CornerWindows(model, cameras)),
+            timed,
+            timed.start(0.0, driver.world.target_pose()),
+            settings=PerceptionSettings(budget=BUDGET, budget_in_doubt=BUDGET),
+        )
+
+    def tick(self, k: int) -> Cost:
+        """Look at the k-th picture with every camera."""
+        frames = [replace(self._picture, camera=name, time=k / 26.0) for name in self._names]
+        began = perf_counter()
+        self._perception.observe(frames)
+        return Cost(self._extraction.lap(), self._update.lap(), perf_counter() - began)
+
+
+def measure_costs(cell: Cell, counts: Sequence[int]) -> tuple[Cost, ...]:
+    """Time perception with several numbers of cameras at a fixed budget of features.
+
+    They take turns tick by tick, so that whatever else the machine does falls on all of them alike.
+
+    Args:
+        cell: with a camera `fixed`.
+        counts: how many copies of that camera.
     """
     driver = SimulatedDriver(cell.replace(perception={"cameras": ["fixed"]}))
     try:
-        model = target_shape(cell, driver)
-        driver.look_for(model.corners)
-        picture = driver.first_frame("fixed")
-        T_world_camera = driver.world.camera_pose("fixed")
-        T_world_target = driver.world.target_pose()
-        names = [f"camera {n}" for n in range(count)]
-        cameras = dict.fromkeys(names, driver.cameras["fixed"])
+        rivals = [_TimedPerception(cell, driver, count) for count in counts]
     finally:
         driver.close()
-    extraction, update = _Stopwatch(), _Stopwatch()
-    timed: Any = _TimedFilter(update)
-    perception = PosePerception(
-        CameraRig.of(cameras, cell.perception.noise_px),
-        TargetShape.from_mesh(model.corners, model.vertices, model.triangles),
-        lambda _camera, _joints: T_world_camera,
-        extraction.timed(CornerWindows(model, cameras)),
-        timed,
-        timed.start(0.0, T_world_target),
-        settings=PerceptionSettings(budget=BUDGET, budget_in_doubt=BUDGET),
-    )
-    laps = [_tick(perception, picture, names, k, extraction, update) for k in range(_TICKS)]
-    return Cost(*np.median(laps[_TICKS // 4 :], axis=0))
-
-
-def _tick(
-    perception: PosePerception[Any],
-    picture: Frame,
-    names: list[str],
-    k: int,
-    extraction: _Stopwatch,
-    update: _Stopwatch,
-) -> Cost:
-    frames = [replace(picture, camera=name, time=k / 26.0) for name in names]
-    began = perf_counter()
-    perception.observe(frames)
-    return Cost(extraction.lap(), update.lap(), perf_counter() - began)
+    laps = np.array([[rival.tick(k) for rival in rivals] for k in range(_TICKS)])
+    return tuple(Cost(*medians) for medians in np.median(laps[_TICKS // 4 :], axis=0))
