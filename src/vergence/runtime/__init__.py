@@ -4,7 +4,7 @@ from vergence.runtime.assembly import Parts, assemble_parts, build_law
 from vergence.runtime.driver import Driver
 from vergence.runtime.loop import Loop, Patience
 from vergence.runtime.recording import Listener, Recorder, Recording, TickRecord
-from vergence.runtime.session import RunResult, run_cell
+from vergence.runtime.run_cell import RunResult, run_cell
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.summary import Summary
 

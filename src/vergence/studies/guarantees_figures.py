@@ -21,7 +21,7 @@ def draw(out: Path, ends: Counter[tuple[str, str]], singular: FloatArray) -> tup
         singular: rows of time (s), smallest singular value, error (px), (K, 3).
     """
     drawn = {
-        "ends": (_ends(ends), "How random runs end, law by law; none passed a joint limit."),
+        "ends": (_ends(ends), "How random runs end, law by law."),
         "singularity": (_singular(singular), "Through the wrist's singularity with the target."),
     }
     return save_figures(out, drawn)
@@ -41,6 +41,7 @@ def _ends(ends: Counter[tuple[str, str]]) -> Any:
         left = [a + b for a, b in zip(left, share, strict=True)]
     axes.set_xlabel("runs (%)")
     axes.set_xlim(0, 100)
+    axes.set_axisbelow(True)
     axes.grid(visible=False, axis="y")
     legend(axes)
     return drawing

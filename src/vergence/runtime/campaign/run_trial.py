@@ -5,7 +5,7 @@ from vergence.outcome import OutcomeKind
 from vergence.runtime.campaign.source import CellSource
 from vergence.runtime.campaign.trace import TrialTrace
 from vergence.runtime.campaign.trial import Ending, Trial, TrialResult
-from vergence.runtime.session import run_cell
+from vergence.runtime.run_cell import run_cell
 
 
 def run_trial(source: CellSource, trial: Trial, tolerance_px: float) -> TrialResult:
