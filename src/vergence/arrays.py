@@ -35,16 +35,3 @@ def frozen(
             raise ShapeError(name, array.shape, shape)
     array.flags.writeable = False
     return array
-
-
-def frozen_mask(values: ArrayLike, length: int, name: str = "mask") -> BoolArray:
-    """Copy values into a read-only boolean array of the given length.
-
-    Raises:
-        ShapeError: if the length differs.
-    """
-    array = np.array(values, dtype=np.bool_)
-    if array.shape != (length,):
-        raise ShapeError(name, array.shape, (length,))
-    array.flags.writeable = False
-    return array

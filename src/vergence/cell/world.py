@@ -90,10 +90,6 @@ class World:
         """Return T_world_target (4, 4), as of the last `update`."""
         return self._body_pose(self._target)
 
-    def last_body_pose(self, arm: str) -> FloatArray:
-        """Return T_world_body (4, 4) of an arm's last body, as of the last `update`."""
-        return self._body_pose(self.model.body(f"{arm}/{self.cell.arms[arm].body}").id)
-
     def move_target(self, T_world_target: FloatArray) -> None:
         """Put the target somewhere; it takes effect with the next step or `update`.
 

@@ -9,6 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.control import Guard, InnerLaw, JointCommand, Law
 from vergence.features import ImagePoints, Observation
 from vergence.outcome import Outcome, OutcomeKind
+from vergence.planning import Reference
 from vergence.robot import Sample
 from vergence.runtime.driver import Driver
 from vergence.runtime.recording import Listener, TickRecord
@@ -116,21 +117,21 @@ class Loop:
                 waited = time - self._last_picture
                 reason = f"no picture for {waited:.2f} s"
                 return None, Outcome(OutcomeKind.IMAGE_LATE, reason, time)
-            self._record(sample, None, self._last_command)
+            self._record(sample, None, self._planner.reference(time), self._last_command)
             return self._last_command, None
         self._last_picture = time
         self._report_losses(time, observation)
-        if not (observation.target or any(view.found.any() for view in observation.views)):
+        reference = self._planner.reference(observation.time)
+        if not _shows_target(observation):
             self._last_command = None
-            self._record(sample, observation, None)
+            self._record(sample, observation, reference, None)
             if time - self._last_seen > self._patience.target_s:
                 return None, Outcome(OutcomeKind.TARGET_LOST, _why_lost(observation), time)
             return None, None
         self._last_seen = time
-        reference = self._planner.reference(observation.time)
         command = self._law.command(observation, reference, sample.joints[self._arm])
         self._last_command = command
-        self._record(sample, observation, command)
+        self._record(sample, observation, reference, command)
         if command.fault is not None:
             return None, Outcome(*command.fault, time)
         return command, None
@@ -170,19 +171,19 @@ class Loop:
             self._inner_tick += 1
 
     def _record(
-        self, sample: Sample, observation: Observation | None, command: JointCommand | None
+        self,
+        sample: Sample,
+        observation: Observation | None,
+        reference: Reference,
+        command: JointCommand | None,
     ) -> None:
-        if not self._listeners:
-            return
-        seen_at = sample.time if observation is None else observation.time
-        reference = self._planner.reference(seen_at)
         commands = {} if command is None else {self._arm: command}
         record = TickRecord(sample.time, sample, observation, reference, commands)
         for listener in self._listeners:
             listener.tick(record)
 
     def _report_losses(self, time: float, observation: Observation) -> None:
-        lost = not (observation.target or any(view.found.any() for view in observation.views))
+        lost = not _shows_target(observation)
         if lost != self._target_lost:
             self._target_lost = lost
             text = _why_lost(observation) if lost else "it is back"
@@ -201,6 +202,10 @@ class Loop:
     def _tell(self, time: float, name: str, text: str) -> None:
         for listener in self._listeners:
             listener.event(time, name, text)
+
+
+def _shows_target(observation: Observation) -> bool:
+    return bool(observation.target) or any(view.found.any() for view in observation.views)
 
 
 def _why_lost(observation: Observation) -> str:
