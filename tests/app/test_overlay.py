@@ -5,13 +5,19 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence.app.overlay import Marks, draw
+from vergence.features import SearchWindows
 
 NOWHERE = np.full((1, 2), np.nan)
 GREY = np.full((80, 100), 128, dtype=np.uint8)
 
 
 def marks(tracked: object = NOWHERE, found: bool = True, **others: object) -> Marks:
-    points = {"desired_px": NOWHERE, "true_px": NOWHERE} | others
+    points = {
+        "asked": np.array([True]),
+        "windows": SearchWindows(NOWHERE, NOWHERE),
+        "desired_px": NOWHERE,
+        "true_px": NOWHERE,
+    } | others
     return Marks(np.asarray(tracked), np.array([found]), **points)
 
 
@@ -40,6 +46,30 @@ def test_a_mark_is_centred_on_its_point_to_a_quarter_of_a_pixel(
     np.testing.assert_allclose(centre, point, atol=0.25)
 
 
+@pytest.mark.parametrize("width", [60, 100, 300])
+@pytest.mark.parametrize("point", [(50.0, 40.0), (50.5, 40.25), (31.8, 32.3)])
+def test_the_edges_of_a_window_are_where_they_should_be(
+    width: int, point: tuple[float, float]
+) -> None:
+    center, half = np.array(point), np.array([20.0, 12.0])
+    windows = SearchWindows(center[None], half[None])
+    ink = np.abs(draw(GREY, marks(windows=windows), width).astype(float) - 128).sum(axis=2)
+    row, column = (round((point[k] + 0.5) * width / 100 - 0.5) for k in (1, 0))
+    for profile, axis in ((ink[row], 0), (ink[:, column], 1)):
+        place = (center[axis] + 0.5) * width / 100 - 0.5
+        along = np.arange(len(profile))
+        for sign in (-1, 1):
+            part = profile * (sign * (along - place) > 0)
+            edge = (along * part).sum() / part.sum()
+            expected = (center[axis] + sign * half[axis] + 0.5) * width / 100 - 0.5
+            assert abs(edge - expected) < 0.25
+
+
+def test_points_not_looked_for_stand_where_they_are_expected() -> None:
+    canvas = draw(GREY, marks([[50.0, 40.0]], found=False, asked=np.array([False])))
+    np.testing.assert_allclose(drawn_centre(canvas, 100), (50.0, 40.0), atol=0.25)
+
+
 def test_unknown_points_are_not_drawn() -> None:
     canvas = draw(GREY, marks(), 200)
     assert canvas.shape == (160, 200, 3)
@@ -59,3 +89,9 @@ def test_the_picture_itself_is_left_alone() -> None:
 def test_found_and_lost_points_look_different() -> None:
     at = [[50.0, 40.0]]
     assert (draw(GREY, marks(at)) != draw(GREY, marks(at, found=False))).any()
+
+
+def test_a_point_nobody_looked_for_does_not_look_lost() -> None:
+    at = [[50.0, 40.0]]
+    lost, unasked = marks(at, found=False), marks(at, found=False, asked=np.array([False]))
+    assert (draw(GREY, lost) != draw(GREY, unasked)).any()

@@ -9,7 +9,7 @@ import pytest
 from vergence.camera import Camera, Frame, FrameTruth
 from vergence.control import JointCommand
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation, TargetState
+from vergence.features import ImagePoints, Observation, SearchWindows, TargetState
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import JointState
@@ -41,6 +41,7 @@ def record_at(time: float, rng: np.random.Generator) -> TickRecord:
         rng.normal(size=(2, 2, 2)),
         np.array([True, False]),
         ("", "left the picture"),
+        SearchWindows(np.array([[1.0, 2.0], [np.nan] * 2]), np.array([[8.0, 9.0], [np.nan] * 2])),
     )
     target = TargetState(time, pose, rng.normal(size=6), rng.normal(size=(12, 12)), True)
     command = JointCommand(rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",))
@@ -104,6 +105,9 @@ def test_points_of_a_camera_read_back_exactly(tmp_path: Path, records: list[Tick
     np.testing.assert_array_equal(camera.T_world_target, [truth.T_world_target for truth in truths])
     assert set(camera.reasons) == {("", "left the picture")}
     np.testing.assert_array_equal(camera.found, [view.found for view in views])
+    np.testing.assert_array_equal(camera.asked, [view.asked for view in views])
+    np.testing.assert_array_equal(camera.window_center_px, [view.windows[0] for view in views])
+    np.testing.assert_array_equal(camera.window_half_px, [view.windows[1] for view in views])
 
 
 def test_errors_count_only_where_a_point_was_found(
@@ -202,6 +206,7 @@ def test_a_changing_number_of_points_is_filled_up(tmp_path: Path, rng: np.random
     wall = Recording.open(tmp_path).cameras["wall"]
     assert wall.points_px.shape == (2, 3, 2)
     np.testing.assert_array_equal(wall.found.sum(axis=1), [1, 3])
+    np.testing.assert_array_equal(wall.asked, wall.found)  # no windows: all were looked for
     np.testing.assert_array_equal(np.isnan(wall.points_px[..., 0]).sum(axis=1), [2, 0])
 
 

@@ -1,9 +1,10 @@
-"""Draws what was tracked, wanted and true into a camera's picture.
+"""Draws what was looked for, tracked, wanted and true into a camera's picture.
 
 Pixel centres are at integers, here as everywhere; marks are placed to better than a
 quarter of a pixel, which is what OpenCV's lines allow.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.features import SearchWindows
 from vergence.runtime.recording import CameraTrace
 
 # Blue, green, red: Okabe and Ito's hues, brightened to stand out from grey textures.
@@ -18,10 +20,13 @@ FOUND = (150, 230, 20)
 LOST = (10, 110, 255)
 DESIRED = (66, 228, 240)
 TRUE = (255, 200, 100)
+WINDOW = (235, 235, 235)
+UNASKED = (170, 170, 170)
 _OUTLINE = (20, 20, 20)
 _SHIFT = 4  # fractional bits of a place
-_RADIUS_PX = 8.0
+_RADIUS_PX, _SMALL_PX = 8.0, 2.5
 _THICK, _THIN = 4, 2  # px, of outline and ink
+_FINE = 1  # px, of a window's frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +35,8 @@ class Marks:
 
     tracked_px: FloatArray  # (M, 2)
     found: BoolArray  # (M,)
+    asked: BoolArray  # (M,) whether it was looked for
+    windows: SearchWindows  # around the predicted places
     desired_px: FloatArray  # (M, 2)
     true_px: FloatArray  # (M, 2)
 
@@ -38,7 +45,12 @@ class Marks:
         """Return the marks of the picture nearest to a time of exposure."""
         row = int(np.argmin(np.abs(trace.time - time)))
         return cls(
-            trace.points_px[row], trace.found[row], trace.desired_px[row], trace.true_px[row]
+            trace.points_px[row],
+            trace.found[row],
+            trace.asked[row],
+            SearchWindows(trace.window_center_px[row], trace.window_half_px[row]),
+            trace.desired_px[row],
+            trace.true_px[row],
         )
 
 
@@ -55,14 +67,18 @@ def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[n
     """
     canvas = _colored(image, width or image.shape[1])
     scale = np.array(canvas.shape[1::-1]) / image.shape[::-1]
+    for low, high in _corners(marks.windows, scale):
+        _frame(canvas, low, high)
+    for point in _known(marks.tracked_px[~marks.asked], scale):
+        _cross(canvas, point, UNASKED, _SMALL_PX, upright=False)
     for point in _known(marks.desired_px, scale):
-        _cross(canvas, point, DESIRED, upright=True)
+        _cross(canvas, point, DESIRED, _RADIUS_PX + 1.0, upright=True)
     for point in _known(marks.true_px, scale):
         _circle(canvas, point, TRUE, 2.5)
     for point in _known(marks.tracked_px[marks.found], scale):
         _circle(canvas, point, FOUND, _RADIUS_PX)
-    for point in _known(marks.tracked_px[~marks.found], scale):
-        _cross(canvas, point, LOST, upright=False)
+    for point in _known(marks.tracked_px[marks.asked & ~marks.found], scale):
+        _cross(canvas, point, LOST, _RADIUS_PX, upright=False)
     return canvas
 
 
@@ -81,6 +97,22 @@ def _known(points_px: FloatArray, scale: FloatArray) -> FloatArray:
     return np.asarray((points_px[drawable] + 0.5) * scale - 0.5)
 
 
+def _corners(windows: SearchWindows, scale: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Return the low and high corners of the windows that were opened, as places likewise."""
+    center, half = windows
+    corners = (_known(center + half * sign, scale) for sign in (-1.0, 1.0))
+    return zip(*corners, strict=True)
+
+
+def _frame(canvas: NDArray[np.uint8], low: FloatArray, high: FloatArray) -> None:
+    import cv2
+
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    places = [np.array([_fixed(corner) for corner in corners], dtype=np.int32)]
+    for ink, thickness in ((_OUTLINE, _THIN + _FINE), (WINDOW, _FINE)):
+        cv2.polylines(canvas, places, True, ink, thickness, cv2.LINE_AA, _SHIFT)
+
+
 def _circle(
     canvas: NDArray[np.uint8], center: FloatArray, color: tuple[int, ...], r: float
 ) -> None:
@@ -92,15 +124,14 @@ def _circle(
 
 
 def _cross(
-    canvas: NDArray[np.uint8], center: FloatArray, color: tuple[int, ...], upright: bool
+    canvas: NDArray[np.uint8], center: FloatArray, color: tuple[int, ...], r: float, upright: bool
 ) -> None:
     import cv2
 
-    arm = np.array([_RADIUS_PX + 1.0, 0.0])
-    turned = arm if upright else np.array([1.0, 1.0]) * _RADIUS_PX / np.sqrt(2)
-    across = np.array([-turned[1], turned[0]])
+    arm = r * (np.array([1.0, 0.0]) if upright else np.array([1.0, 1.0]) / np.sqrt(2))
+    across = np.array([-arm[1], arm[0]])
     for ink, thickness in ((_OUTLINE, _THICK), (color, _THIN)):
-        for half in (turned, across):
+        for half in (arm, across):
             ends = _fixed(center - half), _fixed(center + half)
             cv2.line(canvas, *ends, ink, thickness, cv2.LINE_AA, _SHIFT)
 

@@ -27,6 +27,10 @@ _MARKS = """<p class="marks">
 stroke-width="2"/></svg>tracked</span>
 <span><svg viewBox="0 0 16 16"><path d="M4 4l8 8M12 4l-8 8" stroke="#ff6e0a"
 stroke-width="2"/></svg>not found</span>
+<span><svg viewBox="0 0 16 16"><path d="M6 6l4 4M10 6l-4 4" stroke="#aaaaaa"
+stroke-width="2"/></svg>not looked for</span>
+<span><svg viewBox="0 0 16 16"><path d="M2.5 2.5h11v11h-11z" fill="none" stroke="#ebebeb"
+stroke-width="1"/></svg>window around the predicted place</span>
 <span><svg viewBox="0 0 16 16"><path d="M8 2v12M2 8h12" stroke="#f0e442"
 stroke-width="2"/></svg>desired</span>
 <span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="2.5" fill="none" stroke="#64c8ff"

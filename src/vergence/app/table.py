@@ -35,8 +35,10 @@ def run_rows(recording: Recording) -> list[Row]:
 def camera_rows(trace: CameraTrace) -> list[Row]:
     """Return how well a camera's points were followed."""
     rows = [Row("pictures", str(len(trace.time)))]
-    if trace.found.size:
-        rows.append(Row("points found", f"{100 * trace.found.mean():.1f}", "%"))
+    if asked := np.count_nonzero(trace.asked):
+        share = np.count_nonzero(trace.found & trace.asked) / asked
+        note = "" if trace.asked.all() else "of those looked for"
+        rows.append(Row("points found", f"{100 * share:.1f}", "%", note))
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
         rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last picture"))

@@ -35,5 +35,6 @@ class Look(NamedTuple):
 
     number: int  # of the picture
     features: IntArray  # (K,) chosen, one at least
+    half_px: FloatArray  # (K, 2) half the sizes of their windows
     found: ImagePoints  # K points
     view: View  # of those that are usable

@@ -8,8 +8,9 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera import Frame
+from vergence.estimation.looks import Look
 from vergence.estimation.visibility import SightArray
-from vergence.features import ImagePoints
+from vergence.features import ImagePoints, SearchWindows
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)
@@ -66,12 +67,13 @@ def nothing_measured(
     none = np.zeros(len(reasons), dtype=np.bool_)
     covariance = np.zeros((len(reasons), 2, 2))
     covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
-    return ImagePoints(camera, time, expected_px, covariance, none, reasons)
+    nowhere = np.full_like(expected_px, np.nan)
+    windows = SearchWindows(nowhere, nowhere)
+    return ImagePoints(camera, time, expected_px, covariance, none, reasons, windows)
 
 
 def spread_out(
-    found: ImagePoints,
-    features: IntArray,
+    look: Look,
     kept: IntArray,
     expected_px: FloatArray,
     sight: SightArray,
@@ -83,13 +85,13 @@ def spread_out(
     widest window and the reason.
 
     Args:
-        found: what was measured, K points.
-        features: their numbers, (K,).
+        look: what was measured, K points.
         kept: numbers of the features that agree with the pose.
         expected_px: predicted places, (M, 2).
         sight: a `Sight` each, (M,).
         widest_px: half the widest window.
     """
+    found, features = look.found, look.features
     places = expected_px.copy()
     covariance = np.zeros((len(places), 2, 2))
     covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
@@ -101,7 +103,10 @@ def spread_out(
         reasons[m] = reason or ("" if agrees else "disagrees with the pose")
     places[features[agreeing]] = found.points_px[agreeing]
     covariance[features[agreeing]] = found.covariance_px[agreeing]
-    return ImagePoints(found.camera, found.time, places, covariance, seen, tuple(reasons))
+    windows = SearchWindows(np.full_like(places, np.nan), np.full_like(places, np.nan))
+    windows.center_px[features] = expected_px[features]
+    windows.half_px[features] = look.half_px
+    return ImagePoints(found.camera, found.time, places, covariance, seen, tuple(reasons), windows)
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:

@@ -193,16 +193,17 @@ class PosePerception(Generic[B]):
     def _look(self, picture: Picture, n: int, chosen: BoolArray, expected: FloatArray) -> Look:
         """Measure the features chosen inside windows."""
         features = np.flatnonzero(chosen)
+        half_px = self._half_sizes(picture, features)
         found = self._measure(
             picture.frame,
             features,
             expected[features],
-            self._half_sizes(picture, features),
+            half_px,
             se3_compose(picture.T_camera_world, picture.T_world_target),
         )
         camera = self._rig.cameras[picture.number]
         view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
-        return Look(n, features, found, view)
+        return Look(n, features, half_px, found, view)
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
         """Correct the pose by all pictures; return which features of each agree with it."""
@@ -224,9 +225,7 @@ class PosePerception(Generic[B]):
         """Say what became of every feature; of a target that is lost, none is found."""
         expected, sight, widest = visibility.points_px, visibility.sight, self._windows.most_px
         points = {
-            look.number: spread_out(
-                look.found, look.features, kept, expected[look.number], sight[look.number], widest
-            )
+            look.number: spread_out(look, kept, expected[look.number], sight[look.number], widest)
             for look, kept in zip(looks, agreeing, strict=True)
         }
         for n, picture in enumerate(pictures):

@@ -32,4 +32,5 @@ class TrackedPoints:
             tracks.covariance_px,
             tracks.found,
             tracks.reasons,
+            tracks.windows,
         )

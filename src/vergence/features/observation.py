@@ -1,8 +1,18 @@
 """What perception hands on: image points with covariance, and a target state from a filter."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
+
+
+class SearchWindows(NamedTuple):
+    """Where points were looked for in one picture: rectangles around their predicted places."""
+
+    center_px: FloatArray  # (M, 2) predicted; a row of NaN where nobody looked
+    half_px: FloatArray  # (M, 2) half the width and height
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +25,14 @@ class ImagePoints:
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
+    windows: SearchWindows | None = None  # None from what has no windows and looks for all points
+
+    @property
+    def asked(self) -> BoolArray:
+        """Which points were looked for, (M,)."""
+        if self.windows is None:
+            return np.ones(len(self.found), dtype=np.bool_)
+        return np.isfinite(self.windows.half_px[:, 0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, ImageArray, frozen
+from vergence.features import SearchWindows
 from vergence.vision.image import grey_image
+from vergence.vision.ssd import RANGE_PX
 from vergence.vision.tracker_state import (
     AT_BORDER,
     COLUMNS,
@@ -111,6 +113,7 @@ class SsdTracker:
         grey, reason = grey_image(image)
         if grey is None:
             return nothing_found(out[:, :2], reason)
+        windows = SearchWindows(out[:, :2].copy(), np.full((len(out), 2), float(RANGE_PX)))
         if track_points(grey, self._state, out):
             reasons: tuple[str, ...] = ("",) * len(out)
         else:
@@ -123,6 +126,7 @@ class SsdTracker:
             reasons,
             out[:, RESIDUAL],
             out[:, CORRELATION],
+            windows,
         )
 
     def _reason(self, verdict: int, detail: float) -> str:

@@ -5,6 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.features import SearchWindows
 
 
 class Tracks(NamedTuple):
@@ -16,6 +17,7 @@ class Tracks(NamedTuple):
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
     residuals: FloatArray  # (M,) grey levels, root mean square; NaN where nothing was compared
     correlations: FloatArray  # (M,) with the template, -1 … 1; NaN where nothing was compared
+    windows: SearchWindows | None = None  # where the points were looked for
 
     def __bool__(self) -> bool:
         """Whether every point was found."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from foxglove.messages import (
     CameraCalibration,
     Color,
@@ -23,7 +24,7 @@ from foxglove.messages import JointState as NamedJoint
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.features import ImagePoints
+from vergence.features import ImagePoints, SearchWindows
 from vergence.geometry import matrix_to_quaternion
 
 NANOSECONDS = 1_000_000_000
@@ -33,6 +34,11 @@ FOUND = Color(r=0.0, g=0.62, b=0.45, a=1.0)
 LOST = Color(r=0.84, g=0.37, b=0.0, a=1.0)
 DESIRED = Color(r=0.94, g=0.89, b=0.26, a=1.0)
 TRUE = Color(r=0.34, g=0.71, b=0.91, a=1.0)
+WINDOW = Color(r=0.92, g=0.92, b=0.92, a=0.8)
+UNASKED = Color(r=0.67, g=0.67, b=0.67, a=1.0)
+
+
+_AROUND = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # corners of a window
 
 
 def nanoseconds(time: float) -> int:
@@ -72,14 +78,19 @@ def annotations(
     desired_px: FloatArray | None,
     true_px: FloatArray | None,
 ) -> ImageAnnotations:
-    """Return true, desired and tracked points to be drawn over the picture."""
+    """Return windows, true, desired and tracked points to be drawn over the picture."""
     layers = []
+    if points is not None and points.windows is not None:
+        layers.append(_frames(time, points.windows))
     if true_px is not None:
         layers.append(_dots(time, true_px, [TRUE] * len(true_px), 5.0))
     if desired_px is not None:
         layers.append(_dots(time, desired_px, [DESIRED] * len(desired_px), 7.0))
     if points is not None:
-        colors = [FOUND if found else LOST for found in points.found]
+        colors = [
+            FOUND if found else LOST if asked else UNASKED
+            for found, asked in zip(points.found, points.asked, strict=True)
+        ]
         layers.append(_dots(time, points.points_px, colors, 3.0))
     return ImageAnnotations(timestamp=stamp(time), points=layers)
 
@@ -116,6 +127,21 @@ def _dots(
         points=places,
         outline_colors=colors,
         thickness=thickness,
+    )
+
+
+def _frames(time: float, windows: SearchWindows) -> PointsAnnotation:
+    """Return the windows that were opened, each as its four edges."""
+    opened = np.isfinite(windows.half_px[:, 0])
+    center, half = windows.center_px[opened, None], windows.half_px[opened, None]
+    corners = center + half * _AROUND + 0.5
+    edges = corners[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2)
+    return PointsAnnotation(
+        timestamp=stamp(time),
+        type=PointsAnnotationType.LineList,
+        points=[Point2(x=u, y=v) for u, v in edges.tolist()],
+        outline_color=WINDOW,
+        thickness=1.0,
     )
 
 

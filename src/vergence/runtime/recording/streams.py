@@ -47,6 +47,10 @@ FEATURES_SCHEMA = _schema(
     covariance=_NUMBERS,
     found=_FLAGS,
     reasons=_WORDS,
+    window_u=_NUMBERS,
+    window_v=_NUMBERS,
+    window_half_u=_NUMBERS,
+    window_half_v=_NUMBERS,
     desired_u=_NUMBERS,
     desired_v=_NUMBERS,
     true_u=_NUMBERS,
@@ -102,6 +106,9 @@ def features_message(
         message["covariance"] = numbers(points.covariance_px.ravel())
         message["found"] = np.asarray(points.found, dtype=bool).tolist()
         message["reasons"] = list(points.reasons)
+        if points.windows is not None:
+            message |= _columns("window_", points.windows.center_px)
+            message |= _columns("window_half_", points.windows.half_px)
     if desired_px is not None:
         message |= _columns("desired_", desired_px)
         if points is not None and points.points_px.shape == desired_px.shape:

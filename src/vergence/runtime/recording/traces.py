@@ -36,6 +36,9 @@ class CameraTrace:
     covariance_px: FloatArray  # (K, M, 2, 2) px²
     found: BoolArray  # (K, M)
     reasons: tuple[tuple[str, ...], ...]  # (K,) of M: why not found
+    asked: BoolArray  # (K, M) whether it was looked for
+    window_center_px: FloatArray  # (K, M, 2) predicted places; NaN without a window
+    window_half_px: FloatArray  # (K, M, 2) half the sizes of the windows
     desired_px: FloatArray  # (K, M, 2)
     true_px: FloatArray  # (K, M, 2) truly projected, from a simulated camera
     T_world_camera: FloatArray  # (K, 4, 4) true
@@ -92,6 +95,9 @@ def camera_trace(rows: Sequence[Row]) -> CameraTrace:
         covariance_px=_stack(rows, "covariance", 4 * widest).reshape(count, widest, 2, 2),
         found=_stack(rows, "found", widest) == 1.0,
         reasons=tuple(tuple(row.get("reasons", ())) for row in rows),
+        asked=_asked(rows, widest),
+        window_center_px=_points(rows, "window_", widest),
+        window_half_px=_points(rows, "window_half_", widest),
         desired_px=_points(rows, "desired_", widest),
         true_px=_points(rows, "true_", widest),
         T_world_camera=_poses(rows, "T_world_camera"),
@@ -113,6 +119,16 @@ def target_trace(rows: Sequence[Row]) -> TargetTrace:
 def _length(row: Row) -> int:
     """Return how many points a message speaks of."""
     return max(len(row.get(key, ())) for key in ("u", "desired_u", "true_u"))
+
+
+def _asked(rows: Sequence[Row], width: int) -> BoolArray:
+    """Return which points were looked for: those with a window, and all where there are none."""
+    out = np.zeros((len(rows), width), dtype=np.bool_)
+    for place, row in zip(out, rows, strict=True):
+        found: list[Any] = row.get("found", [])
+        halves: list[Any] = row.get("window_half_u", found)
+        place[: len(found)] = [half is not None for half in halves]
+    return out
 
 
 def _column(rows: Sequence[Row], key: str) -> FloatArray:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
+from vergence.features import SearchWindows
 from vergence.vision.image import grey_image
 from vergence.vision.marks.round import measure_round_marks
 from vergence.vision.tracks import Tracks
@@ -47,5 +48,11 @@ class MarkTracker:
         self._points = np.where(found, seen.points_px, self._points)
         self._radius = np.where(seen.found, np.sqrt(seen.area_px / np.pi), self._radius)
         return Tracks(
-            seen.points_px, seen.covariance_px, seen.found, seen.reasons, nothing, nothing
+            seen.points_px,
+            seen.covariance_px,
+            seen.found,
+            seen.reasons,
+            nothing,
+            nothing,
+            SearchWindows(np.array(expected), half),
         )
