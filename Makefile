@@ -11,13 +11,14 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-images demo test bench peers format clean
+.PHONY: help setup test-images demo test docs bench peers format clean
 .PHONY: check lint lint-format lint-rules lint-types
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
-	@echo "make check    everything CI checks: formatting, lints, types, tests"
+	@echo "make docs     build the documentation into docs/_build; a warning is an error"
+	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
 	@echo "make lint     formatting, lints and types only"
 	@echo "make format   format the code and apply the safe fixes"
 	@echo "make bench    run the benchmarks, peers beside us"
@@ -55,7 +56,11 @@ lint-rules: $(INSTALLED)
 lint-types: $(INSTALLED)
 	$(BIN)/mypy
 
-check: lint test
+docs: $(INSTALLED)
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/_build
+	@echo "documentation: docs/_build/index.html"
+
+check: lint docs test
 
 bench: setup
 	$(BIN)/python benchmarks/run.py
@@ -68,5 +73,5 @@ format: $(INSTALLED)
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist docs/_build .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

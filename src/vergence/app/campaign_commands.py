@@ -43,7 +43,7 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         laws: Annotated[
             str,
             typer.Option(
-                help="Names, with commas between: own (the cell's law), the file's [laws.NAME], "
+                help="Names, with commas between: own (the cell's law), a name in the file's laws, "
                 "image_based, image_based_desired, image_based_mean, optimal_tracking, "
                 "constrained, constrained_tracking."
             ),

@@ -27,17 +27,17 @@ BUILT_IN = Path(__file__).parents[1] / "cells"
 class Cell(Table):
     """Arms, cameras, a target, a task and a law: all that a run depends on."""
 
-    name: str
-    duration_s: Positive
-    seed: Annotated[int, Field(ge=0)] = 0
-    inner_rate_hz: Annotated[float, Field(ge=100)] = 500.0
-    scene: SceneTable = SceneTable()
-    arms: dict[str, ArmTable] = Field(min_length=1)
-    cameras: dict[str, CameraTable] = Field(min_length=1)
-    target: TargetTable
-    task: Task
-    perception: PerceptionTable = PerceptionTable()
-    law: Law
+    name: str  # what its runs are called
+    duration_s: Positive  # of a run, at most
+    seed: Annotated[int, Field(ge=0)] = 0  # of everything that is drawn by chance
+    inner_rate_hz: Annotated[float, Field(ge=100)] = 500.0  # of physics, set-points and guard
+    scene: SceneTable = SceneTable()  # what stands around the arms
+    arms: dict[str, ArmTable] = Field(min_length=1)  # by name
+    cameras: dict[str, CameraTable] = Field(min_length=1)  # by name
+    target: TargetTable  # what is looked at
+    task: Task  # what is to be done about it
+    perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
+    law: Law  # how the arm is moved
     laws: dict[str, Law] = Field(default_factory=dict)  # others, by name, to compare it with
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")

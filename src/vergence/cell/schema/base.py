@@ -18,5 +18,5 @@ class Table(BaseModel):
 class Placement(Table):
     """A pose: a position and roll-pitch-yaw angles, R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    position_m: Vector3 = (0.0, 0.0, 0.0)
-    rotation_rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    position_m: Vector3 = (0.0, 0.0, 0.0)  # x, y, z of its origin
+    rotation_rpy_deg: Vector3 = (0.0, 0.0, 0.0)  # roll, pitch, yaw

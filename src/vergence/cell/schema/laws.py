@@ -11,15 +11,15 @@ class OptimalTrackingTable(Table):
     """The law of [Nelson1995] eq. (29), its gains in the paper's units (pixels, metres a frame)."""
 
     kind: Literal["optimal_tracking"]
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
-    avoidance_axes: tuple[Axis, ...] = ()
+    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of the camera, that track
+    avoidance_axes: tuple[Axis, ...] = ()  # of the camera, that avoid limits
     Q: Positive = 2e-6  # 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 10.0  # one for all controlled axes, or one each
-    S: Annotated[float, Field(ge=0)] = 0.0
-    penalty: Literal["product", "per_joint"] = "product"
-    penalty_k: Positive = 1e5
+    S: Annotated[float, Field(ge=0)] = 0.0  # weight of 1/w', w' the penalised manipulability
+    penalty: Literal["product", "per_joint"] = "product"  # of joint limits, as printed or by joint
+    penalty_k: Positive = 1e5  # k of the penalty as printed
     depth_m: Positive | Literal["initial"] = "initial"  # what the start shows, held constant
-    avoidance_speed_max_m_s: Positive = 0.5
+    avoidance_speed_max_m_s: Positive = 0.5  # of the camera, for avoidance
     singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
 
 
@@ -40,7 +40,7 @@ class ConstrainedTable(Table):
     """Any objective in the image under hard joint limits, with view and singularities kept."""
 
     kind: Literal["constrained"]
-    objective: Literal["image_based", "optimal_tracking"] = "image_based"
+    objective: Literal["image_based", "optimal_tracking"] = "image_based"  # what is minimised
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
@@ -54,7 +54,7 @@ class ConstrainedTable(Table):
         "singularity",
         "joint margin",
     )  # what is kept, most important first; joint limits always are
-    view_margin_px: Annotated[float, Field(ge=0)] = 10.0
+    view_margin_px: Annotated[float, Field(ge=0)] = 10.0  # kept from the border of the image
     joint_margin: Annotated[float, Field(ge=0, lt=0.5)] = 0.03  # share of each joint's range
     manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
     approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second
@@ -65,7 +65,7 @@ class PlainTable(Table):
     """Any objective in the image by itself, through the inverse of the Jacobian: no limits kept."""
 
     kind: Literal["plain"]
-    objective: Literal["image_based", "optimal_tracking"] = "image_based"
+    objective: Literal["image_based", "optimal_tracking"] = "image_based"  # what is minimised
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking

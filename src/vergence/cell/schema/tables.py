@@ -7,6 +7,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from vergence.cell.schema.base import Placement, Positive, Table, Vector3
 
+_Side = Annotated[int, Field(ge=16)]
+
 
 class SceneTable(Table):
     """What stands around the arms."""
@@ -47,8 +49,8 @@ class PoseMotion(Waypoints):
     """
 
     kind: Literal["poses"]
-    positions_m: tuple[Vector3, ...]
-    rotations_rpy_deg: tuple[Vector3, ...]
+    positions_m: tuple[Vector3, ...]  # one for each time
+    rotations_rpy_deg: tuple[Vector3, ...]  # one for each time
 
 
 ArmMotion = Annotated[JointMotion | PoseMotion, Field(discriminator="kind")]
@@ -61,7 +63,7 @@ class ArmTable(Placement):
     body: str  # the last body: cameras are mounted on it unless they name another
     start_deg: tuple[float, ...]  # at the start: degrees; metres for sliding joints
     rate_max_deg_s: Positive | tuple[Positive, ...] = 180.0  # m/s·(180/π) for sliding joints
-    acceleration_max_deg_s2: Positive | tuple[Positive, ...] = 720.0
+    acceleration_max_deg_s2: Positive | tuple[Positive, ...] = 720.0  # m/s²·(180/π) if they slide
     servo_bandwidth_hz: Positive = 12.0  # of the joint servos that stand for the robot's own
     motion: ArmMotion | None = None  # what it does by itself; without one the loop holds it
 
@@ -71,17 +73,17 @@ class CameraTable(Placement):
 
     arm: str | None = None  # the arm that carries it; fixed in the world if absent
     body: str | None = None  # which body of that arm; its last if absent
-    resolution: tuple[Annotated[int, Field(ge=16)], Annotated[int, Field(ge=16)]] = (640, 480)
-    focal_mm: Positive | None = None
-    pixel_um: tuple[Positive, Positive] | None = None
-    focal_px: tuple[Positive, Positive] | None = None
+    resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the picture
+    focal_mm: Positive | None = None  # of the lens, with pixel_um
+    pixel_um: tuple[Positive, Positive] | None = None  # width and height of a pixel
+    focal_px: tuple[Positive, Positive] | None = None  # instead of focal_mm and pixel_um
     principal_px: tuple[float, float] | None = None  # the middle of the image if absent
-    rate_hz: Positive = 30.0
+    rate_hz: Positive = 30.0  # pictures a second
     latency_frames: Annotated[int, Field(ge=0)] = 0  # from exposure until the picture arrives
     noise_grey: Annotated[float, Field(ge=0)] = 1.0  # standard deviation, of 255
     blind_s: tuple[tuple[float, float], ...] = ()  # from when to when its pictures are black
     calibration_error_m: Annotated[float, Field(ge=0)] = 0.0  # how far its believed pose is off
-    calibration_error_deg: Annotated[float, Field(ge=0)] = 0.0
+    calibration_error_deg: Annotated[float, Field(ge=0)] = 0.0  # and by what angle
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":
@@ -101,36 +103,36 @@ class LineMotion(Table):
     """The target moves along a line, then stands."""
 
     kind: Literal["line"]
-    velocity_m_s: Vector3
+    velocity_m_s: Vector3  # in the world
     distance_m: Positive  # after which it stops
-    start_s: Annotated[float, Field(ge=0)] = 0.0
+    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
 
 
 class CircleMotion(Table):
     """The target moves on a horizontal circle that starts at its placement."""
 
     kind: Literal["circle"]
-    radius_m: Positive
-    period_s: Positive
-    start_s: Annotated[float, Field(ge=0)] = 0.0
+    radius_m: Positive  # of the circle
+    period_s: Positive  # of once around
+    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
 
 
 class StepMotion(Table):
     """The target jumps."""
 
     kind: Literal["step"]
-    offset_m: Vector3
-    time_s: Annotated[float, Field(ge=0)]
+    offset_m: Vector3  # in the world
+    time_s: Annotated[float, Field(ge=0)]  # when
 
 
 class RandomMotion(Table):
     """The target wanders smoothly: a few sinusoids of random phase on every axis."""
 
     kind: Literal["random"]
-    amplitude_m: Vector3
-    amplitude_rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    fastest_hz: Positive = 0.3
-    start_s: Annotated[float, Field(ge=0)] = 0.0
+    amplitude_m: Vector3  # along the world's axes
+    amplitude_rpy_deg: Vector3 = (0.0, 0.0, 0.0)  # about them
+    fastest_hz: Positive = 0.3  # of the sinusoids
+    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
 
 
 Motion = Annotated[
@@ -142,9 +144,9 @@ Motion = Annotated[
 class TargetTable(Placement):
     """The object; its placement is where its motion starts, or its pose in what carries it."""
 
-    model: Path
+    model: Path  # MJCF or URDF
     carried_by: str | None = None  # an arm, whose last body it is fixed to
-    motion: Motion = StillMotion()
+    motion: Motion = StillMotion()  # what it does by itself
     features: tuple[Vector3, ...] | None = None  # m, in the target; picked in the image if absent
 
     @model_validator(mode="after")
@@ -158,10 +160,12 @@ class TrackTable(Table):
     """Keep features where they are wanted in one camera's image."""
 
     kind: Literal["track"] = "track"
-    arm: str
-    camera: str
+    arm: str  # which moves, or carries the target
+    camera: str  # carried by the arm, or fixed
     feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
-    desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = "initial"
+    desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = (
+        "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
+    )
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
     target_timeout_s: Positive = 0.2  # with pictures, but none of the features found
 
@@ -170,7 +174,7 @@ class FollowTable(Table):
     """Keep a camera, and so the hand that carries it, at a wanted pose relative to the target."""
 
     kind: Literal["follow"]
-    arm: str
+    arm: str  # which moves
     camera: str  # carried by the arm
     desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
@@ -181,14 +185,14 @@ class ReachTable(Table):
     """Bring the camera to where the target looks as in a picture taken before, along a plan."""
 
     kind: Literal["reach"]
-    arm: str
-    camera: str
+    arm: str  # which moves
+    camera: str  # carried by the arm
     goal_deg: tuple[float, ...]  # joints when the desired picture was taken; metres if they slide
     distance_m: Positive  # believed distance of that camera from the reference plane, d*
-    planner: Literal["optimised", "potential_field"] = "optimised"
+    planner: Literal["optimised", "potential_field"] = "optimised"  # optimised, or the paper's
     margin_px: Annotated[float, Field(ge=0)] = 10.0  # kept from the border of the image
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
-    camera_speed_m_s: Positive = 0.25
+    camera_speed_m_s: Positive = 0.25  # on the way
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
     target_timeout_s: Positive = 0.5  # with pictures, but the target lost
 
@@ -211,13 +215,15 @@ class PerceptionTable(Table):
 
     cameras: tuple[str, ...] | None = None  # those that are looked through; all if absent
     filter: Literal["pose", "rpy"] = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper
-    selection: Literal["information", "indexes"] = "information"
+    selection: Literal["information", "indexes"] = (
+        "information"  # of features: or by spread, as [Lippiello2005]
+    )
     budget: Annotated[int, Field(ge=3)] = 16  # features measured a tick, over all cameras
     noise_px: Positive = 0.5  # expected of a measured point; drawn where there are no images
     believed_noise_px: Positive | None = None  # in place of what each measurement says of itself
     outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches made on purpose
     occlusion: bool = True  # whether arms and fixtures in the way are predicted
     start_error_m: Annotated[float, Field(ge=0)] = 0.01  # how well the first pose is known
-    start_error_deg: Annotated[float, Field(ge=0)] = 2.0
+    start_error_deg: Annotated[float, Field(ge=0)] = 2.0  # and its angle
     acceleration_density: Positive = 0.01  # m²/s³, of the target, for the filter on SE(3)
     angular_acceleration_density: Positive = 0.25  # rad²/s³

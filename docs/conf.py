@@ -1,0 +1,52 @@
+"""How the documentation is built: `make docs`. Nothing is fetched, and a warning is an error."""
+
+import os
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "extensions"), str(HERE.parent / "src")]
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # a kernel is documented as the function it was written as
+
+project = "vergence"
+author = "the vergence authors"
+release = version = version_of("vergence")
+project_copyright = "Apache-2.0"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "cell_file",
+    "command_line",
+    "docstrings",
+    "mathml",
+    "references",
+]
+exclude_patterns = ["_build", "extensions"]
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+default_role = "py:obj"
+add_module_names = False
+python_use_unqualified_type_names = True
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "imported-members": True}
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_custom_sections = [("Fields", "params_style")]
+
+html_theme = "furo"
+html_title = "vergence"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
+html_theme_options = {"top_of_page_buttons": []}

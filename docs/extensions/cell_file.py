@@ -1,0 +1,169 @@
+"""The directive ``cell-file``: every table of a cell file, from the schema that reads it.
+
+Types, bounds and defaults are pydantic's; the unit is the ending of the key; the meaning is the
+comment beside the field.
+"""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from docutils import nodes
+from field_comments import field_comments
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
+
+from vergence.cell import Cell, schema
+
+UNITS = {
+    "deg_s2": "°/s²",
+    "deg_s": "°/s",
+    "m_s": "m/s",
+    "deg": "°",
+    "px": "px",
+    "hz": "Hz",
+    "mm": "mm",
+    "um": "µm",
+    "grey": "grey levels",
+    "m": "m",
+    "s": "s",
+}
+_INLINE = "Placement"  # a table that is written where it is used, and has no section of its own
+
+
+class CellFile(SphinxDirective):
+    """Write a section for each table of a cell file."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the sections."""
+        return self.parse_text_to_nodes("\n".join(reference()), allow_section_headings=True)
+
+
+def reference() -> Iterator[str]:
+    """Yield the lines of the reference, in Markdown."""
+    described: set[str] = set()
+    for place, name, table in _tables(Cell.model_json_schema()):
+        kind = table["properties"].get("kind", {})
+        title = f"`[{place}]`" if place else "The top of the file"
+        if "const" in kind:
+            title += f" with `kind = {_toml(kind['const'])}`"
+            yield from (f"({name.lower()})=", "") if name not in described else ()
+        yield from (f"## {title}", "")
+        if name in described:
+            yield from (f"As [above](#{name.lower()}).", "")
+            continue
+        described.add(name)
+        yield from _table(name, table)
+
+
+def _tables(root: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield place in the file, name and schema of every table, outer ones first."""
+    waiting = [("", "Cell", root)]
+    while waiting:
+        place, name, table = waiting.pop(0)
+        yield place, name, table
+        inner = []
+        for key, value in table["properties"].items():
+            if place == "" and key == "laws":
+                continue  # each is what [law] is
+            for ref in _references(value):
+                below = ".NAME" if "additionalProperties" in value else ""
+                at = f"{place}.{key}{below}" if place else f"{key}{below}"
+                inner.append((at, ref, root["$defs"][ref]))
+        waiting[:0] = inner
+
+
+def _references(value: dict[str, Any]) -> list[str]:
+    """Return the names of the tables that may stand somewhere."""
+    if "$ref" in value:
+        name = value["$ref"].rpartition("/")[2]
+        return [] if name == _INLINE else [name]
+    options = value.get("oneOf", []) + value.get("anyOf", [])
+    if isinstance(value.get("additionalProperties"), dict):
+        options.append(value["additionalProperties"])
+    return [name for option in options for name in _references(option)]
+
+
+def _table(name: str, table: dict[str, Any]) -> Iterator[str]:
+    cls = Cell if name == "Cell" else getattr(schema, name)
+    comments = {k: c for base in reversed(cls.__mro__) for k, c in _comments(base).items()}
+    yield from (" ".join(table.get("description", "").split("\n\n")), "")
+    yield from ("| key | type | unit | default | meaning |", "|---|---|---|---|---|")
+    for key, value in table["properties"].items():
+        if key == "kind" and "const" in value:
+            continue
+        if not comments[key]:
+            raise ExtensionError(f"{cls.__name__}.{key} has no comment that says what it means")
+        default = _default(value) if key not in table.get("required", ()) else "required"
+        cells = (f"`{key}`", _type(value), _unit(key), default, comments[key])
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    yield ""
+
+
+def _comments(cls: type) -> dict[str, str]:
+    return field_comments(cls) if cls.__module__.startswith("vergence") else {}
+
+
+def _unit(key: str) -> str:
+    return next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "")
+
+
+def _default(value: dict[str, Any]) -> str:
+    default = value.get("default")
+    whole_table = isinstance(default, dict) and "kind" not in default
+    return "" if default is None or whole_table else f"`{_toml(default)}`"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        inside = ", ".join(f"{k} = {_toml(v)}" for k, v in value.items() if v is not None)
+        return f"{{ {inside} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return f"{value:g}" if type(value) is float else json.dumps(value)
+
+
+def _type(value: dict[str, Any]) -> str:
+    options = value.get("anyOf") or value.get("oneOf")
+    if options:
+        named = list(dict.fromkeys(_type(o) for o in options if o.get("type") != "null"))
+        of_such = f"list of {named[0]}"
+        return " or ".join("a list of such" if name == of_such else name for name in named)
+    if "$ref" in value:
+        inline = value["$ref"].endswith(f"/{_INLINE}")
+        return "`{ position_m, rotation_rpy_deg }`" if inline else "table"
+    if "const" in value or "enum" in value:
+        allowed = value.get("enum") or [value["const"]]
+        return " or ".join(f"`{_toml(word)}`" for word in allowed)
+    if value["type"] == "array":
+        return _array(value)
+    if value["type"] in ("number", "integer"):
+        return _bounded(value)
+    if value["type"] == "object":
+        return "tables, one a name"
+    if value.get("format") == "path":
+        return "path"
+    return {"boolean": "`true` or `false`", "string": "text"}[value["type"]]
+
+
+def _array(value: dict[str, Any]) -> str:
+    if "prefixItems" in value:
+        items = value["prefixItems"]
+        return f"{len(items)} × {_type(items[0])}"
+    return f"list of {_type(value['items'])}"
+
+
+def _bounded(value: dict[str, Any]) -> str:
+    word = "number" if value["type"] == "number" else "whole number"
+    low = value.get("exclusiveMinimum", value.get("minimum"))
+    high = value.get("exclusiveMaximum", value.get("maximum"))
+    above = "" if low is None else f" {'>' if 'exclusiveMinimum' in value else '≥'} {low}"
+    below = "" if high is None else f" {'<' if 'exclusiveMaximum' in value else '≤'} {high}"
+    return word + above + ("," if above and below else "") + below
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Add the directive."""
+    app.add_directive("cell-file", CellFile)
+    return {"parallel_read_safe": True}

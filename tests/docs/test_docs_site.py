@@ -1,0 +1,46 @@
+"""The documentation holds what it promises: an entry for every citation, a page for every room."""
+
+import re
+from pathlib import Path
+
+import pytest
+from cell_file import reference
+
+import vergence
+
+SOURCE = Path(vergence.__file__).parent
+DOCS = Path(__file__).parents[2] / "docs"
+API = DOCS / "reference" / "api"
+KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:19|20)\d\d[a-z]?)\]")
+ENTRY = re.compile(r"^\(([A-Z]\w+)\)=\n(.*?)(?=^\(|\Z)", re.MULTILINE | re.DOTALL)
+
+
+def cited_keys() -> dict[str, str]:
+    """Key, and a file that cites it."""
+    files = [*SOURCE.rglob("*.py"), *DOCS.rglob("*.md"), DOCS.parent / "README.md"]
+    return {key: file.name for file in files for key in KEY.findall(file.read_text())}
+
+
+def test_every_cited_key_has_an_entry_with_its_doi():
+    entries = dict(ENTRY.findall((DOCS / "references.md").read_text()))
+    cited = cited_keys()
+    assert {key: file for key, file in cited.items() if key not in entries} == {}
+    assert sorted(entries) == sorted(cited), "an entry that nobody cites"
+    for key, text in entries.items():
+        assert re.search(r"https://doi\.org/10\.\d{4,}/\S+|has no DOI|DOI not\s+verified", text), (
+            key
+        )
+
+
+def rooms() -> list[str]:
+    return sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
+
+
+@pytest.mark.parametrize("room", [room for room in rooms() if room != "app"])
+def test_every_room_is_in_the_api(room):
+    assert f"automodule:: vergence.{room}\n" in (API / f"{room}.md").read_text()
+    assert f"api/{room}\n" in (API.parent / "api.md").read_text()
+
+
+def test_every_key_of_a_cell_file_says_what_it_means():
+    assert "`view_margin_px`" in "".join(reference())  # it raises where a comment is missing
