@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.cell import Cell, SimulatedDriver
 from vergence.cell.schema import TrackTable
 from vergence.errors import InputError
@@ -12,6 +12,8 @@ from vergence.planning import FixedReference, Reference
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
 from vergence.runtime.stages import Perception
+
+_WINDOW_PX = 32.0  # of the tracker, at the finest level
 
 
 def track_parts(cell: Cell, task: TrackTable, driver: SimulatedDriver, images: bool) -> Parts:
@@ -58,11 +60,7 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
     camera = driver.cameras[name]
     if image is None:
         return _grid(camera.width, camera.height, count)
-    from vergence.vision import pick_features
-
-    picked = pick_features(image, 4 * count, _middle(camera.width, camera.height))
-    on_target = ~np.isnan(driver.anchor(name, picked.points_px)).any(axis=1)
-    points: FloatArray = picked.points_px[on_target]
+    points = _far_apart(image, count, driver, name)
     if len(points) < count:
         raise InputError(
             str(cell.path),
@@ -71,6 +69,27 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
             f"at most {len(points)}: no more good features of the target are in the first picture",
         )
     return points[:count]
+
+
+def _far_apart(image: ImageArray, count: int, driver: SimulatedDriver, camera: str) -> FloatArray:
+    """Pick points of the target as far apart as it offers: close together they fix no pose."""
+    from vergence.vision import pick_features
+
+    height, width = image.shape
+    for apart_px in (height / 4, height / 8, height / 16, 16.0):
+        picked = pick_features(image, 4 * count, _middle(width, height), apart_px)
+        points: FloatArray = picked.points_px[_on_target(picked.points_px, driver, camera)]
+        if len(points) >= count:
+            break
+    return points
+
+
+def _on_target(points_px: FloatArray, driver: SimulatedDriver, camera: str) -> BoolArray:
+    """Tell whose windows lie on the target alone: what is behind it moves otherwise."""
+    corners = points_px[:, None] + _WINDOW_PX / 2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    places = driver.anchor(camera, corners.reshape(-1, 2)).reshape(-1, 4, 3)
+    on: BoolArray = ~np.isnan(places).any(axis=(1, 2))
+    return on
 
 
 def _middle(width: int, height: int) -> BoolArray:
