@@ -78,14 +78,57 @@ def test_a_margin_moves_every_border_inwards(margin: float) -> None:
     assert not camera.contains(np.array(just_outside), margin).any()
 
 
-def test_a_covariance_moves_with_the_points() -> None:
-    camera, rng = Camera(640, 480, 700.0, 350.0, 319.5, 239.5), np.random.default_rng(2)
-    covariance = np.array([[4.0, 1.0], [1.0, 9.0]])
-    pixels = rng.multivariate_normal((300, 200), covariance, 200_000)
+@pytest.mark.parametrize("distortion", DISTORTIONS)
+def test_a_covariance_moves_with_the_points(distortion: str) -> None:
+    camera, rng = camera_with(distortion), np.random.default_rng(2)
+    covariance, middle = np.array([[0.4, 0.1], [0.1, 0.9]]), np.array([[560.0, 60.0]])
+    pixels = rng.multivariate_normal(middle[0], covariance, 200_000)
     sampled = np.cov(camera.normalize(pixels).T)
-    exact = camera.normalize_covariance(covariance[None])[0]
-    np.testing.assert_allclose(exact, covariance / np.outer([700, 350], [700, 350]), rtol=1e-12)
+    exact = camera.normalize_covariance(covariance[None], camera.normalize(middle))[0]
     np.testing.assert_allclose(sampled, exact, rtol=0.05)
+
+
+@pytest.mark.parametrize("distortion", DISTORTIONS)
+def test_a_velocity_moves_with_the_points(distortion: str) -> None:
+    camera, px, velocity = camera_with(distortion), np.array([[560.0, 60.0]]), np.array([[9.0, 4]])
+    moved = camera.normalize(px + 1e-4 * velocity) - camera.normalize(px - 1e-4 * velocity)
+    exact = camera.normalize_velocity(velocity, camera.normalize(px))
+    np.testing.assert_allclose(exact, moved / 2e-4, rtol=1e-6)
+
+
+@pytest.mark.parametrize("distortion", DISTORTIONS)
+def test_the_undistorted_camera_sees_all_that_the_camera_sees(distortion: str) -> None:
+    camera = camera_with(distortion)
+    wide = camera.undistorted()
+    assert (wide is camera) == (distortion == "ideal")
+    assert not wide.distorted
+    u, v = np.meshgrid(np.linspace(-0.5, 639.4, 40), np.linspace(-0.5, 479.4, 30))
+    pixels = np.column_stack((u.ravel(), v.ravel()))
+    assert wide.contains(wide.to_pixels(camera.normalize(pixels))).all()
+
+
+@pytest.mark.parametrize("distortion", DISTORTIONS)
+def test_the_rectangle_lies_in_view_and_touches_every_side(distortion: str) -> None:
+    camera = camera_with(distortion)
+    x_min, x_max, y_min, y_max = camera.rectangle(5.0)
+    x, y = np.meshgrid(np.linspace(x_min, x_max, 40), np.linspace(y_min, y_max, 40))
+    inside = camera.to_pixels(np.column_stack((x.ravel(), y.ravel())))
+    assert camera.contains(inside, 4.99).all()
+    sides = np.concatenate((inside, (639, 479) - inside), axis=1).min(axis=0)
+    np.testing.assert_allclose(sides, 4.5, atol=0.1)
+
+
+def test_what_a_barrel_lens_folds_back_into_the_picture_is_not_in_view() -> None:
+    camera = Camera(640, 480, 400.0, 400.0, 319.5, 239.5, np.array([-0.3, 0.0, 0.0, 0.0, 0.0]))
+    assert camera.reach == pytest.approx(np.sqrt(1 / 0.9))
+    folded = np.array([[1.8, 0.0, 1.0], [0.5, 0.1, 1.0], [0.5, 0.1, -1.0]])
+    assert camera.contains(camera.project(folded[:1])).all()
+    assert camera.in_view(folded).tolist() == [False, True, False]
+
+
+def test_a_picture_that_its_distortion_folds_is_refused() -> None:
+    with pytest.raises(InputError, match="one-to-one"):
+        Camera(640, 480, 200.0, 200.0, 319.5, 239.5, np.array([-0.3, 0, 0, 0, 0])).undistorted()
 
 
 @pytest.mark.parametrize("key", ["width", "height", "fx", "fy"])

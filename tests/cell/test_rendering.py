@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from vergence.cell import Cell, SimulatedDriver, load_cell
+from vergence.cell.build import intrinsics
+from vergence.errors import InputError
 
 MODEL = """<mujoco><worldbody><body name="spot">
   <geom type="{kind}" size="{size}" rgba="1 1 1 1" contype="0" conaffinity="0"/>
@@ -33,6 +35,7 @@ rotation_rpy_deg = [180.0, 0.0, {turn}]
 resolution = [{width}, {height}]
 focal_px = [{fx}, {fy}]
 principal_px = [{cx}, {cy}]
+distortion = {distortion}
 noise_grey = 0.0
 [target]
 model = "spot.xml"
@@ -44,7 +47,7 @@ camera = "eye"
 [law]
 kind = "optimal_tracking"
 """
-LENSES = {
+LENSES: dict[str, dict[str, object]] = {
     "central": {"width": 640, "height": 480, "fx": 700, "fy": 700, "cx": 319.5, "cy": 239.5},
     "off the middle": {
         "width": 640,
@@ -54,15 +57,33 @@ LENSES = {
         "cx": 250.25,
         "cy": 300.5,
     },
+    "barrel": {
+        "width": 640,
+        "height": 480,
+        "fx": 420,
+        "fy": 430,
+        "cx": 310.5,
+        "cy": 250.5,
+        "distortion": [-0.28, 0.08, 1e-3, -2e-3, 0.0],
+    },
+    "cushion": {
+        "width": 640,
+        "height": 480,
+        "fx": 700,
+        "fy": 700,
+        "cx": 319.5,
+        "cy": 239.5,
+        "distortion": [0.3, 0.1],
+    },
     "odd size": {"width": 333, "height": 251, "fx": 400, "fy": 480, "cx": 190.0, "cy": 101.75},
 }
 
 
-def spot_cell(folder: Path, geom: dict[str, str], **values: float) -> Cell:
+def spot_cell(folder: Path, geom: dict[str, str], **values: object) -> Cell:
     (folder / "spot.xml").write_text(MODEL.format(**geom))
     (folder / "arm.xml").write_text(ARM)
     (folder / "room.xml").write_text(ROOM)
-    (folder / "cell.toml").write_text(CELL.format(**values))
+    (folder / "cell.toml").write_text(CELL.format(**{"distortion": []} | values))
     return load_cell(folder)
 
 
@@ -118,3 +139,31 @@ def test_edges_of_a_box_fall_between_the_right_pixels(tmp_path: Path) -> None:
     assert columns[-1] == np.floor(middle[0] + half[0])
     assert rows[0] == np.ceil(middle[1] - half[1])
     assert rows[-1] == np.floor(middle[1] + half[1])
+
+
+def test_a_line_across_a_distorted_picture_bends_as_the_lens_bends_it(tmp_path: Path) -> None:
+    rod = {"kind": "box", "size": "0.005 2 0.0001"}
+    cell = spot_cell(tmp_path, rod, turn=0.0, x=0.45, y=0.0, **LENSES["barrel"])
+    image, _ = picture(cell)
+    lens = intrinsics(cell.cameras["eye"])
+    for y in np.linspace(-0.4, 0.4, 9):
+        u, v = lens.project(np.array([[0.45, y, 1.0]]))[0]
+        row = image[round(v)]
+        row = row - np.median(row)
+        near = lens.project(np.array([[0.45, lens.normalize([[u, round(v)]])[0, 1], 1.0]]))[0]
+        assert (np.arange(640) * row).sum() / row.sum() == pytest.approx(near[0], abs=0.3)
+
+
+def test_points_in_a_distorted_picture_are_where_the_features_are_drawn(tmp_path: Path) -> None:
+    disc = {"kind": "cylinder", "size": "0.012 0.0001"}
+    for x, y in ((0.6, 0.4), (-0.6, 0.4), (0.6, -0.4)):  # near the corners of the picture
+        cell = spot_cell(tmp_path, disc, turn=0.0, x=x, y=y, **LENSES["barrel"])
+        image, true_px = picture(cell)
+        assert np.abs(centroid(image) - true_px).max() < 0.1
+
+
+def test_a_lens_that_folds_the_picture_is_refused_with_its_key(tmp_path: Path) -> None:
+    disc = {"kind": "cylinder", "size": "0.02 0.0001"}
+    lens = LENSES["barrel"] | {"distortion": [-2.0]}
+    with pytest.raises(InputError, match=r"cameras\.eye\.distortion.*one-to-one"):
+        SimulatedDriver(spot_cell(tmp_path, disc, turn=0.0, x=0.0, y=0.0, **lens), images=False)

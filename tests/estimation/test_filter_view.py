@@ -27,7 +27,7 @@ def test_pixels_become_the_normalized_coordinates_of_the_pose(camera):
     view = view_of(points(camera), camera, WALL, BOX)
     np.testing.assert_allclose(view.measured, project(WALL, moving(0.3)), atol=1e-12)
     np.testing.assert_allclose(view.T_camera_world, se3_inverse(WALL))
-    expected = camera.normalize_covariance(points(camera).covariance_px)
+    expected = camera.normalize_covariance(points(camera).covariance_px, view.measured)
     np.testing.assert_allclose(view.covariance, expected, rtol=1e-12)
     assert (view.camera, view.time, view.size) == ("wall", 1.5, len(BOX))
 

@@ -25,7 +25,6 @@ from vergence.planning.tree import connect_trees, edge_in_view, pull_into_view
 from vergence.planning.visibility import (
     add_visibility_penalty,
     clearance_at,
-    image_bounds,
     view_clearances,
 )
 
@@ -57,7 +56,7 @@ def test_points_are_in_view_where_the_clearance_is_positive() -> None:
 
 def test_image_bounds_of_a_distorted_camera_lie_in_the_image() -> None:
     camera = replace(section6().camera, distortion=np.array([-0.2, 0.05, 0.001, -0.002, 0.0]))
-    x_min, x_max, y_min, y_max = image_bounds(camera, 5.0)
+    x_min, x_max, y_min, y_max = camera.rectangle(5.0)
     x, y = np.meshgrid(np.linspace(x_min, x_max, 20), np.linspace(y_min, y_max, 20))
     assert camera.contains(camera.to_pixels(np.column_stack((x.ravel(), y.ravel()))), 4.9).all()
 

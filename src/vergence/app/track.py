@@ -78,7 +78,8 @@ def track(request: Request, out: Path | None, as_json: bool) -> int:
 
 
 def _camera(request: Request, first: "Picture") -> "Camera":
-    from vergence.app.tracking.intrinsics import camera_of_file, camera_of_options
+    from vergence.app.tracking.intrinsics import camera_of_options
+    from vergence.camera import read_camera
     from vergence.errors import InputError
 
     height, width = first.image.shape
@@ -87,7 +88,7 @@ def _camera(request: Request, first: "Picture") -> "Camera":
     for key, value in (*request.intrinsics.items(), ("distortion", request.distortion)):
         if value is not None:
             raise InputError("vergence track", f"--{key}", value, "either --camera or intrinsics")
-    return camera_of_file(request.camera, width, height)
+    return read_camera(request.camera, width, height)
 
 
 def _follower(

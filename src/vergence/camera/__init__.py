@@ -1,6 +1,7 @@
-"""Cameras: the pinhole model with distortion, and the frames they deliver."""
+"""Cameras: the pinhole model with distortion, files that describe it, and what it delivers."""
 
+from vergence.camera.files import camera_of, read_camera, write_camera
 from vergence.camera.frame import Frame, FrameTruth
 from vergence.camera.pinhole import Camera
 
-__all__ = ["Camera", "Frame", "FrameTruth"]
+__all__ = ["Camera", "Frame", "FrameTruth", "camera_of", "read_camera", "write_camera"]

@@ -6,6 +6,12 @@ from typing import Self
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.camera.distortion import (
+    distort_points,
+    distortion_reach,
+    distortion_slopes,
+    undistort_points,
+)
 from vergence.errors import InputError
 
 
@@ -24,12 +30,15 @@ class Camera:
     cx: float  # px
     cy: float  # px
     distortion: FloatArray = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3
+    reach: float = field(init=False, repr=False, compare=False)  # normalized; see distortion_reach
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "fx", "fy"):
             if not getattr(self, name) > 0:
                 raise InputError("Camera", name, getattr(self, name), "a number above zero")
         object.__setattr__(self, "distortion", frozen(self.distortion, (5,), "distortion"))
+        reach = distortion_reach(self.distortion) if self.distorted else np.inf
+        object.__setattr__(self, "reach", reach)
 
     @classmethod
     def from_lens(
@@ -68,20 +77,74 @@ class Camera:
 
     def to_pixels(self, normalized: FloatArray) -> FloatArray:
         """Turn normalized coordinates (N, 2) into pixels (N, 2)."""
-        points = self._distort(normalized) if self.distorted else np.asarray(normalized)
+        points = np.asarray(normalized, dtype=np.float64)
+        if self.distorted:
+            points = distort_points(points, self.distortion)
         pixels: FloatArray = points * self.focal_px + (self.cx, self.cy)
         return pixels
 
     def normalize(self, points_px: FloatArray) -> FloatArray:
         """Turn pixels (N, 2) into normalized coordinates (N, 2)."""
         points: FloatArray = (np.asarray(points_px) - (self.cx, self.cy)) / self.focal_px
-        return self._undistort(points) if self.distorted else points
+        return undistort_points(points, self.distortion) if self.distorted else points
 
-    def normalize_covariance(self, covariance_px: FloatArray) -> FloatArray:
-        """Turn covariances (N, 2, 2) in px² into normalized coordinates."""
+    def normalize_velocity(self, velocity_px: FloatArray, normalized: FloatArray) -> FloatArray:
+        """Turn velocities (N, 2) in px/s, of points at normalized (N, 2), into 1/s."""
+        scaled: FloatArray = velocity_px / self.focal_px
+        if self.distorted:
+            slopes = distortion_slopes(normalized, self.distortion)
+            scaled = np.asarray(np.linalg.solve(slopes, scaled[:, :, None])[:, :, 0])
+        return scaled
+
+    def normalize_covariance(self, covariance_px: FloatArray, normalized: FloatArray) -> FloatArray:
+        """Turn covariances (N, 2, 2), px², of points at normalized (N, 2), into theirs."""
         scale = 1.0 / self.focal_px
-        normalized: FloatArray = covariance_px * np.outer(scale, scale)
-        return normalized
+        scaled: FloatArray = covariance_px * np.outer(scale, scale)
+        if not self.distorted:
+            return scaled
+        inverse = np.linalg.inv(distortion_slopes(normalized, self.distortion))
+        bent: FloatArray = inverse @ scaled @ inverse.transpose(0, 2, 1)
+        return bent
+
+    def rectangle(self, margin_px: float = 0.0) -> FloatArray:
+        """Return x_min, x_max, y_min, y_max, (4,), of the largest normalized rectangle in view.
+
+        With distortion it lies inside the curved border.
+
+        Args:
+            margin_px: distance to keep from the border of the image.
+        """
+        left, right, top, bottom = self._sides(margin_px)
+        return np.array([left[:, 0].max(), right[:, 0].min(), top[:, 1].max(), bottom[:, 1].min()])
+
+    def undistorted(self) -> "Camera":
+        """Return the smallest camera without distortion that sees all that this one sees.
+
+        Its focal length is the same; it is this camera itself where there is no distortion.
+
+        Raises:
+            InputError: if the distortion is not one-to-one over the picture.
+        """
+        if not self.distorted:
+            return self
+        border = np.concatenate(self._sides(0.0))
+        if not self._is_one_to_one(border):
+            allowed = "coefficients that map the picture one-to-one"
+            raise InputError("Camera", "distortion", self.distortion.tolist(), allowed)
+        low = np.floor(border.min(axis=0) * self.focal_px) - 1.0
+        high = np.ceil(border.max(axis=0) * self.focal_px) + 1.0
+        width, height = (high - low).astype(int)
+        center = -low - 0.5
+        return Camera(int(width), int(height), self.fx, self.fy, center[0], center[1])
+
+    def in_view(self, points_camera: FloatArray) -> BoolArray:
+        """Tell which points (N, 3) of the camera's frame project into the picture."""
+        points = np.asarray(points_camera, dtype=np.float64)
+        seen: BoolArray = points[:, 2] > 0.0
+        normalized = points[seen, :2] / points[seen, 2:]
+        near = np.hypot(*normalized.T) < self.reach
+        seen[seen] = near & self.contains(self.to_pixels(normalized))
+        return seen
 
     def contains(self, points_px: FloatArray, margin_px: float = 0.0) -> BoolArray:
         """Tell which pixels (N, 2) lie in the image, at least the margin from its border."""
@@ -91,29 +154,19 @@ class Camera:
         inside: BoolArray = np.all((points_px >= low) & (points_px < high), axis=1)
         return inside
 
-    def _distort(self, normalized: FloatArray) -> FloatArray:
-        x, y = normalized[:, 0], normalized[:, 1]
-        k1, k2, p1, p2, k3 = self.distortion
-        r2 = x * x + y * y
-        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        return np.column_stack(
-            (
-                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-            )
-        )
+    def _sides(self, margin_px: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return normalized coordinates along the left, right, upper and lower border, (33, 2)."""
+        low, right, bottom = margin_px - 0.5, self.width - 0.5, self.height - 0.5
+        right, bottom = right - margin_px, bottom - margin_px
+        u, v = np.linspace(low, right, 33), np.linspace(low, bottom, 33)
 
-    def _undistort(self, distorted: FloatArray) -> FloatArray:
-        # Newton on the distortion itself: three steps reach 1e-12 for ordinary lenses.
-        points = distorted.copy()
-        for _ in range(8):
-            residual = self._distort(points) - distorted
-            jacobian = np.stack((self._slope(points, 0), self._slope(points, 1)), axis=2)
-            points = points - np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
-        return points
+        def side(us: FloatArray | float, vs: FloatArray | float) -> FloatArray:
+            return self.normalize(np.column_stack(np.broadcast_arrays(us, vs)))
 
-    def _slope(self, points: FloatArray, axis: int) -> FloatArray:
-        """Return the distortion's derivative along one axis, (N, 2), by central differences."""
-        step = 1e-6 * np.eye(2)[axis]
-        slope: FloatArray = (self._distort(points + step) - self._distort(points - step)) / 2e-6
-        return slope
+        return side(low, v), side(right, v), side(u, low), side(u, bottom)
+
+    def _is_one_to_one(self, border: FloatArray) -> bool:
+        """Whether the border, normalized (N, 2), lies within reach and maps back to itself."""
+        pixels = self.to_pixels(border)
+        inside = (pixels > -0.51).all() and (pixels < (self.width - 0.49, self.height - 0.49)).all()
+        return bool(inside and (np.hypot(*border.T) < self.reach).all())

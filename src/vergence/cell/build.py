@@ -28,9 +28,9 @@ def assemble(cell: Cell) -> Any:
     spec.visual.map.znear = 0.01
     spec.stat.extent = 1.0
     spec.visual.headlight.active = 0
-    width = max(table.resolution[0] for table in cell.cameras.values())
-    height = max(table.resolution[1] for table in cell.cameras.values())
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
+    rendered = [_rendered(cell, name) for name in cell.cameras]
+    spec.visual.global_.offwidth = max(camera.width for camera in rendered)
+    spec.visual.global_.offheight = max(camera.height for camera in rendered)
     room = cell.scene.model or _ROOM
     spec.attach(_read(cell, "scene.model", room), frame=spec.worldbody.add_frame(), prefix="scene/")
     for light in spec.lights:
@@ -112,7 +112,7 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
 
 
 def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
-    camera = intrinsics(table)
+    camera = _rendered(cell, name)
     body = spec.worldbody
     if table.arm is not None:
         wanted = table.body or cell.arms[table.arm].body
@@ -143,4 +143,15 @@ def intrinsics(table: CameraTable) -> Camera:
         assert table.pixel_um is not None
         fx, fy = (table.focal_mm * 1e3 / size for size in table.pixel_um)
     cx, cy = table.principal_px or ((width - 1) / 2, (height - 1) / 2)
-    return Camera(width, height, fx, fy, cx, cy)
+    distortion = np.zeros(5)
+    distortion[: len(table.distortion)] = table.distortion
+    return Camera(width, height, fx, fy, cx, cy, distortion)
+
+
+def _rendered(cell: Cell, name: str) -> Camera:
+    """Return the camera that MuJoCo draws for one of a cell; its pictures are distorted after."""
+    try:
+        return intrinsics(cell.cameras[name]).undistorted()
+    except InputError as error:
+        key = f"cameras.{name}.{error.key}"
+        raise InputError(str(cell.path), key, error.given, error.allowed) from None

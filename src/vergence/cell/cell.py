@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
+from vergence.camera import read_camera
 from vergence.cell.schema import (
     TABLES,
     ArmTable,
@@ -144,6 +145,7 @@ def _other_kind(old: Mapping[str, Any], change: Mapping[str, Any]) -> bool:
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
+    values = _with_calibrations(values, path)
     try:
         cell = Cell.model_validate(values)
     except ValidationError as error:
@@ -151,6 +153,34 @@ def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
     cell._path, cell._text = path, text
     _check_names(cell)
     return cell
+
+
+def _with_calibrations(values: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Put in what the camera files say that a cell names; what cannot be one is left as it is."""
+    cameras = values.get("cameras")
+    if not isinstance(cameras, Mapping):
+        return values
+    calibrated = {
+        name: _calibrated(table, path, f"cameras.{name}.")
+        for name, table in cameras.items()
+        if isinstance(table, Mapping) and isinstance(table.get("calibration"), str)
+    }
+    return {**values, "cameras": {**cameras, **calibrated}}
+
+
+def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, Any]:
+    """Return a camera's table with the lens of its camera file."""
+    own = {key: value for key, value in table.items() if key != "calibration"}
+    for key in ("resolution", "focal_mm", "pixel_um", "focal_px", "principal_px", "distortion"):
+        if key in own:
+            raise InputError(str(path), place + key, own[key], "no lens beside calibration")
+    camera = read_camera(path.parent / table["calibration"])
+    return own | {
+        "resolution": (camera.width, camera.height),
+        "focal_px": (camera.fx, camera.fy),
+        "principal_px": (camera.cx, camera.cy),
+        "distortion": tuple(camera.distortion.tolist()),
+    }
 
 
 def _explain(error: ValidationError, source: str, values: Any) -> InputError:

@@ -100,8 +100,8 @@ class IdealDriver:
         T_world_target = cell.target(self.time)
         points = transform_points(se3_inverse(T_world_camera) @ T_world_target, cell.features)
         depth = points[:, 2].copy()
-        visible = depth > 1e-3
+        in_front = depth > 1e-3
         points_px = np.full((len(points), 2), np.nan)
-        points_px[visible] = cell.camera.project(points[visible])
-        visible[visible] = cell.camera.contains(points_px[visible])
+        points_px[in_front] = cell.camera.project(points[in_front])
+        visible = in_front & cell.camera.in_view(points)
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)

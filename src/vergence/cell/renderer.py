@@ -41,9 +41,11 @@ def choose_renderer(needed: bool = True) -> None:
 
 
 class CameraRenderer:
-    """Takes grey pictures with one camera of a world, with sensor noise.
+    """Takes grey pictures with one camera of a world, with distortion and sensor noise.
 
-    Shadows and multisampling stay off: a picture then costs a few milliseconds on a CPU.
+    Shadows and multisampling stay off: a picture then costs a few milliseconds on a CPU. MuJoCo
+    draws without distortion, a picture wide enough for all that the camera sees; each pixel of
+    the camera's own picture is then looked up in that one.
     """
 
     def __init__(
@@ -52,7 +54,8 @@ class CameraRenderer:
         import mujoco
 
         try:
-            self._renderer = mujoco.Renderer(model, camera.height, camera.width)
+            drawn = camera.undistorted()
+            self._renderer = mujoco.Renderer(model, drawn.height, drawn.width)
         except Exception as error:  # whatever the graphics library throws
             raise RenderingError(
                 f"the offscreen renderer does not start ({error}); "
@@ -60,7 +63,8 @@ class CameraRenderer:
             ) from None
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._renderer.scene.flags[flag] = 0
-        self._name = name
+        self._name, self._shape = name, (camera.height, camera.width)
+        self._lookup = _lookup(camera, drawn) if camera.distorted else None
         self._rng = rng
         shape = (camera.height + _NOISE_POOL, camera.width + _NOISE_POOL)
         self._noise = rng.normal(0, noise_grey, shape).astype(np.int16) if noise_grey else None
@@ -69,11 +73,7 @@ class CameraRenderer:
         """Return the picture (height, width) of the world as it stands, black if blind."""
         import cv2
 
-        if blind:
-            grey = np.zeros((self._renderer.height, self._renderer.width), dtype=np.uint8)
-        else:
-            self._renderer.update_scene(data, self._name)
-            grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
+        grey = np.zeros(self._shape, dtype=np.uint8) if blind else self._draw(data)
         if self._noise is not None:
             # A fresh window of one pool: drawing normal deviates would cost more than the picture.
             row, column = self._rng.integers(0, _NOISE_POOL, 2)
@@ -83,6 +83,25 @@ class CameraRenderer:
         image.flags.writeable = False
         return image
 
+    def _draw(self, data: Any) -> Any:
+        import cv2
+
+        self._renderer.update_scene(data, self._name)
+        grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
+        return grey if self._lookup is None else cv2.remap(grey, *self._lookup, cv2.INTER_LINEAR)
+
     def close(self) -> None:
         """Free the graphics context."""
         self._renderer.close()
+
+
+def _lookup(camera: Camera, drawn: Camera) -> tuple[Any, Any]:
+    """Return where each pixel of a camera lies in the picture drawn, as OpenCV's remap has it."""
+    import cv2
+
+    v, u = np.mgrid[: camera.height, : camera.width]
+    places = drawn.to_pixels(camera.normalize(np.column_stack((u.ravel(), v.ravel()))))
+    across, down = (
+        places.reshape(camera.height, camera.width, 2).astype(np.float32).transpose(2, 0, 1)
+    )
+    return cv2.convertMaps(across.copy(), down.copy(), cv2.CV_16SC2)

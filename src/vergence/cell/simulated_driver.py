@@ -195,8 +195,7 @@ class SimulatedDriver:
         in_front = depth > 1e-3
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = intrinsics.project(points[in_front])
-        visible = in_front & np.bool_(not blind)
-        visible[in_front] &= intrinsics.contains(points_px[in_front])
+        visible = intrinsics.in_view(points) & in_front & np.bool_(not blind)
         in_sight = np.flatnonzero(visible)
         if len(in_sight):
             points_world = transform_points(T_world_target, self._features[in_sight])

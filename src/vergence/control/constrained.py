@@ -179,9 +179,8 @@ class ConstrainedLaw:
         self.depth_m = frozen(depth_m, (None,), "depth_m")
         self.period = period
         self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
-        corners = np.array([[0.0, 0.0], [camera.width - 1.0, camera.height - 1.0]])
-        inside = corners + np.array([[1.0], [-1.0]]) * view_margin_px
-        low, high = camera.normalize(inside)
+        x_min, x_max, y_min, y_max = camera.rectangle(view_margin_px + 0.5)
+        low, high = np.array([x_min, y_min]), np.array([x_max, y_max])
         self._settings = ConstraintSettings(
             approach_rate,
             joint_margin if "joint margin" in order else 0.0,

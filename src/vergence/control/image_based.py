@@ -42,7 +42,7 @@ class ImageBased:
         desired = self._camera.normalize(reference.points_px)
         wanted = -self._gain * (features.points - desired) - features.flow
         if reference.velocity_px is not None:
-            wanted = wanted + reference.velocity_px / self._camera.focal_px
+            wanted = wanted + self._camera.normalize_velocity(reference.velocity_px, desired)
         L = self._interaction(features.points, desired, depth)
         objective: TwistObjective = least_squares_objective(
             L, wanted.ravel(), np.repeat(found, 2).astype(np.float64), self._R

@@ -79,7 +79,7 @@ class PathTrackingLaw:
         wanted = self.camera.normalize(reference.points_px[found])
         feedforward = np.zeros_like(wanted)
         if reference.velocity_px is not None:
-            feedforward = reference.velocity_px[found] / self.camera.focal_px
+            feedforward = self.camera.normalize_velocity(reference.velocity_px[found], wanted)
         L = self.interaction(seen, wanted, reference.depth_m[found])
         error = (seen - wanted).ravel()
         twist = tracking_twist(L, error, feedforward.ravel(), self.gain, self.damping)

@@ -9,6 +9,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
+from vergence.camera.distortion import distort
 from vergence.errors import InputError, nearest
 
 # Columns of a packed lens.
@@ -72,11 +73,8 @@ def lens_pixel(lens: FloatArray, x: float, y: float) -> tuple[float, float, bool
     outside the field of view would seem to lie in the picture; such a point is not one-to-one.
     """
     r2 = x * x + y * y
-    k1, k2, k3 = lens[K1], lens[K2], lens[K3]
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    growth = 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3))
-    u = x * radial + 2.0 * lens[P1] * x * y + lens[P2] * (r2 + 2.0 * x * x)
-    v = y * radial + lens[P1] * (r2 + 2.0 * y * y) + 2.0 * lens[P2] * x * y
+    growth = 1.0 + r2 * (3.0 * lens[K1] + r2 * (5.0 * lens[K2] + r2 * 7.0 * lens[K3]))
+    u, v = distort(x, y, lens[K1], lens[K2], lens[P1], lens[P2], lens[K3])
     return lens[FX] * u + lens[CX], lens[FY] * v + lens[CY], growth > 0.0
 
 

@@ -103,6 +103,7 @@ def view_of(
     measured, covariance = pinhole_coordinates(places, spread, lens)
     if camera.distorted:
         measured = camera.normalize(places)
+        covariance = camera.normalize_covariance(spread, measured)
     return View(
         image_points.camera,
         image_points.time,

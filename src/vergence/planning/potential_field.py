@@ -10,7 +10,6 @@ from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.field import ARRIVED, STUCK, Field, FieldPath, descend
 from vergence.planning.path import Path
 from vergence.planning.problem import PlanningProblem
-from vergence.planning.visibility import image_bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +114,7 @@ def _pose_free_field(problem: PlanningProblem, long_way: bool) -> tuple[Field, F
         delta=(points[:, 2] - distance) / points[:, 2],
         distance=distance,
         T_world_star=problem.T_world_goal.copy(),
-        bounds=image_bounds(problem.camera, problem.margin_px),
+        bounds=problem.camera.rectangle(problem.margin_px),
         image_zone=np.ones(4),
         q_min=problem.arm.q_min.copy(),
         q_max=problem.arm.q_max.copy(),

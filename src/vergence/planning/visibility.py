@@ -23,32 +23,9 @@ class View(NamedTuple):
     points_world: FloatArray  # (N, 3) m
 
 
-def image_bounds(camera: Camera, margin_px: float = 0.0) -> FloatArray:
-    """Return the largest rectangle x_min, x_max, y_min, y_max of normalized coordinates in view.
-
-    Args:
-        camera: any; with distortion the rectangle lies inside the curved border.
-        margin_px: distance to keep from the border of the image.
-    """
-    low, right, bottom = margin_px - 0.5, camera.width - 0.5, camera.height - 0.5
-    u, v = np.linspace(low, right - margin_px, 33), np.linspace(low, bottom - margin_px, 33)
-
-    def side(us: FloatArray, vs: FloatArray, axis: int) -> FloatArray:
-        return camera.normalize(np.column_stack(np.broadcast_arrays(us, vs)))[:, axis]
-
-    return np.array(
-        [
-            side(u[:1], v, 0).max(),
-            side(u[-1:], v, 0).min(),
-            side(u, v[:1], 1).max(),
-            side(u, v[-1:], 1).min(),
-        ]
-    )
-
-
 def make_view(camera: Camera, points_world: FloatArray, margin_px: float, depth_min: float) -> View:
     """Return the view of a camera that keeps a margin in pixels and a least depth in metres."""
-    x_min, x_max, y_min, y_max = image_bounds(camera, margin_px)
+    x_min, x_max, y_min, y_max = camera.rectangle(margin_px)
     sides = np.array([[1, 0, -x_min], [-1, 0, x_max], [0, 1, -y_min], [0, -1, y_max], [0, 0, 1.0]])
     return View(
         sides / np.linalg.norm(sides, axis=1, keepdims=True),

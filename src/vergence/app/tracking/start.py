@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vergence.app.tracking.tables import KINDS, numbers, read_table, require_known
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.geometry import quaternion_to_matrix, rpy_to_matrix, se3, so3_exp
+from vergence.tables import KINDS, numbers, read_table, require_known
 
 _ROTATIONS = ("rotation_rpy_deg", "quaternion_wxyz", "rotation_vector")
 _KEYS = ("T_camera_target", "position_m", *_ROTATIONS, "points_m", "points_px")

@@ -78,6 +78,8 @@ class CameraTable(Placement):
     pixel_um: tuple[Positive, Positive] | None = None  # width and height of a pixel
     focal_px: tuple[Positive, Positive] | None = None  # instead of focal_mm and pixel_um
     principal_px: tuple[float, float] | None = None  # the middle of the image if absent
+    distortion: tuple[float, ...] = Field(default=(), max_length=5)  # k1, k2, p1, p2, k3 of OpenCV
+    calibration: Path | None = None  # a camera file, also ROS's, for the six keys above
     rate_hz: Positive = 30.0  # pictures a second
     latency_frames: Annotated[int, Field(ge=0)] = 0  # from exposure until the picture arrives
     noise_grey: Annotated[float, Field(ge=0)] = 1.0  # standard deviation, of 255
@@ -89,7 +91,7 @@ class CameraTable(Placement):
     def _one_lens(self) -> "CameraTable":
         by_lens = self.focal_mm is not None and self.pixel_um is not None
         if by_lens == (self.focal_px is not None):
-            raise ValueError("either focal_mm and pixel_um, or focal_px")
+            raise ValueError("either focal_mm and pixel_um, or focal_px, or calibration")
         return self
 
 

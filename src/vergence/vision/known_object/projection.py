@@ -8,11 +8,11 @@ from numba import njit
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
+from vergence.camera.distortion import distort, distortion_slope
 
 # Columns of a packed lens.
 FX, FY, CX, CY, WIDTH, HEIGHT, K1, K2, P1, P2, K3 = range(11)
 HIDDEN_SLACK = 2e-3  # of its depth: by how much a point must be behind a face to be hidden
-_STEP = 1e-5  # normalized, for the slope of the distortion
 
 
 def lens_of(camera: Camera) -> FloatArray:
@@ -24,10 +24,7 @@ def lens_of(camera: Camera) -> FloatArray:
 @njit(cache=True)
 def pixel_of(lens: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Return the pixel of normalized (x, y); the model of `Camera`."""
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (lens[K1] + r2 * (lens[K2] + r2 * lens[K3]))
-    u = x * radial + 2.0 * lens[P1] * x * y + lens[P2] * (r2 + 2.0 * x * x)
-    v = y * radial + lens[P1] * (r2 + 2.0 * y * y) + 2.0 * lens[P2] * x * y
+    u, v = distort(x, y, lens[K1], lens[K2], lens[P1], lens[P2], lens[K3])
     return lens[FX] * u + lens[CX], lens[FY] * v + lens[CY]
 
 
@@ -55,12 +52,10 @@ def pixel_rows(
         return np.nan, np.nan, pz
     x, y = px / pz, py / pz
     u, v = pixel_of(lens, x, y)
-    u1, v1 = pixel_of(lens, x + _STEP, y)
-    u2, v2 = pixel_of(lens, x, y + _STEP)
+    xx, xy, yy = distortion_slope(x, y, lens[K1], lens[K2], lens[P1], lens[P2], lens[K3])
     for i in range(2):
-        along_x = (u1 - u if i == 0 else v1 - v) / _STEP
-        along_y = (u2 - u if i == 0 else v2 - v) / _STEP
-        gx, gy = along_x / pz, along_y / pz
+        along_x, along_y = (xx, xy) if i == 0 else (xy, yy)
+        gx, gy = lens[i] * along_x / pz, lens[i] * along_y / pz
         gz = -(gx * x + gy * y)
         rows[i, 0], rows[i, 1], rows[i, 2] = gx, gy, gz
         rows[i, 3] = ay * gz - az * gy

@@ -1,4 +1,4 @@
-"""Tables a user writes: cameras and starting poses from TOML, JSON or YAML files."""
+"""Tables a user writes: cameras, poses and boards from TOML, JSON or YAML files."""
 
 import json
 import tomllib
