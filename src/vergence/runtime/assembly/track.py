@@ -88,7 +88,8 @@ def _on_target(points_px: FloatArray, driver: SimulatedDriver, camera: str) -> B
     """Tell whose windows lie on the target alone: what is behind it moves otherwise."""
     corners = points_px[:, None] + _WINDOW_PX / 2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     places = driver.anchor(camera, corners.reshape(-1, 2)).reshape(-1, 4, 3)
-    on: BoolArray = ~np.isnan(places).any(axis=(1, 2))
+    met = np.isfinite(places).reshape(len(points_px), -1)
+    on: BoolArray = met.all(axis=1)
     return on
 
 
