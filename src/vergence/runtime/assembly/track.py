@@ -87,9 +87,8 @@ def _far_apart(image: ImageArray, count: int, driver: SimulatedDriver, camera: s
 def _on_target(points_px: FloatArray, driver: SimulatedDriver, camera: str) -> BoolArray:
     """Tell whose windows lie on the target alone: what is behind it moves otherwise."""
     corners = points_px[:, None] + _WINDOW_PX / 2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    places = driver.anchor(camera, corners.reshape(-1, 2)).reshape(-1, 4, 3)
-    met = np.isfinite(places).reshape(len(points_px), -1)
-    on: BoolArray = met.all(axis=1)
+    depth = driver.anchor(camera, corners.reshape(-1, 2))[:, 2].reshape(-1, 4)
+    on: BoolArray = np.isfinite(depth.sum(axis=1))  # NaN where the target is not met
     return on
 
 
