@@ -1,7 +1,7 @@
 """Where the features are now, and how fast the target moves them: latency and motion undone."""
 
 from collections import deque
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -44,6 +44,11 @@ class ImageMotion:
         self._history: deque[tuple[float, FloatArray]] = deque()
         self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, q, points
         self._flow: FloatArray | None = None
+
+    @classmethod
+    def of(cls, arm: Arm, camera: Camera, smoothing_s: float | None) -> Self | None:
+        """Return one for a law that acts on pictures as they are unless a smoothing is given."""
+        return None if smoothing_s is None else cls(arm, camera, smoothing_s)
 
     def update(self, view: ImagePoints, depth: FloatArray, joints: JointState) -> FeatureState:
         """Take in a view and return the features now.

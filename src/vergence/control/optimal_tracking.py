@@ -7,6 +7,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera
 from vergence.control.command import JointCommand
+from vergence.control.image_motion import ImageMotion
 from vergence.control.tracking_kernels import (
     TrackingGains,
     TrackingSetup,
@@ -45,6 +46,8 @@ class OptimalTrackingLaw:
         penalty_k: steepness of the penalty.
         avoidance_speed_max: bound on the speed spent on avoidance, m/s.
         singular_below: smallest singular value of J at which the law gives up.
+        flow_smoothing_s: of the target's motion in the image, which is then fed forward, and
+            latency undone; None for the paper's law, which does neither.
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class OptimalTrackingLaw:
         penalty_k: float = 1e5,
         avoidance_speed_max: float = 0.5,
         singular_below: float = 0.02,
+        flow_smoothing_s: float | None = None,
     ) -> None:
         self.arm, self.camera = arm, camera
         self.depth_m = frozen(depth_m, (None,), "depth_m")
@@ -99,6 +103,7 @@ class OptimalTrackingLaw:
             arm.chain,
         )
         self._packed = pack_setup(self.setup)
+        self._motion = ImageMotion.of(arm, camera, flow_smoothing_s)
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -107,10 +112,12 @@ class OptimalTrackingLaw:
         view = observation.views[-1]
         assert reference.points_px is not None
         depth = self.depth_m if reference.depth_m is None else reference.depth_m
-        seen, wanted = view.points_px[view.found], reference.points_px[view.found]
-        features = np.column_stack(
-            (self.camera.normalize(seen), self.camera.normalize(wanted), depth[view.found])
-        )
+        if self._motion is None:
+            seen, flow = self.camera.normalize(view.points_px), np.empty((len(depth), 0))
+        else:
+            seen, flow = self._motion.update(view, depth, joints)
+        wanted = self.camera.normalize(reference.points_px)
+        features = np.column_stack((seen, wanted, depth, flow))[view.found]
         result = np.empty(self.arm.joint_count + 10)
         optimal_tracking_tick(*self._packed, joints.position, features, result)
         tick = unpack_tick(result)

@@ -1,6 +1,5 @@
 """Tracking a planned image trajectory."""
 
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -9,9 +8,10 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control.command import JointCommand
+from vergence.control.image_motion import FeatureState, ImageMotion
 from vergence.control.redundancy import resolve_redundant
 from vergence.errors import InputError
-from vergence.features import Observation, interaction_matrix_points
+from vergence.features import ImagePoints, Observation, interaction_matrix_points
 from vergence.outcome import OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import Arm, JointState, jacobian
@@ -40,28 +40,41 @@ def tracking_twist(
     return np.linalg.solve(A, L.T @ (feedforward - gain * error)).astype(np.float64)
 
 
-@dataclass(frozen=True, slots=True)
 class PathTrackingLaw:
     """Keeps image points on their trajectory s*(t); [Mezouar2001] section 5.
 
     Everything is in normalized coordinates (the paper's s is in pixels, its L normalized). Points
     that were not found are left out. The depths are the planner's, so with any model of L an error
     of d* scales the translation only; the error it acts on stays small.
+
+    Args:
+        arm: up to the camera.
+        camera: its intrinsics.
+        gain: λ, 1/s.
+        model: where L is taken: at s, at s*(t) as the paper does, or the mean of both.
+        damping: of L's pseudo-inverse, relative.
+        singular_below: singular values of J, relative to the largest, that are damped.
+        flow_smoothing_s: of the object's own motion in the image, which is then fed forward, and
+            latency undone; None for an object that stands.
     """
 
-    arm: Arm
-    camera: Camera
-    gain: float = 2.0  # λ, 1/s
-    model: Model = "desired"  # where L is taken: s, s*(t) as the paper does, or the mean of both
-    damping: float = 1e-6  # of L's pseudo-inverse
-    singular_below: float = 1e-2  # singular values of J, relative to the largest, that are damped
-
-    def __post_init__(self) -> None:
-        if self.model not in get_args(Model):
-            allowed = ", ".join(get_args(Model))
-            raise InputError("PathTrackingLaw", "model", self.model, allowed)
-        if not self.gain > 0:
-            raise InputError("PathTrackingLaw", "gain", self.gain, "a number above zero")
+    def __init__(
+        self,
+        arm: Arm,
+        camera: Camera,
+        gain: float = 2.0,
+        model: Model = "desired",
+        damping: float = 1e-6,
+        singular_below: float = 1e-2,
+        flow_smoothing_s: float | None = None,
+    ) -> None:
+        if model not in get_args(Model):
+            raise InputError("PathTrackingLaw", "model", model, ", ".join(get_args(Model)))
+        if not gain > 0:
+            raise InputError("PathTrackingLaw", "gain", gain, "a number above zero")
+        self.arm, self.camera, self.gain, self.model = arm, camera, gain, model
+        self.damping, self.singular_below = damping, singular_below
+        self._motion = ImageMotion.of(arm, camera, flow_smoothing_s)
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -73,13 +86,14 @@ class PathTrackingLaw:
             reason = f"{len(found)} of {len(view.found)} points found; {FEWEST} are needed"
             fault = (OutcomeKind.TARGET_LOST, reason)
             return JointCommand(np.zeros(self.arm.joint_count), np.zeros(6), fault=fault)
+        (seen, flow), reference = self._now(view, reference, joints)
         assert reference.points_px is not None
         assert reference.depth_m is not None
-        seen = self.camera.normalize(view.points_px[found])
-        wanted = self.camera.normalize(reference.points_px[found])
-        feedforward = np.zeros_like(wanted)
+        seen, wanted = seen[found], self.camera.normalize(reference.points_px[found])
+        feedforward = -flow[found]
         if reference.velocity_px is not None:
-            feedforward = self.camera.normalize_velocity(reference.velocity_px[found], wanted)
+            planned = self.camera.normalize_velocity(reference.velocity_px[found], wanted)
+            feedforward = feedforward + planned
         L = self.interaction(seen, wanted, reference.depth_m[found])
         error = (seen - wanted).ravel()
         twist = tracking_twist(L, error, feedforward.ravel(), self.gain, self.damping)
@@ -87,6 +101,17 @@ class PathTrackingLaw:
         rest = np.zeros(self.arm.joint_count)
         rates = resolve_redundant(J, twist, rest, self.arm.rate_max, self.singular_below)
         return JointCommand(rates, J @ rates)
+
+    def _now(
+        self, view: ImagePoints, reference: Reference, joints: JointState
+    ) -> tuple[FeatureState, Reference]:
+        """Return features and reference at one and the same time: now, or the exposure."""
+        if self._motion is None:
+            points = self.camera.normalize(view.points_px)
+            return FeatureState(points, np.zeros_like(points)), reference
+        assert reference.depth_m is not None
+        features = self._motion.update(view, reference.depth_m, joints)
+        return features, reference.at(joints.time)
 
     def interaction(self, seen: FloatArray, wanted: FloatArray, depth: FloatArray) -> FloatArray:
         """Return L̂, (2M, 6), at normalized points (M, 2) seen and wanted, depths (M,) in m."""

@@ -54,6 +54,7 @@ class PlainLaw:
         view = observation.views[-1]
         depth = self.depth_m if reference.depth_m is None else reference.depth_m
         features = self._motion.update(view, depth, joints)
+        reference = reference.at(joints.time)
         H, g = self.objective.twist_objective(*seen_only(features, view.found, depth, reference))
         twist = np.linalg.solve(H, g).astype(np.float64)
         J = self.arm.jacobian(joints.position)

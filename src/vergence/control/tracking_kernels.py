@@ -18,6 +18,10 @@ from vergence.robot.manipulability import (
 )
 from vergence.robot.positive_definite import factor_spd, outer_square, solve_factored
 
+# Times R: what going along with the target costs. So little that next to nothing of it is saved,
+# enough that the flow's noise does not shake axes that a small target hardly tells apart.
+SHARING = 1e-7
+
 
 class TrackingGains(NamedTuple):
     """The weights of the objective (28)."""
@@ -102,11 +106,31 @@ def tracking_displacement(
 
 
 @njit(cache=True, error_model="numpy")
+def target_displacement(drift_px: FloatArray, B: FloatArray, gains: TrackingGains) -> FloatArray:
+    """Return the camera's displacement over the next frame that goes along with the target, (6,).
+
+    It is (17) with the drift for an error, and errors so dear that R only decides how axes with the
+    same effect share the motion. Added to (29), whose R then charges only for what is done about
+    the error, it leaves no lag behind a target in uniform motion. The paper has no such term.
+
+    Args:
+        drift_px: how far the target's own motion moves the features in a frame, (2M,).
+        B: (2M, 6), px per m and per rad.
+        gains: the weights.
+    """
+    dear = TrackingGains(
+        gains.Q / SHARING, gains.R, 0.0, gains.controlled, gains.avoiding, 0.0, gains.period
+    )
+    return tracking_displacement(drift_px, B, dear, 0.0, gains.avoiding)
+
+
+@njit(cache=True, error_model="numpy")
 def image_model(features: FloatArray, focal_px: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return x - x_D (2M,) in pixels and B (2M, 6) at T = 1, [Nelson1995] eq. (15).
 
     Args:
-        features: one row each: x, y, wanted x, wanted y, normalized, and the depth in m, (M, 5).
+        features: one row each: x, y, wanted x, wanted y, normalized, and the depth in m, (M, 5 or
+            more).
         focal_px: (fx, fy).
     """
     B = interaction_matrix_points(features[:, :2], features[:, 4])
@@ -117,6 +141,16 @@ def image_model(features: FloatArray, focal_px: FloatArray) -> tuple[FloatArray,
             for i in range(6):
                 B[2 * j + a, i] *= focal_px[a]
     return error_px, B
+
+
+@njit(cache=True, error_model="numpy")
+def _drift(features: FloatArray, period: float, focal_px: FloatArray) -> FloatArray:
+    """Return how far the target's own motion moves the features in a frame, px, (2M,)."""
+    drift_px = np.empty(2 * len(features))
+    for j in range(len(features)):
+        for a in range(2):
+            drift_px[2 * j + a] = features[j, 5 + a] * period * focal_px[a]
+    return drift_px
 
 
 class PackedSetup(NamedTuple):
@@ -160,7 +194,8 @@ def optimal_tracking_tick(
         weights: of `pack_setup`.
         joints: of `pack_setup`.
         q: joint positions, (n,).
-        features: as for `image_model`, (M, 5).
+        features: as for `image_model`, (M, 5), or (M, 7) with the target's own motion in the
+            picture as well, normalized, 1/s, which is then fed forward.
         result: takes the fields of a `TrackingTick` one after the other, (n + 10,).
     """
     n, gains, focal_px = len(q), unpack_gains(weights), weights[7:9]
@@ -174,6 +209,8 @@ def optimal_tracking_tick(
     error_px, B = image_model(features, focal_px)
     w = P * arm.det_JJt
     v_camera = tracking_displacement(error_px, B, gains, w, gradient)
+    if features.shape[1] == 7:
+        v_camera += target_displacement(_drift(features, gains.period, focal_px), B, gains)
     for i in range(6):
         v_camera[i] /= gains.period
     rates = joint_rates(arm, v_camera)

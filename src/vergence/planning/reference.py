@@ -1,6 +1,7 @@
 """What the law should reach now."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 from vergence.arrays import FloatArray
 
@@ -14,3 +15,10 @@ class Reference:
     velocity_px: FloatArray | None = None  # (M, 2) ds*/dt, px/s
     depth_m: FloatArray | None = None  # (M,) depth of the points as the planner knows it
     T_camera_target: FloatArray | None = None  # (4, 4) wanted relative pose
+
+    def at(self, time: float) -> Self:
+        """Return the reference moved on, at its velocity, to a time near its own."""
+        if self.points_px is None or self.velocity_px is None:
+            return self
+        points_px = self.points_px + self.velocity_px * (time - self.time)
+        return replace(self, time=time, points_px=points_px)

@@ -21,6 +21,7 @@ class OptimalTrackingTable(Table):
     depth_m: Positive | Literal["initial"] = "initial"  # what the start shows, held constant
     avoidance_speed_max_m_s: Positive = 0.5  # of the camera, for avoidance
     singular_below: Positive = 0.02  # smallest singular value of J at which the law gives up
+    flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the target stands if absent
 
 
 class PositionBasedTable(Table):
@@ -82,6 +83,7 @@ class PathTrackingTable(Table):
     kind: Literal["path_tracking"]
     gain: Positive = 2.0  # λ, 1/s
     interaction: Literal["current", "desired", "mean"] = "desired"  # where L is taken
+    flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the object stands if absent
 
 
 Law = Annotated[

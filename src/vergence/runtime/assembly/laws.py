@@ -46,7 +46,10 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
             _require_task(cell, "reach")
             name, table = cell.task.camera, cell.law
             arm, camera = driver.world.arm_to_camera(name), driver.cameras[name]
-            return PathTrackingLaw(arm, camera, table.gain, table.interaction)
+            smoothing = table.flow_smoothing_s
+            return PathTrackingLaw(
+                arm, camera, table.gain, table.interaction, flow_smoothing_s=smoothing
+            )
 
 
 def _require_task(cell: Cell, *kinds: str) -> None:
@@ -96,6 +99,7 @@ def _optimal_tracking(
         penalty_k=table.penalty_k,
         avoidance_speed_max=table.avoidance_speed_max_m_s,
         singular_below=table.singular_below,
+        flow_smoothing_s=table.flow_smoothing_s,
     )
 
 
