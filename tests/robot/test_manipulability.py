@@ -12,6 +12,7 @@ from vergence.robot import (
     determinant_measure,
     joint_limit_penalty,
     manipulability,
+    manipulability_measure,
     numeric_camera_gradient,
     per_joint_limit_penalty,
     relative_manipulability,
@@ -141,7 +142,7 @@ def test_the_penaltys_gradient_is_exact_up_to_the_limit(penalty, k: float, near:
 
 
 @pytest.mark.parametrize("per_joint", [False, True])
-@pytest.mark.parametrize("joint_count", [6, 7, 9])
+@pytest.mark.parametrize("joint_count", [2, 4, 5, 6, 7, 9])
 def test_the_gradient_is_exact_for_any_arm(joint_count: int, per_joint: bool) -> None:
     rng = np.random.default_rng(17)
     for seed in range(4):
@@ -150,6 +151,20 @@ def test_the_gradient_is_exact_for_any_arm(joint_count: int, per_joint: bool) ->
         expected = differences(lambda at, a=arm: measure(a, at, per_joint).value, q, 1e-4)
         found = measure(arm, q, per_joint).gradient_q
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * abs(expected).max())
+
+
+@pytest.mark.parametrize("joint_count", [3, 5, 6, 8])
+def test_an_arm_of_any_number_of_joints_has_its_singular_values_as_measure(
+    joint_count: int,
+) -> None:
+    arm = arms(joint_count, 1)
+    q = somewhere(arm, np.random.default_rng(19))
+    m, J = measure(arm, q), arm.jacobian(q)
+    singular = np.linalg.svd(J, compute_uv=False)
+    assert m.det_JJt == pytest.approx(np.prod(singular) ** 2)
+    assert manipulability_measure(J) == pytest.approx(np.prod(singular))
+    assert 0.3 * singular[-1] < m.smallest_singular_value <= singular[-1] * (1 + 1e-9)
+    np.testing.assert_allclose(m.J_inverse, np.linalg.pinv(J), atol=1e-9)
 
 
 @pytest.mark.parametrize("near", [0.9, 0.99, 0.9999])

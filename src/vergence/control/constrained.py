@@ -71,7 +71,7 @@ def constrained_rates(
     m = manipulability(chain, q, limits[0], limits[1], avoidance.penalty_k, True, 1e-3)
     J = m.J_camera
     H, g = joint_objective(H_twist, g_twist, J, avoidance.damping)
-    H_inverse = invert_spd_any(H)
+    H_inverse, _ = invert_spd_any(H)
     if avoidance.S > 0.0 and m.value > 0.0:
         pull = avoidance.S * period * period / (2.0 * m.value * m.value) * m.gradient_q
         rate = H_inverse @ pull

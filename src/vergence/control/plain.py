@@ -12,7 +12,7 @@ from vergence.errors import InputError
 from vergence.features import Observation
 from vergence.outcome import OutcomeKind
 from vergence.planning import Reference
-from vergence.robot import Arm, JointState
+from vergence.robot import Arm, JointState, manipulability_measure
 
 
 class PlainLaw:
@@ -69,5 +69,5 @@ class PlainLaw:
         J_inverse = np.linalg.pinv(J).astype(np.float64)
         rates, scale = resolve_twist(J_inverse, twist, self.arm.rate_max)
         active = ("joint rates",) if scale < 1.0 else ()
-        measure = float(np.linalg.det(J @ J.T))
+        measure = manipulability_measure(J) ** 2
         return JointCommand(rates, scale * twist, measure, active=active, fault=fault)

@@ -7,7 +7,12 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.robot.chain import Chain, jacobian
-from vergence.robot.positive_definite import invert_spd, outer_square, times_six
+from vergence.robot.positive_definite import (
+    invert_spd,
+    invert_spd_any,
+    outer_square,
+    times_six,
+)
 
 
 class Manipulability(NamedTuple):
@@ -15,7 +20,7 @@ class Manipulability(NamedTuple):
 
     value: float  # w'(q) = P(q) det(J Jᵀ), [Nelson1995] eq. (26)
     penalty: float  # P(q), eq. (27)
-    det_JJt: float  # det(J Jᵀ), the square of Yoshikawa's measure (21)
+    det_JJt: float  # det(J Jᵀ), the square of (21); det(Jᵀ J) of (22) with fewer than six joints
     gradient_q: FloatArray  # (n,) ∂w'/∂q
     gradient_camera: FloatArray  # (6,) ∂w'/∂x along the camera's axes, per m and per rad
     J_camera: FloatArray  # (6, n)
@@ -36,6 +41,11 @@ def yoshikawa_measure(J: FloatArray) -> float:
 def transmissibility_measure(J: FloatArray) -> float:
     """Return √det(Jᵀ J) of a Jacobian (m, n) with m ≥ n, [Nelson1995] eq. (22)."""
     return float(np.sqrt(max(np.linalg.det(J.T @ J), 0.0)))
+
+
+def manipulability_measure(J: FloatArray) -> float:
+    """Return (21), or (22) where the arm has fewer joints than the Jacobian (m, n) has rows."""
+    return yoshikawa_measure(J) if J.shape[1] >= J.shape[0] else transmissibility_measure(J)
 
 
 def relative_manipulability(J: FloatArray, a: FloatArray, d: FloatArray) -> float:
@@ -113,10 +123,10 @@ class Posture(NamedTuple):
     """An arm at one configuration: what the laws and measures build on."""
 
     J: FloatArray  # (6, n) of the tip, in its own frame: v_tip = J q̇
-    inverse: FloatArray  # (6, 6) (J Jᵀ)⁻¹
+    inverse: FloatArray  # (6, 6) (J Jᵀ)⁻¹; with fewer than six joints the pseudo-inverse
     damped: FloatArray  # (6, 6) (J Jᵀ + λ² I)⁻¹; the inverse itself away from singularities
-    det_JJt: float  # det(J Jᵀ)
-    sigma: float  # smallest singular value of J, bounded from below: 1/√tr((J Jᵀ)⁻¹)
+    det_JJt: float  # det(J Jᵀ), or det(Jᵀ J) with fewer than six joints
+    sigma: float  # smallest singular value of J, bounded from below: 1/√tr((J Jᵀ)⁺)
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,7 +137,7 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
     """
     J = jacobian(chain, q)
     A = outer_square(J)
-    inverse, det_JJt = invert_spd(A)
+    inverse, det_JJt = invert_spd(A) if J.shape[1] >= 6 else pseudo_invert_square(J)
     trace = 0.0
     for i in range(6):
         trace += inverse[i, i]
@@ -141,8 +151,26 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
 
 
 @njit(cache=True, error_model="numpy")
+def pseudo_invert_square(J: FloatArray) -> tuple[FloatArray, float]:
+    """Return (J Jᵀ)⁺ = J (Jᵀ J)⁻² Jᵀ (6, 6) and det(Jᵀ J) of J (6, n) with n < 6."""
+    n = J.shape[1]
+    inner = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            for r in range(6):
+                inner[i, j] += J[r, i] * J[r, j]
+    inverse, determinant = invert_spd_any(inner)
+    X = np.zeros((6, n))
+    for r in range(6):
+        for i in range(n):
+            for j in range(n):
+                X[r, i] += J[r, j] * inverse[j, i]
+    return outer_square(X), determinant
+
+
+@njit(cache=True, error_model="numpy")
 def pseudo_inverse_transposed(inverse: FloatArray, J: FloatArray) -> FloatArray:
-    """Return X = (J Jᵀ)⁻¹ J (6, n), the transpose of J⁺."""
+    """Return X = (J Jᵀ)⁺ J (6, n), the transpose of J⁺."""
     X = np.empty(J.shape)
     for i in range(J.shape[1]):
         for r in range(6):

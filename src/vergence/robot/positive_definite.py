@@ -40,17 +40,18 @@ def invert_spd(A: FloatArray) -> tuple[FloatArray, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def invert_spd_any(A: FloatArray) -> FloatArray:
-    """Return A⁻¹ (n, n) for as many joints as there are, with `invert_spd`'s care for pivots."""
+def invert_spd_any(A: FloatArray) -> tuple[FloatArray, float]:
+    """Return A⁻¹ (n, n) and det A for as many joints as there are, as `invert_spd` does."""
     n = len(A)
     if n == 6:
-        inverse: FloatArray = invert_spd(A)[0]
-        return inverse
+        return invert_spd(A)
     inverse = A.copy()
     trace = 1e-280
     for i in range(n):
         trace += A[i, i]
+    determinant = 1.0
     for k in range(n):
+        determinant *= max(inverse[k, k], 0.0)
         scale = 1.0 / max(inverse[k, k], _PIVOT_FLOOR * trace)
         for j in range(n):
             inverse[k, j] *= scale
@@ -61,7 +62,7 @@ def invert_spd_any(A: FloatArray) -> FloatArray:
                 inverse[i, k] = 0.0
                 for j in range(n):
                     inverse[i, j] -= factor * inverse[k, j]
-    return inverse
+    return inverse, determinant
 
 
 @njit(cache=True, error_model="numpy")

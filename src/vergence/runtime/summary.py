@@ -39,8 +39,9 @@ class Summary:
         for command in record.commands.values():
             if np.isnan(self._start_manipulability):
                 self._start_manipulability = command.manipulability
-            ratio = command.manipulability / self._start_manipulability
-            self._keep("min_manipulability_ratio", ratio, min)
+            if self._start_manipulability > 0:
+                ratio = command.manipulability / self._start_manipulability
+                self._keep("min_manipulability_ratio", ratio, min)
             self._keep("min_penalty", command.penalty, min)
         self._keep_pose_errors(record)
         views = [view for view in record.observation.views if view.camera == self._camera]

@@ -20,7 +20,7 @@ from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
 from vergence.errors import InputError
-from vergence.robot import Arm, reverse_arm, yoshikawa_measure
+from vergence.robot import Arm, manipulability_measure, reverse_arm
 
 
 def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
@@ -113,7 +113,7 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
             str(cell.path), "law.depth_range", table.depth_range, "a factor up to 1 and one from 1"
         )
     q = driver.read().joints[cell.task.arm].position
-    start = yoshikawa_measure(arm.jacobian(q[::-1] if _is_fixed(cell) else q))
+    start = manipulability_measure(arm.jacobian(q[::-1] if _is_fixed(cell) else q))
     return ConstrainedLaw(
         arm,
         camera,
