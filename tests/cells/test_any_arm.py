@@ -21,7 +21,8 @@ ROBOT = """<robot name="r">
   <link name="mast">
     <visual><geometry><mesh filename="package://robots/seen.{seen}"/></geometry></visual>
     <collision><geometry><box size="0.1 0.1 0.3"/></geometry></collision>
-    <inertial><mass value="0"/><inertia ixx="9" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+    <inertial><mass value="0"/>
+      <inertia ixx="9" ixy="{ixy}" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
   </link>
   <joint name="mount" type="fixed"><parent link="mast"/><child link="tool"/>
     <origin xyz="0 0 0.3"/></joint>
@@ -32,11 +33,11 @@ ROBOT = """<robot name="r">
 </robot>"""
 
 
-def urdf(folder: Path, seen: str) -> Path:
+def urdf(folder: Path, seen: str, ixy: float = 0.0) -> Path:
     (folder / "robots" / "urdf").mkdir(parents=True)
     (folder / "robots" / f"seen.{seen}").write_text(TETRAHEDRON)
     path = folder / "robots" / "urdf" / "r.urdf"
-    path.write_text(ROBOT.format(seen=seen))
+    path.write_text(ROBOT.format(seen=seen, ixy=ixy))
     return path
 
 
@@ -55,6 +56,11 @@ def test_a_link_is_drawn_by_its_visual_shape_where_it_can_be_read(tmp_path, seen
     wanted = {"mesh": mujoco.mjtGeom.mjGEOM_MESH, "box": mujoco.mjtGeom.mjGEOM_BOX}[drawn]
     assert shapes.tolist() == [int(wanted)]
     assert not model.geom_contype.any()
+
+
+def test_an_inertia_that_no_body_can_have_is_made_one(tmp_path):
+    model = read_urdf(urdf(tmp_path, "obj", ixy=30.0), "tool").compile()
+    assert (model.body("mast").inertia > 0).all()
 
 
 def test_a_missing_mesh_is_named(tmp_path):
@@ -91,7 +97,7 @@ def test_other_models_lie_beside_the_cell():
     assert locate_model(Path("/b/a.xml"), Path("/cells"), "", "") == Path("/b/a.xml")
 
 
-@pytest.mark.parametrize(("name", "joints"), [("ur5", 6), ("panda", 7)])
+@pytest.mark.parametrize(("name", "joints"), [("so100", 5), ("ur5", 6), ("panda", 7)])
 def test_the_chain_of_a_urdf_agrees_with_mujoco_in_random_postures(name, joints):
     cell = load_cell(name)
     world = World(cell)
@@ -105,7 +111,7 @@ def test_the_chain_of_a_urdf_agrees_with_mujoco_in_random_postures(name, joints)
         np.testing.assert_allclose(arm.forward_kinematics(q), world.camera_pose(camera), atol=1e-9)
 
 
-@pytest.mark.parametrize(("name", "joints"), [("ur5", 6), ("panda", 7)])
+@pytest.mark.parametrize(("name", "joints"), [("so100", 5), ("ur5", 6), ("panda", 7)])
 def test_an_arm_from_a_urdf_keeps_a_moving_board_in_view_within_its_limits(name, joints):
     cell = load_cell(name, {"duration_s": "5"})
     listener = Extremes(name)

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
 import mujoco
+import numpy as np
 
 from vergence.errors import InputError
 
@@ -24,6 +25,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     - `package://NAME/…` is looked for in the folders above the file, as a ROS workspace lays them
       out;
     - a link whose visual meshes MuJoCo cannot read is drawn by its collision shapes;
+    - an inertia that no body can have loses its products of inertia;
     - joints that do not lead to the last body, as a gripper's, are locked where they are zero;
     - arms touch nothing, as the arms of all our cells.
 
@@ -37,6 +39,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     robot = _parse(path)
     for link in robot.iter("link"):
         _choose_shapes(link)
+        _mend_inertia(link)
     for mesh in robot.iter("mesh"):
         mesh.set("filename", str(_find_mesh(mesh.get("filename", ""), path)))
     if last_body is not None:
@@ -73,6 +76,19 @@ def _choose_shapes(link: Element) -> None:
         for shape in collision:
             if not _drawable(shape):
                 link.remove(shape)
+
+
+def _mend_inertia(link: Element) -> None:
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return
+    tensor = np.zeros((3, 3))
+    for row, column in zip(*np.triu_indices(3), strict=True):
+        key = "i" + "xyz"[row] + "xyz"[column]
+        tensor[row, column] = tensor[column, row] = float(inertia.get(key, 0.0))
+    if np.linalg.eigvalsh(tensor)[0] <= 0:
+        for key in ("ixy", "ixz", "iyz"):
+            inertia.set(key, "0")
 
 
 def _drawable(shape: Element) -> bool:

@@ -133,6 +133,13 @@ class World:
         eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
         return ~hidden(self.model, self.data, eye, points)
 
+    def in_the_way(self, camera: str, points: FloatArray) -> tuple[str, ...]:
+        """Return the names of the bodies that hide points (N, 3) in the world from a camera."""
+        eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
+        geoms = hiding(self.model, self.data, eye, points)
+        bodies = {int(self.model.geom_bodyid[geom]) for geom in geoms if geom >= 0}
+        return tuple(sorted(self.model.body(body).name for body in bodies))
+
     def _body_pose(self, body: int) -> FloatArray:
         T = np.eye(4)
         T[:3, :3] = self.data.xmat[body].reshape(3, 3)
@@ -208,7 +215,13 @@ class World:
 def hidden(
     model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None
 ) -> BoolArray:
-    """Tell which points (N, 3) a surface hides from an eye, (N,).
+    """Tell which points (N, 3) a surface hides from an eye, (N,)."""
+    result: BoolArray = hiding(model, data, eye, points, groups) >= 0
+    return result
+
+
+def hiding(model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None) -> Any:
+    """Return which geometry hides each of the points (N, 3) from an eye, (N,); -1 for none.
 
     A point counts as seen up to a few millimetres inside a surface, so that corners do.
     """
@@ -220,8 +233,7 @@ def hidden(
     mujoco.mj_multiRay(
         model, data, eye, directions, groups, True, -1, geoms, met, None, len(rays), reach
     )
-    result: BoolArray = (geoms >= 0) & (met < distance - _SKIN_M)
-    return result
+    return np.where(met < distance - _SKIN_M, geoms, -1)
 
 
 def _descendants(model: Any, root: int) -> frozenset[int]:

@@ -3,11 +3,13 @@
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.camera import FrameTruth
 from vergence.cell import Cell, SimulatedDriver
 from vergence.cell.schema import TrackTable
 from vergence.errors import InputError
 from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.tracked_points import TrackedPoints
+from vergence.geometry import transform_points
 from vergence.planning import FixedReference, Reference
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
@@ -36,11 +38,10 @@ def _look(
         frame = driver.first_frame(name)
     assert frame.truth is not None
     if not frame.truth.visible.all():
-        hidden = ", ".join(str(j) for j in np.flatnonzero(~frame.truth.visible))
         raise InputError(
             str(cell.path),
             "target",
-            f"at the start camera {name} does not see feature {hidden} of it",
+            f"at the start camera {name} does not see {_unseen(driver, name, frame.truth)}",
             "a start from which the camera sees every feature",
         )
     points_px = frame.truth.points_px
@@ -53,13 +54,31 @@ def _look(
     return points_px, TrackedPoints(name, SsdTracker(frame.image, points_px))
 
 
+def _unseen(driver: SimulatedDriver, camera: str, truth: FrameTruth) -> str:
+    """Say which features a camera does not see, and why."""
+    missing = np.flatnonzero(~truth.visible)
+    which = "feature " + ", ".join(str(j) for j in missing)
+    lens, points_px = driver.cameras[camera], truth.points_px[missing]
+    inside = (truth.depth_m[missing] > 0) & lens.contains(np.nan_to_num(points_px, nan=-1.0))
+    if not inside.any():
+        return f"{which}, which is out of its picture"
+    rays = np.column_stack((lens.normalize(points_px[inside]), np.ones(inside.sum())))
+    points_camera = rays * truth.depth_m[missing[inside], None]
+    hiding = driver.world.in_the_way(camera, transform_points(truth.T_world_camera, points_camera))
+    return f"{which}; in the way: {', '.join(hiding)}"
+
+
 def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
     """Choose features on the target by themselves: in the picture, or its middle without one."""
     name, count = task.camera, task.feature_count
     image = driver.first_frame(name).image
     camera = driver.cameras[name]
     if image is None:
-        return _grid(camera.width, camera.height, count)
+        points = _grid(camera.width, camera.height, count)
+        if np.isnan(driver.anchor(name, points)).any():
+            given = f"at the start it does not fill the middle of camera {name}'s picture"
+            raise InputError(str(cell.path), "target", given, "features, or a start before it")
+        return points
     points = _far_apart(image, count, driver, name)
     if len(points) < count:
         raise InputError(
