@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence.control import Guard, guarded_step, stoppable_speed
+from vergence.control import Guard, guarded_step, guarded_steps, stoppable_speed
 from vergence.robot import Arm, Chain
 
 ROUNDING = 1e-9
@@ -146,3 +146,24 @@ def test_the_kernel_leaves_what_it_is_given_alone() -> None:
     step = guarded_step(position, velocity, wanted, limits, 2e-3)
     assert position[0] == velocity[0] == 0.0
     assert step.position[0] > 0.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1e-3, 2e-3, 1e-2]))
+def test_many_steps_at_once_are_those_steps_one_by_one(seed: int, dt: float) -> None:
+    rng = np.random.default_rng(seed)
+    arm = drawn_arm(rng)
+    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    guard = Guard(arm, drawn_start(arm, rng), dt)
+    setpoint, stuck = guard.step(np.zeros(6)), np.empty(6, dtype=np.bool_)
+    for _ in range(30):
+        wanted, count = wanted_rates(rng, 6), int(rng.integers(1, 40))
+        position, velocity = setpoint.position.copy(), setpoint.velocity.copy()
+        held_back = np.ones(6, dtype=np.bool_)
+        for _ in range(count):
+            setpoint = guard.step(wanted)
+            held_back &= guard.at_limit
+        guarded_steps(position, velocity, wanted, limits, dt, count, stuck)
+        np.testing.assert_allclose(position, setpoint.position, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(velocity, setpoint.velocity, rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(stuck, held_back)

@@ -1,7 +1,16 @@
 """Cameras: the pinhole model with distortion, files that describe it, and what it delivers."""
 
+from vergence.camera.exposure import picture_tick
 from vergence.camera.files import camera_of, read_camera, write_camera
 from vergence.camera.frame import Frame, FrameTruth
 from vergence.camera.pinhole import Camera
 
-__all__ = ["Camera", "Frame", "FrameTruth", "camera_of", "read_camera", "write_camera"]
+__all__ = [
+    "Camera",
+    "Frame",
+    "FrameTruth",
+    "camera_of",
+    "picture_tick",
+    "read_camera",
+    "write_camera",
+]

@@ -2,7 +2,7 @@
 
 from vergence.cell.cell import Cell, built_in_cells, load_cell
 from vergence.cell.ideal_driver import IdealCell, IdealDriver
-from vergence.cell.motion import TargetPose, placement_pose, target_pose
+from vergence.cell.motion import TargetPose, TargetPoses, placement_pose, target_pose, target_poses
 from vergence.cell.renderer import CameraRenderer, choose_renderer
 from vergence.cell.simulated_driver import SimulatedDriver
 
@@ -13,9 +13,11 @@ __all__ = [
     "IdealDriver",
     "SimulatedDriver",
     "TargetPose",
+    "TargetPoses",
     "built_in_cells",
     "choose_renderer",
     "load_cell",
     "placement_pose",
     "target_pose",
+    "target_poses",
 ]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray, frozen
-from vergence.camera import Camera, Frame, FrameTruth
-from vergence.cell.motion import TargetPose
+from vergence.camera import Camera, Frame, FrameTruth, picture_tick
+from vergence.cell.motion import TargetPoses
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm, JointState, Sample, Setpoint
 
@@ -22,10 +22,10 @@ class IdealCell:
     arm: Arm  # up to the camera
     camera: Camera
     start: FloatArray  # (n,) joint positions
-    target: TargetPose
+    target: TargetPoses  # poses at times
     features: FloatArray  # (M, 3) in the target's frame, m
     rate_hz: float = 30.0  # of the camera
-    inner_ticks: int = 4  # a picture
+    inner_rate_hz: float = 120.0  # at which set-points come
     latency_frames: int = 0
     dropped: float = 0.0  # share of the pictures that never arrive
     seed: int = 0  # of what is dropped
@@ -41,7 +41,7 @@ class IdealDriver:
     def __init__(self, cell: IdealCell) -> None:
         self._cell = cell
         self._rng = np.random.default_rng(cell.seed)
-        self._tick = 0
+        self._tick = self._exposed = 0
         self._position, self._velocity = np.array(cell.start), np.zeros(len(cell.start))
         self._queue: deque[tuple[int, Frame]] = deque()
         self._expose()
@@ -58,8 +58,8 @@ class IdealDriver:
 
     @property
     def inner_rate_hz(self) -> float:
-        """A whole multiple of the camera's rate."""
-        return self._cell.rate_hz * self._cell.inner_ticks
+        """How often `step` is to be called."""
+        return self._cell.inner_rate_hz
 
     @property
     def time(self) -> float:
@@ -79,7 +79,7 @@ class IdealDriver:
         self._position = setpoints[ARM].position
         self._velocity = setpoints[ARM].velocity
         self._tick += 1
-        if self._tick % self._cell.inner_ticks == 0:
+        if self._tick >= self._tick_of(self._exposed):
             self._expose()
 
     def close(self) -> None:
@@ -90,14 +90,18 @@ class IdealDriver:
         return Frame(CAMERA, self.time, None, {ARM: frozen(self._position)}, self._truth())
 
     def _expose(self) -> None:
+        arrival = self._tick_of(self._exposed + self._cell.latency_frames)
+        self._exposed += 1
         if self._rng.random() >= self._cell.dropped:
-            late = self._cell.latency_frames * self._cell.inner_ticks
-            self._queue.append((self._tick + late, self.frame()))
+            self._queue.append((arrival, self.frame()))
+
+    def _tick_of(self, picture: int) -> int:
+        return picture_tick(picture, self._cell.inner_rate_hz, self._cell.rate_hz)
 
     def _truth(self) -> FrameTruth:
         cell = self._cell
         T_world_camera = cell.arm.forward_kinematics(self._position)
-        T_world_target = cell.target(self.time)
+        T_world_target = cell.target(np.array([self.time]))[0]
         points = transform_points(se3_inverse(T_world_camera) @ T_world_target, cell.features)
         depth = points[:, 2].copy()
         in_front = depth > 1e-3

@@ -19,7 +19,9 @@ from vergence.cell.waypoints import through_poses
 from vergence.geometry import rpy_to_matrix, se3
 
 TargetPose = Callable[[float], FloatArray]  # time in s to T_world_target (4, 4)
-Offset = Callable[[float], tuple[FloatArray, FloatArray]]  # time to (position, rpy) offsets
+TargetPoses = Callable[[FloatArray], FloatArray]  # times (K,) in s to T_world_target (K, 4, 4)
+# Times (K,) to offsets of position and of (yaw, pitch, roll), (K, 3) or, for all times, (3,).
+_Offset = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 _SINUSOIDS = 3
 
@@ -34,7 +36,13 @@ def placement_pose(placement: Placement) -> FloatArray:
 
 
 def target_pose(start: Placement, motion: Motion, seed: int) -> TargetPose:
-    """Return the pose of the target as a function of time.
+    """Return the pose of the target as a function of time; arguments as for `target_poses`."""
+    poses = target_poses(start, motion, seed)
+    return lambda time: poses(np.array([time]))[0]
+
+
+def target_poses(start: Placement, motion: Motion, seed: int) -> TargetPoses:
+    """Return the poses of the target as a function of many times.
 
     Args:
         start: where it is placed.
@@ -43,55 +51,59 @@ def target_pose(start: Placement, motion: Motion, seed: int) -> TargetPose:
     """
     T_start = placement_pose(start)
     if isinstance(motion, PoseMotion):
-        return lambda time: through_poses(motion, T_start, np.array([time]))[0]
+        return lambda times: through_poses(motion, T_start, times)
     offset = _offset(motion, seed)
 
-    def pose(time: float) -> FloatArray:
-        position, rpy = offset(time)
-        T: FloatArray = se3(rpy_to_matrix(rpy) @ T_start[:3, :3], T_start[:3, 3] + position)
+    def poses(times: FloatArray) -> FloatArray:
+        position, rpy = offset(times)
+        T = np.tile(T_start, (len(times), 1, 1))
+        T[:, :3, 3] += position
+        if rpy.any():
+            for k, angles in enumerate(rpy):
+                T[k, :3, :3] = rpy_to_matrix(angles) @ T_start[:3, :3]
         return T
 
-    return pose
+    return poses
 
 
 def _offset(
     motion: StillMotion | LineMotion | CircleMotion | StepMotion | RandomMotion, seed: int
-) -> Offset:
+) -> _Offset:
     none = np.zeros(3)
     match motion:
         case LineMotion():
             velocity = np.array(motion.velocity_m_s)
             longest = motion.distance_m / max(float(np.linalg.norm(velocity)), 1e-12)
-            return lambda t: (velocity * np.clip(t - motion.start_s, 0.0, longest), none)
+            return lambda t: (np.outer(np.clip(t - motion.start_s, 0.0, longest), velocity), none)
         case CircleMotion():
-            return lambda t: (_on_circle(motion, max(t - motion.start_s, 0.0)), none)
+            return lambda t: (_on_circle(motion, t), none)
         case StepMotion():
-            step = np.array(motion.offset_m)
-            return lambda t: (step if t >= motion.time_s else none, none)
+            return lambda t: (np.outer(t >= motion.time_s, motion.offset_m), none)
         case RandomMotion():
             return _random(motion, seed)
         case _:
             return lambda _: (none, none)
 
 
-def _on_circle(motion: CircleMotion, time: float) -> FloatArray:
-    angle = 2 * np.pi * time / motion.period_s
-    return motion.radius_m * np.array([np.cos(angle) - 1.0, np.sin(angle), 0.0])
+def _on_circle(motion: CircleMotion, times: FloatArray) -> FloatArray:
+    angle = 2 * np.pi * np.maximum(times - motion.start_s, 0.0) / motion.period_s
+    circle = np.column_stack((np.cos(angle) - 1.0, np.sin(angle), np.zeros_like(angle)))
+    return motion.radius_m * circle
 
 
-def _random(motion: RandomMotion, seed: int) -> Offset:
+def _random(motion: RandomMotion, seed: int) -> _Offset:
     rng = np.random.default_rng([seed, 1])
     frequency = 2 * np.pi * motion.fastest_hz * rng.uniform(0.2, 1.0, (_SINUSOIDS, 6))
     phase = rng.uniform(0, 2 * np.pi, (_SINUSOIDS, 6))
     yaw_pitch_roll = np.deg2rad(motion.amplitude_rpy_deg)[::-1]
     amplitude = np.concatenate((motion.amplitude_m, yaw_pitch_roll)) / _SINUSOIDS
 
-    def offset(time: float) -> tuple[FloatArray, FloatArray]:
+    def offset(times: FloatArray) -> tuple[FloatArray, FloatArray]:
         # Each sinusoid less its value and its tangent at the start: it sets off from rest.
-        t = max(time - motion.start_s, 0.0)
+        t = np.maximum(times - motion.start_s, 0.0)[:, None]
         onset = 1.0 - np.exp(-t)
-        wave = np.sin(frequency * t + phase) - np.sin(phase)
-        both = amplitude * onset * wave.sum(axis=0)
-        return both[:3], both[3:]
+        wave = np.sin(frequency * t[:, :, None] + phase) - np.sin(phase)
+        both = amplitude * onset * wave.sum(axis=1)
+        return both[:, :3], both[:, 3:]
 
     return offset

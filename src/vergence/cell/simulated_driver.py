@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera, Frame, FrameTruth
+from vergence.camera import Camera, Frame, FrameTruth, picture_tick
 from vergence.cell.arm_motion import JointTrajectory, arm_trajectory
 from vergence.cell.cell import Cell
 from vergence.cell.motion import target_pose
@@ -175,8 +175,7 @@ class SimulatedDriver:
             self._queue.append((arrival, self._frame(name)))
 
     def _tick_of(self, picture: int, rate_hz: float) -> int:
-        """Return the inner tick of a picture, ⌊k · inner/rate⌋, as the loop schedules its own."""
-        return int(picture * self.inner_rate_hz / rate_hz + 1e-9)
+        return picture_tick(picture, self.inner_rate_hz, rate_hz)
 
     def _frame(self, camera: str) -> Frame:
         blind = any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)

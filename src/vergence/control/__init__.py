@@ -11,7 +11,7 @@ from vergence.control.conditioning import (
 )
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.eye_to_hand import EyeToHandLaw
-from vergence.control.guard import Guard, guarded_step, stoppable_speed
+from vergence.control.guard import Guard, guarded_step, guarded_steps, stoppable_speed
 from vergence.control.image_based import ImageBased
 from vergence.control.image_motion import FeatureState, ImageMotion
 from vergence.control.inner import InnerLaw
@@ -67,6 +67,7 @@ __all__ = [
     "TrackingSetup",
     "TrackingTick",
     "guarded_step",
+    "guarded_steps",
     "hand_rates",
     "image_model",
     "interpolate",

@@ -16,3 +16,19 @@ class JointCommand:
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command
     fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
+
+
+def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, str] | None:
+    """Return the fault of an arm too near a singularity, if it is.
+
+    Args:
+        sigma: smallest singular value of its Jacobian.
+        singular_below: below which a law gives up.
+    """
+    if not sigma < singular_below:
+        return None
+    reason = (
+        f"the smallest singular value of the Jacobian fell to {sigma:.3g} "
+        f"(limit {singular_below:g})"
+    )
+    return OutcomeKind.SINGULARITY, reason

@@ -8,6 +8,8 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray
 from vergence.robot import Arm, Setpoint
 
+_SPARE = 1e-9  # rad or m of room beyond what braking needs; nearer, rounding decides
+
 
 class GuardedStep(NamedTuple):
     """The next set-point, and which joints met what."""
@@ -42,19 +44,88 @@ def guarded_step(
     new_position, new_velocity = np.empty(n), np.empty(n)
     at_limit = np.zeros(n, dtype=np.bool_)
     for i in range(n):
-        a = limits[3, i]
-        want = wanted[i] if np.isfinite(wanted[i]) else 0.0
-        v = min(max(want, -limits[2, i]), limits[2, i])
-        v = min(max(v, velocity[i] - a * dt), velocity[i] + a * dt)
-        fastest_up = stoppable_speed(limits[1, i] - position[i], a, dt)
-        fastest_down = stoppable_speed(position[i] - limits[0, i], a, dt)
-        at_limit[i] = (v > fastest_up and fastest_up < a * dt) or (
-            -v > fastest_down and fastest_down < a * dt
+        new_position[i], new_velocity[i], at_limit[i] = guarded_joint(
+            position[i], velocity[i], wanted[i], limits[:, i], dt
         )
-        v = min(max(v, -fastest_down), fastest_up)
-        new_velocity[i] = v
-        new_position[i] = min(max(position[i] + v * dt, limits[0, i]), limits[1, i])
     return GuardedStep(new_position, new_velocity, at_limit)
+
+
+@njit(cache=True, error_model="numpy")
+def guarded_joint(
+    position: float, velocity: float, wanted: float, limits: FloatArray, dt: float
+) -> tuple[float, float, bool]:
+    """Do one joint's part of `guarded_step`; limits (4,)."""
+    a = limits[3]
+    v = reachable_rate(wanted, limits[2])
+    v = min(max(v, velocity - a * dt), velocity + a * dt)
+    fastest_up = stoppable_speed(limits[1] - position, a, dt)
+    fastest_down = stoppable_speed(position - limits[0], a, dt)
+    at_limit = (v > fastest_up and fastest_up < a * dt) or (
+        -v > fastest_down and fastest_down < a * dt
+    )
+    v = min(max(v, -fastest_down), fastest_up)
+    return min(max(position + v * dt, limits[0]), limits[1]), v, at_limit
+
+
+@njit(cache=True, error_model="numpy")
+def reachable_rate(wanted: float, rate_max: float) -> float:
+    """Return the rate that is meant: within its limit, and rest where it is not a number."""
+    return min(max(wanted, -rate_max), rate_max) if np.isfinite(wanted) else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def guarded_steps(
+    position: FloatArray,
+    velocity: FloatArray,
+    wanted: FloatArray,
+    limits: FloatArray,
+    dt: float,
+    count: int,
+    stuck: BoolArray,
+) -> None:
+    """Take many guarded steps with the same wanted rates, in place.
+
+    A joint so far from its limits that it could stop anywhere on the way ramps to its rate and
+    keeps it, which is a sum in closed form; only one that might have to brake is stepped.
+
+    Args:
+        position: set-points, (n,); moved.
+        velocity: their rates, (n,); changed.
+        wanted: as for `guarded_step`, and so are the rest.
+        limits: (4, n).
+        dt: inner period, s.
+        count: how many steps.
+        stuck: says which joints a limit held back at every step, (n,); filled.
+    """
+    for i in range(len(position)):
+        step, v = limits[3, i] * dt, reachable_rate(wanted[i], limits[2, i])
+        change = v - velocity[i]
+        ramp = min(np.floor(abs(change) / step), float(count))
+        up, down = max(velocity[i], v, 0.0), max(-velocity[i], -v, 0.0)
+        least_room = min(
+            _room(limits[1, i] - position[i] - count * dt * up, up, limits[3, i], dt),
+            _room(position[i] - limits[0, i] - count * dt * down, down, limits[3, i], dt),
+        )
+        if least_room > _SPARE:
+            gained = np.copysign(step, change) * ramp
+            position[i] += dt * (
+                ramp * velocity[i] + 0.5 * (ramp + 1.0) * gained + (count - ramp) * v
+            )
+            velocity[i] = v if ramp < count else velocity[i] + gained
+            stuck[i] = False
+            continue
+        stuck[i] = True
+        for _ in range(count):
+            position[i], velocity[i], at_limit = guarded_joint(
+                position[i], velocity[i], wanted[i], limits[:, i], dt
+            )
+            stuck[i] &= at_limit
+
+
+@njit(cache=True, error_model="numpy")
+def _room(room: float, speed: float, a: float, dt: float) -> float:
+    """Return what is left of the room when a speed is braked with a, by `guarded_step`'s bound."""
+    return room - a * dt * dt / 8.0 - speed * (speed + a * dt) / (2.0 * a)
 
 
 @njit(cache=True, error_model="numpy")

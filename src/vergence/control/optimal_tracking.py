@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera
-from vergence.control.command import JointCommand
+from vergence.control.command import JointCommand, singular_fault
 from vergence.control.image_motion import ImageMotion
 from vergence.control.tracking_kernels import (
     TrackingGains,
@@ -17,7 +17,6 @@ from vergence.control.tracking_kernels import (
 )
 from vergence.errors import InputError, nearest
 from vergence.features import Observation
-from vergence.outcome import OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import Arm, JointState
 
@@ -104,6 +103,7 @@ class OptimalTrackingLaw:
         )
         self._packed = pack_setup(self.setup)
         self._motion = ImageMotion.of(arm, camera, flow_smoothing_s)
+        self.feeds_forward = self._motion is not None
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -121,14 +121,7 @@ class OptimalTrackingLaw:
         result = np.empty(self.arm.joint_count + 10)
         optimal_tracking_tick(*self._packed, joints.position, features, result)
         tick = unpack_tick(result)
-        sigma = tick.sigma
-        fault = None
-        if sigma < self.singular_below:
-            fault = (
-                OutcomeKind.SINGULARITY,
-                f"the smallest singular value of the Jacobian fell to {sigma:.3g} "
-                f"(limit {self.singular_below:g})",
-            )
+        fault = singular_fault(tick.sigma, self.singular_below)
         active = ("joint rates",) if tick.scale < 1.0 else ()
         return JointCommand(tick.rates, tick.v_camera, tick.w, tick.penalty, active, fault)
 

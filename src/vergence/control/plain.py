@@ -4,13 +4,12 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
-from vergence.control.command import JointCommand
+from vergence.control.command import JointCommand, singular_fault
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import Objective, seen_only
 from vergence.control.resolve import resolve_twist
 from vergence.errors import InputError
 from vergence.features import Observation
-from vergence.outcome import OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import Arm, JointState, manipulability_measure
 
@@ -59,13 +58,7 @@ class PlainLaw:
         twist = np.linalg.solve(H, g).astype(np.float64)
         J = self.arm.jacobian(joints.position)
         smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
-        fault = None
-        if smallest < self.singular_below:
-            reason = (
-                f"the smallest singular value of the Jacobian fell to {smallest:.3g} "
-                f"(limit {self.singular_below:g})"
-            )
-            fault = (OutcomeKind.SINGULARITY, reason)
+        fault = singular_fault(smallest, self.singular_below)
         J_inverse = np.linalg.pinv(J).astype(np.float64)
         rates, scale = resolve_twist(J_inverse, twist, self.arm.rate_max)
         active = ("joint rates",) if scale < 1.0 else ()

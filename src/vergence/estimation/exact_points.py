@@ -5,6 +5,8 @@ import numpy as np
 from vergence.camera import Frame
 from vergence.features import ImagePoints, Observation
 
+OUT_OF_SIGHT = "out of sight"
+
 
 class ExactPoints:
     """Observes the target's features as a simulated camera truly projects them.
@@ -38,5 +40,5 @@ class ExactPoints:
             np.where(truth.visible[:, None], truth.points_px + noise, np.nan),
             np.broadcast_to(covariance, (len(noise), 2, 2)),
             truth.visible,
-            tuple("" if seen else "out of sight" for seen in truth.visible),
+            tuple("" if seen else OUT_OF_SIGHT for seen in truth.visible),
         )

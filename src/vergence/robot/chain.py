@@ -41,36 +41,68 @@ def along(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vect
     )
 
 
+Axes = tuple[Vector, Vector, Vector, Vector]  # x, y, z of a frame and its origin
+
+
+@njit(cache=True, error_model="numpy")
+def fixed_step(frame: Axes, R: FloatArray, t: FloatArray) -> Axes:
+    """Return the next frame of the chain before its joint has moved, R (3, 3) and t (3,) fixed."""
+    x, y, z, p = frame
+    step = along(x, y, z, t[0], t[1], t[2])
+    return (
+        along(x, y, z, R[0, 0], R[1, 0], R[2, 0]),
+        along(x, y, z, R[0, 1], R[1, 1], R[2, 1]),
+        along(x, y, z, R[0, 2], R[1, 2], R[2, 2]),
+        (p[0] + step[0], p[1] + step[1], p[2] + step[2]),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def joint_step(frame: Axes, q: float, sliding: bool) -> Axes:
+    """Return a frame moved by q about its z axis, or along it."""
+    x, y, z, p = frame
+    if sliding:
+        return x, y, z, (p[0] + q * z[0], p[1] + q * z[1], p[2] + q * z[2])
+    c, s = np.cos(q), np.sin(q)
+    return along(x, y, z, c, s, 0.0), along(x, y, z, -s, c, 0.0), z, p
+
+
+@njit(cache=True, error_model="numpy")
+def tip_frame(chain: Chain, q: FloatArray) -> Axes:
+    """Return the tip's axes and its place along world axes, at joint positions q (n,)."""
+    R, t = chain.rotation, chain.position
+    frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    for i in range(len(q)):
+        frame = joint_step(fixed_step(frame, R[i], t[i]), q[i], chain.sliding[i])
+    return fixed_step(frame, R[len(q)], t[len(q)])
+
+
 @njit(cache=True, error_model="numpy")
 def chain_state(chain: Chain, q: FloatArray) -> ChainState:
     """Walk the chain at joint positions q (n,)."""
-    n, T, t = len(q), chain.rotation, chain.position
+    n, R, t = len(q), chain.rotation, chain.position
     axis, anchor = np.empty((n, 3)), np.empty((n, 3))
-    x, y, z, p = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-    for i in range(n + 1):
-        step = along(x, y, z, t[i, 0], t[i, 1], t[i, 2])
-        p = (p[0] + step[0], p[1] + step[1], p[2] + step[2])
-        x, y, z = (
-            along(x, y, z, T[i, 0, 0], T[i, 1, 0], T[i, 2, 0]),
-            along(x, y, z, T[i, 0, 1], T[i, 1, 1], T[i, 2, 1]),
-            along(x, y, z, T[i, 0, 2], T[i, 1, 2], T[i, 2, 2]),
-        )
-        if i == n:
-            break
-        axis[i, 0], axis[i, 1], axis[i, 2] = z
-        anchor[i, 0], anchor[i, 1], anchor[i, 2] = p
-        if chain.sliding[i]:
-            p = (p[0] + q[i] * z[0], p[1] + q[i] * z[1], p[2] + q[i] * z[2])
-        else:
-            c, s = np.cos(q[i]), np.sin(q[i])
-            x, y = along(x, y, z, c, s, 0.0), along(x, y, z, -s, c, 0.0)
-    R = np.empty((3, 3))
-    R[0, 0], R[1, 0], R[2, 0] = x
-    R[0, 1], R[1, 1], R[2, 1] = y
-    R[0, 2], R[1, 2], R[2, 2] = z
-    tip = np.empty(3)
-    tip[0], tip[1], tip[2] = p
-    return ChainState(axis, anchor, R, tip)
+    frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    for i in range(n):
+        frame = fixed_step(frame, R[i], t[i])
+        axis[i, 0], axis[i, 1], axis[i, 2] = frame[2]
+        anchor[i, 0], anchor[i, 1], anchor[i, 2] = frame[3]
+        frame = joint_step(frame, q[i], chain.sliding[i])
+    x, y, z, p = fixed_step(frame, R[n], t[n])
+    tip_R, tip_p = np.empty((3, 3)), np.empty(3)
+    for a in range(3):
+        tip_R[a, 0], tip_R[a, 1], tip_R[a, 2], tip_p[a] = x[a], y[a], z[a], p[a]
+    return ChainState(axis, anchor, tip_R, tip_p)
+
+
+@njit(cache=True, error_model="numpy")
+def frame_matrix(frame: Axes) -> FloatArray:
+    """Return a frame as a pose (4, 4)."""
+    T = np.eye(4)
+    x, y, z, p = frame
+    for a in range(3):
+        T[a, 0], T[a, 1], T[a, 2], T[a, 3] = x[a], y[a], z[a], p[a]
+    return T
 
 
 @njit(cache=True, error_model="numpy")
@@ -97,10 +129,7 @@ def world_jacobian(chain: Chain, state: ChainState) -> FloatArray:
 @njit(cache=True, error_model="numpy")
 def forward_kinematics(chain: Chain, q: FloatArray) -> FloatArray:
     """Return T_world_tip (4, 4) at joint positions q (n,)."""
-    state = chain_state(chain, q)
-    T = np.eye(4)
-    T[:3, :3] = state.R
-    T[:3, 3] = state.p
+    T: FloatArray = frame_matrix(tip_frame(chain, q))
     return T
 
 

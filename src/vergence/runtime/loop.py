@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.camera import picture_tick
 from vergence.control import Guard, InnerLaw, JointCommand, Law
 from vergence.features import ImagePoints, Observation
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import Sample
+from vergence.runtime import endings
 from vergence.runtime.driver import Driver
 from vergence.runtime.recording import Listener, TickRecord
 from vergence.runtime.stages import Perception, Planner
@@ -29,8 +31,7 @@ class Loop:
 
     Each outer tick reads the cell, looks, and asks the law for joint rates; each inner tick hands a
     guarded set-point to the driver, so that whatever the law says no joint passes its limits. An
-    `InnerLaw` is asked for new rates at each inner tick, any other keeps them between pictures. The
-    k-th outer tick begins at inner tick ⌊k · inner/outer⌋, exact also where 26 Hz meets 500 Hz.
+    `InnerLaw` is asked for new rates at each inner tick, any other keeps them between pictures.
 
     Args:
         driver: the cell.
@@ -89,18 +90,15 @@ class Loop:
         outer_tick, sample = 0, self._first
         while True:
             if sample.time >= duration_s:
-                reason = f"ran for {duration_s:g} s with the target in view"
-                return Outcome(OutcomeKind.COMPLETED, reason, sample.time)
+                return endings.completed(duration_s, sample.time)
             observation = self._perception.observe(sample.frames)
             command, outcome = self._decide(sample, observation)
             if outcome is not None:
                 return outcome
             outer_tick += 1
-            next_tick = int(outer_tick * self._driver.inner_rate_hz / self._outer_rate_hz + 1e-9)
+            next_tick = picture_tick(outer_tick, self._driver.inner_rate_hz, self._outer_rate_hz)
             if limited := self._move(self._rates(command), next_tick):
-                joints = " and ".join(limited)
-                reason = f"{joints} at the end of its range, driven against it"
-                return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
+                return endings.joint_limit(limited, self._now)
             sample = self._driver.read()
 
     @property
@@ -114,9 +112,7 @@ class Loop:
         time = sample.time
         if observation is None:
             if time - self._last_picture > self._patience.image_s:
-                waited = time - self._last_picture
-                reason = f"no picture for {waited:.2f} s"
-                return None, Outcome(OutcomeKind.IMAGE_LATE, reason, time)
+                return None, endings.image_late(time - self._last_picture, time)
             self._record(sample, None, self._planner.reference(time), self._last_command)
             return self._last_command, None
         self._last_picture = time
@@ -126,7 +122,7 @@ class Loop:
             self._last_command = None
             self._record(sample, observation, reference, None)
             if time - self._last_seen > self._patience.target_s:
-                return None, Outcome(OutcomeKind.TARGET_LOST, _why_lost(observation), time)
+                return None, endings.target_lost(_reasons(observation), time)
             return None, None
         self._last_seen = time
         command = self._law.command(observation, reference, sample.joints[self._arm])
@@ -186,7 +182,7 @@ class Loop:
         lost = not _shows_target(observation)
         if lost != self._target_lost:
             self._target_lost = lost
-            text = _why_lost(observation) if lost else "it is back"
+            text = endings.why_lost(_reasons(observation)) if lost else "it is back"
             self._tell(time, "target out of sight" if lost else "target in sight", text)
         if observation.target is None and not lost:
             self._report_features(time, observation.views[-1])
@@ -208,6 +204,5 @@ def _shows_target(observation: Observation) -> bool:
     return bool(observation.target) or any(view.found.any() for view in observation.views)
 
 
-def _why_lost(observation: Observation) -> str:
-    reasons = sorted({reason for view in observation.views for reason in view.reasons if reason})
-    return "no feature found: " + "; ".join(reasons)
+def _reasons(observation: Observation) -> list[str]:
+    return [reason for view in observation.views for reason in view.reasons]

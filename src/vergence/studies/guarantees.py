@@ -101,9 +101,9 @@ def _line(arm: Arm, speed: float, heading: float) -> IdealCell:
     T_start = arm.forward_kinematics(start) @ facing(1.0)
     direction = np.array([np.cos(heading), np.sin(heading), 0.0])
 
-    def target(time: float) -> FloatArray:
-        T = T_start.copy()
-        T[:3, 3] += direction * min(speed * time, RANGE_M)
+    def target(times: FloatArray) -> FloatArray:
+        T = np.tile(T_start, (len(times), 1, 1))
+        T[:, :3, 3] += np.outer(np.minimum(speed * times, RANGE_M), direction)
         return T
 
     return IdealCell(
@@ -184,7 +184,9 @@ _SQUARE = np.array([[0.08, 0.08, 0], [-0.08, 0.08, 0], [-0.08, -0.08, 0], [0.08,
 
 def _still(arm: Arm, start: FloatArray, depth: float = 0.6) -> IdealCell:
     T_target = arm.forward_kinematics(start) @ facing(depth)
-    return IdealCell(arm, CAMERA_MODEL, start, lambda _: T_target, _SQUARE)
+    return IdealCell(
+        arm, CAMERA_MODEL, start, lambda times: np.tile(T_target, (len(times), 1, 1)), _SQUARE
+    )
 
 
 def _singularity(arm: Arm) -> tuple[Check, FloatArray]:

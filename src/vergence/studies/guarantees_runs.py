@@ -172,9 +172,9 @@ def attempt(known: tuple[Arm, ...], seed: int) -> Attempt:
     direction = rng.normal(size=3)
     velocity = direction / np.linalg.norm(direction) * 10.0 ** rng.uniform(-2, 1)
 
-    def target(time: float) -> FloatArray:
-        T = T_start.copy()
-        T[:3, 3] += velocity * time
+    def target(times: FloatArray) -> FloatArray:
+        T = np.tile(T_start, (len(times), 1, 1))
+        T[:, :3, 3] += np.outer(times, velocity)
         return T
 
     features = np.column_stack((rng.uniform(-0.1, 0.1, (4, 2)), np.zeros(4)))
@@ -200,10 +200,10 @@ def joint_path(
     """Return the cell with a target that is seen alike all along a straight way of the joints."""
     start, arm = cell.start, cell.arm
 
-    def target(time: float) -> FloatArray:
-        share = 0.5 - 0.5 * np.cos(np.pi * np.clip(time / duration_s, 0.0, 1.0))
-        T: FloatArray = arm.forward_kinematics(start + share * (q_end - start)) @ T_camera_target
-        return T
+    def target(times: FloatArray) -> FloatArray:
+        shares = 0.5 - 0.5 * np.cos(np.pi * np.clip(times / duration_s, 0.0, 1.0))
+        poses = [arm.forward_kinematics(start + share * (q_end - start)) for share in shares]
+        return np.array(poses) @ T_camera_target
 
     return replace(cell, target=target)
 

@@ -1,0 +1,73 @@
+"""Closed-loop runs of the first paper's tracker: in the batch kernel, and in the loop beside it."""
+
+import time
+from collections.abc import Callable
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from harness import Block, Peer, measured, row
+from vergence.cell import IdealCell, SimulatedDriver, load_cell, target_poses
+from vergence.runtime import assemble_parts
+from vergence.runtime.assembly import Parts
+from vergence.runtime.batch import IdealRun, run_batch
+from vergence.runtime.batch.closed_loop import closed_loops
+from vergence.runtime.batch.run_batch import empty_records, pack
+
+RUN_S, RUNS = 25.0, 500
+TICKS = 750  # of a run, at 30 Hz
+
+
+def first_papers_run() -> IdealRun:
+    """The Puma that follows the board for 2.5 m, four axes and avoidance, two frames late."""
+    cell = load_cell("puma560")
+    driver = SimulatedDriver(cell, images=False)
+    parts, camera = assemble_parts(cell, driver, images=False), cell.task.camera
+    assert isinstance(parts, Parts)
+    wanted = parts.planner.reference(0.0).points_px
+    assert wanted is not None
+    ideal = IdealCell(
+        driver.world.arm_to_camera(camera),
+        driver.cameras[camera],
+        np.array(driver.read().joints[cell.task.arm].position),
+        target_poses(cell.target, cell.target.motion, cell.seed),
+        driver.features,
+        rate_hz=cell.cameras[camera].rate_hz,
+        inner_rate_hz=cell.inner_rate_hz,
+        latency_frames=cell.cameras[camera].latency_frames,
+    )
+    return IdealRun(ideal, parts.law, wanted, RUN_S)
+
+
+def runs_a_second(run: IdealRun) -> float:
+    """How many runs every core of this machine makes together, from cells to outcomes."""
+    run_batch([run] * 8)
+    start = time.perf_counter()
+    run_batch([run] * RUNS)
+    return RUNS / (time.perf_counter() - start)
+
+
+def block(whole_run: Callable[[], object]) -> Block:
+    """A block whose calls are ticks, by the time this thread was at work."""
+
+    def seconds(count: int) -> float:
+        runs = ceil(count / TICKS)
+        start = time.thread_time()
+        for _ in range(runs):
+            whole_run()
+        return (time.thread_time() - start) / (runs * TICKS)
+
+    return seconds
+
+
+def run() -> list[dict[str, Any]]:
+    one = first_papers_run()
+    inputs = pack([one])
+    records = empty_records(inputs)
+    kernel = block(lambda: closed_loops(inputs, records))
+    loop = Peer("the loop in Python", block(one.in_loop))
+    return [
+        row("batch: closed-loop tick, CPU time", kernel, loop, value_aim=2.5),
+        measured("batch: runs of 25 s on all cores", runs_a_second(one), "runs/s"),
+    ]

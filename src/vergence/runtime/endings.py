@@ -1,0 +1,32 @@
+"""How a run ends, in words: for the loop and for the batch that stands for it."""
+
+from collections.abc import Iterable
+
+from vergence.outcome import Outcome, OutcomeKind
+
+
+def completed(duration_s: float, time: float) -> Outcome:
+    """Return the end of a run that went on as long as it should."""
+    reason = f"ran for {duration_s:g} s with the target in view"
+    return Outcome(OutcomeKind.COMPLETED, reason, time)
+
+
+def image_late(waited_s: float, time: float) -> Outcome:
+    """Return the end of a run without pictures."""
+    return Outcome(OutcomeKind.IMAGE_LATE, f"no picture for {waited_s:.2f} s", time)
+
+
+def target_lost(reasons: Iterable[str], time: float) -> Outcome:
+    """Return the end of a run whose target is gone; reasons as perception gave them."""
+    return Outcome(OutcomeKind.TARGET_LOST, why_lost(reasons), time)
+
+
+def why_lost(reasons: Iterable[str]) -> str:
+    """Say why there is no feature, each reason once."""
+    return "no feature found: " + "; ".join(sorted({reason for reason in reasons if reason}))
+
+
+def joint_limit(joints: Iterable[str], time: float) -> Outcome:
+    """Return the end of a run with joints held at their limits."""
+    reason = f"{' and '.join(joints)} at the end of its range, driven against it"
+    return Outcome(OutcomeKind.JOINT_LIMIT, reason, time)

@@ -1,0 +1,149 @@
+"""The batch kernel comes to what the loop comes to, run by run."""
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.cell import IdealCell, IdealDriver
+from vergence.control import OptimalTrackingLaw
+from vergence.geometry import se3, so3_exp
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.runtime import TickRecord
+from vergence.runtime.batch import BatchTrace, IdealRun, covers, run_batch
+from vergence.runtime.recording import RunInfo
+from vergence.studies.guarantees_runs import arms
+
+CAMERA = Camera(640, 480, 600.0, 580.0, 319.5, 239.5)
+ARMS = arms()  # six turning joints, seven with a track, three sliding and three turning
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def drawn_run(seed: int) -> IdealRun:
+    """Draw a run: any arm, start, motion, delay, noise and belief; some of them hopeless."""
+    rng = np.random.default_rng([seed, 7])
+    arm = ARMS[seed % len(ARMS)]
+    low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
+    start = low + rng.uniform(0.02, 0.98, arm.joint_count) * (high - low)
+    T_camera_target = se3(so3_exp(rng.uniform(-0.4, 0.4, 3)), np.zeros(3))
+    T_camera_target[:3, 3] = [*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.5, 1.5)]
+    T_start = arm.forward_kinematics(start) @ T_camera_target
+    velocity = rng.normal(size=3)
+    velocity *= 10.0 ** rng.uniform(-2, 0.3) / np.linalg.norm(velocity)
+
+    def target(times: FloatArray) -> FloatArray:
+        poses = np.tile(T_start, (len(times), 1, 1))
+        poses[:, :3, 3] += np.outer(times, velocity)
+        return poses
+
+    count = int(rng.integers(1, 5))
+    cell = IdealCell(
+        arm,
+        CAMERA,
+        start,
+        target,
+        np.column_stack((rng.uniform(-0.1, 0.1, (count, 2)), np.zeros(count))),
+        rate_hz=float(rng.choice([26.0, 30.0])),
+        inner_rate_hz=float(rng.choice([120.0, 500.0])),
+        latency_frames=int(rng.integers(0, 4)),
+        dropped=float(rng.choice([0.0, 0.3, 0.99], p=[0.6, 0.3, 0.1])),
+        seed=seed,
+    )
+    truth = IdealDriver(cell).frame().truth
+    assert truth is not None
+    axes = tuple(rng.choice(AXES, rng.integers(2, 7), replace=False))
+    law = OptimalTrackingLaw(
+        arm,
+        CAMERA,
+        truth.depth_m * np.exp(rng.uniform(-0.7, 0.7)),
+        axes=axes,
+        avoidance_axes=axes[: rng.integers(0, len(axes) + 1)],
+        S=float(rng.choice([0.0, 1e-3])),
+        period=1.0 / cell.rate_hz,
+        penalty=str(rng.choice(["product", "per_joint"])),
+        penalty_k=float(rng.choice([50.0, 1e5])),
+        singular_below=float(rng.choice([1e-4, 0.05])),
+    )
+    wanted = truth.points_px + rng.normal(0, 30, 2)
+    return IdealRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
+
+
+class Followed:
+    """What the loop told its listeners of a run."""
+
+    def __init__(self, run: IdealRun) -> None:
+        self.position: list[FloatArray] = []
+        self.times: list[float] = []
+        self.points_px: list[FloatArray] = []
+        self.camera_m: list[FloatArray] = []
+        self.target_m: list[FloatArray] = []
+        self.outcome = run.in_loop([self])
+
+    def begin(self, info: RunInfo) -> None:
+        """Nothing to note."""
+
+    def tick(self, record: TickRecord) -> None:
+        self.position.append(record.sample.joints["arm"].position)
+        for frame in record.sample.frames:
+            assert frame.truth is not None
+            self.times.append(frame.time)
+            self.points_px.append(frame.truth.points_px)
+            self.camera_m.append(frame.truth.T_world_camera[:3, 3])
+            self.target_m.append(frame.truth.T_world_target[:3, 3])
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Nothing to note."""
+
+    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
+        """Nothing to let go of."""
+
+
+def check_same(trace: BatchTrace, followed: Followed) -> None:
+    assert trace.outcome == followed.outcome
+    for name in ("position", "times", "points_px", "camera_m", "target_m"):
+        given, wanted = getattr(trace, name), np.array(getattr(followed, name))
+        if wanted.size or given.size:
+            np.testing.assert_allclose(given, wanted, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+RUNS = [drawn_run(seed) for seed in range(120)]
+
+
+@pytest.fixture(scope="module")
+def traces() -> list[BatchTrace]:
+    return run_batch(RUNS)
+
+
+@pytest.mark.parametrize("number", range(len(RUNS)))
+def test_a_run_of_the_batch_is_the_run_of_the_loop(traces, number: int) -> None:
+    check_same(traces[number], Followed(RUNS[number]))
+
+
+def test_the_runs_end_in_every_way(traces) -> None:
+    kinds = Counter(trace.outcome.kind for trace in traces)
+    assert kinds.keys() == {
+        OutcomeKind.COMPLETED,
+        OutcomeKind.IMAGE_LATE,
+        OutcomeKind.JOINT_LIMIT,
+        OutcomeKind.SINGULARITY,
+        OutcomeKind.TARGET_LOST,
+    }
+    assert min(kinds.values()) >= 3
+
+
+def test_one_core_and_all_of_them_find_the_same(traces) -> None:
+    for alone, together in zip(run_batch(RUNS[:20], threads=1), traces, strict=False):
+        assert alone.outcome == together.outcome
+        np.testing.assert_array_equal(alone.position, together.position)
+
+
+def test_a_law_that_the_kernel_does_not_know_is_left_to_the_loop() -> None:
+    from vergence.control import ImageBased, PlainLaw
+
+    run = RUNS[0]
+    plain = PlainLaw(run.cell.arm, CAMERA, ImageBased(CAMERA), np.ones(len(run.cell.features)))
+    assert covers(run)
+    assert not covers(IdealRun(run.cell, plain, run.wanted_px, 1.0))
