@@ -37,6 +37,10 @@ class RenderingError(VergenceError):
     """No offscreen renderer on this machine; the message names the package that brings one."""
 
 
+class DriverSilent(VergenceError):
+    """Raised by a driver whose hardware does not answer; the loop ends the run and says why."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Tell which names there are, the one probably meant first."""
     names = sorted(known)

@@ -1,9 +1,12 @@
 """The loop keeps time, holds the arm when it cannot see, and ends with a reason."""
 
+import signal
+
 import numpy as np
 import pytest
 from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, ScriptedLaw, flat_arm, looped
 
+from vergence.errors import DriverSilent
 from vergence.outcome import OutcomeKind
 from vergence.runtime import Patience
 
@@ -159,3 +162,55 @@ def test_whatever_the_law_says_the_joints_stay_within_their_limits(rates) -> Non
     assert (abs(driver.positions()) <= 1.0).all()
     assert (abs(driver.velocities()) <= 2.0).all()
     assert changes_within(driver.velocities(), 8.0, 2e-3)
+
+
+class Pressed(ScriptedDriver):
+    """Ctrl-C is pressed in the middle of some ticks."""
+
+    presses: tuple[int, ...] = ()
+
+    def step(self, setpoints) -> None:
+        if self.tick in self.presses:
+            signal.raise_signal(signal.SIGINT)
+        super().step(setpoints)
+
+
+@pytest.mark.parametrize("tick", [0, 1, 333, 800])
+def test_ctrl_c_waits_for_the_tick_that_is_under_way(tick: int) -> None:
+    driver = Pressed()
+    driver.presses = (tick,)
+    outcome = looped(driver, law=ScriptedLaw(np.array([0.4, -0.4]))).run(5.0)
+    assert outcome.kind is OutcomeKind.STOPPED
+    velocities = driver.velocities()
+    np.testing.assert_array_equal(velocities[-1], 0.0)
+    assert changes_within(velocities, 8.0, 2e-3)  # no set-point was lost
+
+
+def test_a_second_ctrl_c_does_not_wait() -> None:
+    driver = Pressed()
+    driver.presses = (300, 301)
+    with pytest.raises(KeyboardInterrupt):
+        looped(driver).run(5.0)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+class Silent(ScriptedDriver):
+    """Stops answering in some tick."""
+
+    silent_from: int = 10**9
+
+    def step(self, setpoints) -> None:
+        if self.tick >= self.silent_from:
+            raise DriverSilent("the robot said nothing for 0.5 s")
+        super().step(setpoints)
+
+
+@pytest.mark.parametrize("tick", [0, 333, 500])
+def test_a_driver_that_falls_silent_ends_the_run_by_name(tick: int) -> None:
+    driver, notes = Silent(), Notes()
+    driver.silent_from = tick  # 500: while the arm is braked
+    outcome = looped(driver, listeners=[notes]).run(1.0)
+    assert outcome.kind is OutcomeKind.DRIVER_SILENT
+    assert outcome.reason == "the robot said nothing for 0.5 s"
+    assert outcome.time == pytest.approx(tick / 500)
+    assert notes.events[-1][1] == "driver silent"

@@ -13,7 +13,8 @@ class Driver(Protocol):
     """A cell: arms that take set-points at the inner rate, cameras that deliver frames.
 
     A simulated driver advances its world by one inner period in `step`; a real one hands the
-    set-points on and returns at the next inner tick. So the loop needs no other clock.
+    set-points on and returns at the next inner tick. So the loop needs no other clock. Hardware
+    that does not answer in time is reported by raising `DriverSilent` from `read` or `step`.
     """
 
     @property

@@ -8,12 +8,14 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import picture_tick
 from vergence.control import Guard, InnerLaw, JointCommand, Law
+from vergence.errors import DriverSilent
 from vergence.features import ImagePoints, Observation
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.planning import Reference
 from vergence.robot import Sample
 from vergence.runtime import endings
 from vergence.runtime.driver import Driver
+from vergence.runtime.interrupt import Interrupt
 from vergence.runtime.recording import Listener, TickRecord
 from vergence.runtime.stages import Perception, Planner
 
@@ -67,6 +69,7 @@ class Loop:
             name: Guard(arm, self._first.joints[name].position, dt)
             for name, arm in driver.arms.items()
         }
+        self._interrupt = Interrupt()
         self._still = np.zeros(driver.arms[arm].joint_count)
         self._inner_tick = 0
         self._last_picture = self._last_seen = 0.0
@@ -75,20 +78,31 @@ class Loop:
         self._last_command: JointCommand | None = None
 
     def run(self, duration_s: float) -> Outcome:
-        """Run until the time is over, the task has failed, or Ctrl-C; then stop the arm."""
+        """Run until the time is over, the task has failed, or Ctrl-C; then stop the arm.
+
+        An arm whose driver is silent cannot be stopped from here: its own watchdog does that.
+        """
         try:
-            outcome = self._run(duration_s)
-        except KeyboardInterrupt:
-            time = self._inner_tick / self._driver.inner_rate_hz
-            outcome = Outcome(OutcomeKind.STOPPED, "stopped by the user", time)
-        self._brake()
+            with self._interrupt:
+                outcome = self._run_or_stop(duration_s)
+                self._brake()
+        except DriverSilent as silence:
+            outcome = Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
         if not outcome.succeeded:
             self._tell(outcome.time, outcome.kind.value, outcome.reason)
         return outcome
 
+    def _run_or_stop(self, duration_s: float) -> Outcome:
+        try:
+            return self._run(duration_s)
+        except KeyboardInterrupt:
+            return self._stopped()
+
     def _run(self, duration_s: float) -> Outcome:
         outer_tick, sample = 0, self._first
         while True:
+            if self._interrupt.asked:
+                return self._stopped()
             if sample.time >= duration_s:
                 return endings.completed(duration_s, sample.time)
             observation = self._perception.observe(sample.frames)
@@ -100,6 +114,9 @@ class Loop:
             if limited := self._move(self._rates(command), next_tick):
                 return endings.joint_limit(limited, self._now)
             sample = self._driver.read()
+
+    def _stopped(self) -> Outcome:
+        return Outcome(OutcomeKind.STOPPED, "stopped by the user", self._now)
 
     @property
     def _now(self) -> float:
@@ -146,7 +163,7 @@ class Loop:
         """Step the driver to an inner tick; return the joints stuck at a limit all the while."""
         guard = self._guards[self._arm]
         stuck = np.ones(guard.joint_count, dtype=np.bool_)
-        while self._inner_tick < until_tick:
+        while self._inner_tick < until_tick and not self._interrupt.asked:
             wanted = rates(guard.position)
             setpoints = {
                 name: other.step(wanted if name == self._arm else np.zeros(other.joint_count))
@@ -155,6 +172,8 @@ class Loop:
             stuck &= guard.at_limit
             self._driver.step(setpoints)
             self._inner_tick += 1
+        if self._interrupt.asked:
+            return []
         names = self._driver.arms[self._arm].names
         return [name for name, at_limit in zip(names, stuck, strict=True) if at_limit]
 

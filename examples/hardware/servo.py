@@ -1,0 +1,57 @@
+"""Servo the robot behind the socket: everything but the driver is as in simulation.
+
+python robot.py puma560 5000 &
+python servo.py puma560 5000
+"""
+
+import sys
+from pathlib import Path
+
+from driver import SocketDriver
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control import OptimalTrackingLaw
+from vergence.estimation import TrackedPoints
+from vergence.outcome import Outcome
+from vergence.planning import FixedReference, Reference
+from vergence.runtime import Driver, Loop, Recorder
+from vergence.runtime.recording import RunInfo
+from vergence.vision import SsdTracker, pick_features
+
+
+def servo(driver: Driver, model: SimulatedDriver, duration_s: float, folder: Path) -> Outcome:
+    """Keep four points of the first picture where they are; leave a recording."""
+    sample = driver.read()
+    while not sample.frames:  # the first picture may be late
+        driver.step({})
+        sample = driver.read()
+    image = sample.frames[0].image
+    points = pick_features(image, 4).points_px
+    law = OptimalTrackingLaw(
+        model.world.arm_to_camera("wrist"),
+        driver.cameras["wrist"],
+        depth_m=[1.0] * len(points),
+        axes=("x", "y", "rx", "ry"),
+        Q=2e-6 / len(points),
+    )
+    seen = TrackedPoints("wrist", SsdTracker(image, points))
+    goal = FixedReference(Reference(0.0, points))
+    recorder = Recorder(folder)
+    recorder.begin(RunInfo.of(driver, "robot over a socket", "", None, "wrist"))
+    loop = Loop(driver, "puma", seen, goal, law, outer_rate_hz=30, listeners=[recorder])
+    outcome = loop.run(duration_s)
+    recorder.close(outcome, {})
+    return outcome
+
+
+def main(cell: str, port: int) -> None:
+    model = SimulatedDriver(load_cell(cell), images=False)  # only its arm and camera are used
+    driver = SocketDriver(("localhost", port), model.arms, model.cameras, model.inner_rate_hz)
+    folder = Path("runs/robot-over-a-socket")
+    print(servo(driver, model, 5.0, folder))
+    print(f"see it by: vergence report {folder}")
+    driver.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))

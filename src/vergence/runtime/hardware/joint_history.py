@@ -1,0 +1,42 @@
+"""Where an arm stood a moment ago."""
+
+from collections import deque
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.robot import JointState
+
+
+class JointHistory:
+    """Remembers an arm's joints, to say where they were when a picture was exposed.
+
+    Args:
+        length: how many states to keep; the oldest go first.
+    """
+
+    def __init__(self, length: int = 1000) -> None:
+        self._states: deque[JointState] = deque(maxlen=length)
+
+    def add(self, state: JointState) -> None:
+        """Remember a state; times must not go backwards."""
+        self._states.append(state)
+
+    def at(self, time: float) -> FloatArray:
+        """Return the positions (n,) at a time, between two states on the line that joins them.
+
+        Before the first state, the first's; after the last, the last's.
+        """
+        assert self._states, "a state is added before one is asked for"
+        later = None
+        for state in reversed(self._states):
+            if state.time <= time:
+                return state.position if later is None else _between(state, later, time)
+            later = state
+        return self._states[0].position
+
+
+def _between(before: JointState, after: JointState, time: float) -> FloatArray:
+    share = (time - before.time) / (after.time - before.time)
+    positions: FloatArray = np.asarray(before.position + share * (after.position - before.position))
+    return positions

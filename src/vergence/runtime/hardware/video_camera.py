@@ -1,0 +1,100 @@
+"""A camera that OpenCV can open: USB, a network stream, or a video file played in real time."""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Event, Thread
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.camera import Frame
+from vergence.errors import InputError
+from vergence.runtime.hardware.metronome import Metronome
+
+_LOG = logging.getLogger(__name__)
+
+
+class VideoCamera:
+    """Takes pictures in a thread of its own, as fast as they come, and stamps each on arrival.
+
+    When the camera is unplugged or the file ends, no more pictures come, and the loop ends the run
+    as it does whenever pictures stay away: image late.
+
+    Args:
+        name: the camera's name.
+        source: number of a device, or a file or address.
+        clock: the run's time now, s; pictures are stamped with it.
+        latency_s: from exposure to arrival; measure it, for a moving arm feels every millisecond.
+        keep: how many pictures wait to be fetched; the oldest go first.
+
+    Raises:
+        InputError: if OpenCV cannot open the source.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        source: int | str,
+        clock: Callable[[], float],
+        latency_s: float = 0.0,
+        keep: int = 8,
+    ) -> None:
+        import cv2
+
+        self.name = name
+        self._clock, self._latency_s = clock, latency_s
+        self._capture = cv2.VideoCapture(source)
+        if not self._capture.isOpened():
+            raise InputError(f"camera {name}", "", source, "a device, file or address OpenCV opens")
+        self._pace = _pace_of(source, self._capture.get(cv2.CAP_PROP_FPS))
+        self._waiting: deque[tuple[float, ImageArray]] = deque(maxlen=keep)
+        self._closing = Event()
+        self._thread = Thread(target=self._take, name=f"camera {name}", daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether no more pictures will come."""
+        return not self._thread.is_alive()
+
+    def frames(self, joints_at: Callable[[float], Mapping[str, FloatArray]]) -> tuple[Frame, ...]:
+        """Return the pictures that arrived since the last call, oldest first.
+
+        Args:
+            joints_at: gives the arms' joint positions at an exposure, such as a `JointHistory`.
+        """
+        arrived = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        return tuple(Frame(self.name, time, image, joints_at(time)) for time, image in arrived)
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        self._closing.set()
+        self._thread.join()
+        self._capture.release()
+
+    def _take(self) -> None:
+        while not self._closing.is_set():
+            if self._pace is not None:
+                self._pace.wait()
+            there = self._capture.grab()
+            time = self._clock() - self._latency_s
+            there, raw = self._capture.retrieve() if there else (False, None)
+            if not there:
+                _LOG.info("camera %s: no more pictures", self.name)
+                return
+            self._waiting.append((time, _grey(np.asarray(raw))))
+
+
+def _pace_of(source: int | str, rate_hz: float) -> Metronome | None:
+    """Return the pace of a file; a device and an address have their own."""
+    if isinstance(source, int) or not Path(source).is_file():
+        return None
+    return Metronome(rate_hz if rate_hz > 0.0 else 25.0)
+
+
+def _grey(raw: ImageArray) -> ImageArray:
+    import cv2
+
+    return raw if raw.ndim == 2 else np.asarray(cv2.cvtColor(raw, cv2.COLOR_BGR2GRAY), np.uint8)

@@ -1,0 +1,77 @@
+"""On the robot's side: follow what is asked for, and stop when nobody asks any more."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control import Guard, stoppable_speed
+from vergence.robot import Arm, Setpoint
+
+
+class Watchdog:
+    """Stands between a link that may fail and an arm's servo, and is stepped by the servo's clock.
+
+    Between two set-points the arm goes on at the speed of the last one, so that a late message is
+    not felt. After `patience_s` without any it is braked to rest, and stays there: only a new
+    watchdog moves it again. Whatever arrives, no limit of the arm is passed. It waits patiently for
+    the first set-point.
+
+    Args:
+        arm: the arm with its limits.
+        start: joint positions now, (n,), rad or m.
+        dt: period of the servo, s.
+        patience_s: how long the arm may go on without a word.
+    """
+
+    def __init__(self, arm: Arm, start: FloatArray, dt: float, patience_s: float = 0.1) -> None:
+        self._guard = Guard(arm, start, dt)
+        self._acceleration = arm.acceleration_max
+        self._dt, self._patience_s = dt, patience_s
+        self._wanted: Setpoint | None = None
+        self._silent_s = 0.0
+        self.tripped = False  # whether it has given up waiting
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the arm has been brought to a stop."""
+        return not self._guard.moving
+
+    def hear(self, setpoint: Setpoint, age_s: float = 0.0) -> None:
+        """Take a set-point; one that is not finite counts for nothing.
+
+        Args:
+            setpoint: where the arm should be, and how fast it should move there.
+            age_s: how long ago it was meant for; beyond the patience it counts for nothing either.
+        """
+        numbers = np.concatenate((setpoint.position, setpoint.velocity))
+        if age_s > self._patience_s or not np.isfinite(numbers).all():
+            return
+        moved = setpoint.position + age_s * setpoint.velocity
+        self._wanted = Setpoint(moved, setpoint.velocity)
+        self._silent_s = 0.0
+
+    def step(self) -> Setpoint:
+        """Return what to hand to the servo in this tick."""
+        if self._wanted is None:
+            return self._guard.step(np.zeros(self._guard.joint_count))
+        self.tripped |= self._silent_s > self._patience_s
+        self._silent_s += self._dt
+        if self.tripped:
+            return self._guard.step(np.zeros(self._guard.joint_count))
+        out = self._guard.step(self._rates(self._wanted))
+        ahead = self._wanted.position + self._dt * self._wanted.velocity
+        self._wanted = Setpoint(ahead, self._wanted.velocity)
+        return out
+
+    def _rates(self, wanted: Setpoint) -> FloatArray:
+        """Return rates that keep the arm on the set-point, or bring it there as it can brake."""
+        behind = wanted.position - self._dt * wanted.velocity - self._guard.position
+        catching_up = [
+            np.copysign(self._closing_speed(abs(gap), a), gap)
+            for gap, a in zip(behind.tolist(), self._acceleration.tolist(), strict=True)
+        ]
+        return np.asarray(wanted.velocity + catching_up)
+
+    def _closing_speed(self, gap: float, a: float) -> float:
+        """Return how fast to close a gap; at once if the acceleration of one period does it."""
+        stoppable = stoppable_speed(gap, a, self._dt)
+        return min(gap / self._dt, max(stoppable, a * self._dt / 8.0))
