@@ -167,7 +167,7 @@ def far_robot() -> Iterator[tuple[subprocess.Popen[str], int]]:
 
 @pytest.mark.parametrize(
     ("how", "reason"),
-    [(signal.SIGKILL, "the robot"), (signal.SIGSTOP, "the robot said nothing for 0.5 s")],
+    [(signal.SIGKILL, "the robot"), (signal.SIGSTOP, "the robot said nothing for 2 s")],
 )
 def test_a_robot_that_dies_or_hangs_ends_the_run_by_name(
     far_robot: tuple[subprocess.Popen[str], int], how: int, reason: str, tmp_path: Path
@@ -182,7 +182,7 @@ def test_a_robot_that_dies_or_hangs_ends_the_run_by_name(
     )
     recording = tmp_path / "runs" / "robot-over-a-socket" / "recording.mcap"
     for _ in range(600):
-        if recording.is_file() and recording.stat().st_size > 300_000:
+        if recording.is_file() and recording.stat().st_size > 1_000_000:
             break
         time.sleep(0.1)
     robot.send_signal(how)
@@ -194,7 +194,7 @@ def test_a_robot_that_dies_or_hangs_ends_the_run_by_name(
     assert kept.complete
     assert kept.outcome is not None
     assert kept.outcome.kind is OutcomeKind.DRIVER_SILENT
-    assert len(kept.arms["puma"].time) > 3
+    assert len(kept.arms["puma"].time) > 10
 
 
 def test_a_robot_that_never_speaks_is_told_from_the_start(

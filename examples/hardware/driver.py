@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from multiprocessing.connection import Client
+from multiprocessing.connection import Client, Connection
+from time import monotonic, sleep
 
 import numpy as np
 
@@ -11,6 +12,18 @@ from vergence.camera import Camera, Frame
 from vergence.errors import DriverSilent
 from vergence.robot import Arm, JointState, Sample, Setpoint
 from vergence.runtime.hardware import JointHistory, VideoCamera
+
+
+def connect(address: tuple[str, int], within_s: float = 30.0) -> Connection:
+    """Return the link to a robot that may still be starting."""
+    until = monotonic() + within_s
+    while True:
+        try:
+            return Client(address)
+        except ConnectionRefusedError as error:
+            if monotonic() > until:
+                raise DriverSilent(f"nobody listens at {address[0]}:{address[1]}") from error
+            sleep(0.1)
 
 
 class SocketDriver:
@@ -22,7 +35,7 @@ class SocketDriver:
         arms: Mapping[str, Arm],
         cameras: Mapping[str, Camera],
         inner_rate_hz: float,
-        patience_s: float = 0.5,
+        patience_s: float = 2.0,
     ) -> None:
         self.arms, self.cameras, self.inner_rate_hz = arms, cameras, inner_rate_hz
         self.videos: Sequence[VideoCamera] = ()  # cameras on this computer
@@ -31,7 +44,7 @@ class SocketDriver:
         self._frames: list[Frame] = []
         self._period = 0
         self.time = 0.0  # s, of the robot's clock
-        self._link = Client(address)
+        self._link = connect(address)
         self._receive()
 
     def read(self) -> Sample:

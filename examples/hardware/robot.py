@@ -23,7 +23,7 @@ from vergence.runtime import Driver
 from vergence.runtime.hardware import Metronome, Watchdog
 
 
-def serve(robot: Driver, listener: Listener, patience_s: float = 0.1) -> str:
+def serve(robot: Driver, listener: Listener, patience_s: float = 0.5) -> str:
     """Work for one client until it is gone and the arms are at rest; return why it ended."""
     dt, sample = 1.0 / robot.inner_rate_hz, robot.read()
     dogs = {
@@ -90,8 +90,8 @@ def listen(
 
 if __name__ == "__main__":
     cell, port = sys.argv[1], int(sys.argv[2])
+    robot = SimulatedDriver(load_cell(cell))
     with Listener(("localhost", port)) as door:
-        robot = SimulatedDriver(load_cell(cell))
         print("ready", flush=True)
         print(serve(robot, door))
-        robot.close()
+    robot.close()

@@ -1,7 +1,7 @@
 """Servo the robot behind the socket: everything but the driver is as in simulation.
 
-python robot.py puma560 5000 &
-python servo.py puma560 5000
+python robot.py puma560 5007 &
+python servo.py puma560 5007
 """
 
 import sys
@@ -11,6 +11,7 @@ from driver import SocketDriver
 
 from vergence.cell import SimulatedDriver, load_cell
 from vergence.control import OptimalTrackingLaw
+from vergence.errors import VergenceError
 from vergence.estimation import TrackedPoints
 from vergence.outcome import Outcome
 from vergence.planning import FixedReference, Reference
@@ -54,4 +55,7 @@ def main(cell: str, port: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    try:
+        main(sys.argv[1], int(sys.argv[2]))
+    except VergenceError as error:
+        raise SystemExit(str(error)) from None

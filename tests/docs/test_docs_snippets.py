@@ -1,6 +1,7 @@
 """Every snippet of the documentation runs, in order, in an empty folder.
 
-A block with a caption is a file, or says how a command ends; a `text` block after another is what
+A block with a caption is a file, as is a captioned file of the project that a page shows; or the
+caption says how a command ends. A `text` block after another is what
 that one prints, where `…` stands for anything.
 """
 
@@ -37,6 +38,12 @@ def blocks(page: Path) -> Iterator[Block]:
         if token.type != "fence":
             continue
         directive, _, language = token.info.strip().rpartition(" ")
+        if directive == "{literalinclude}" and (
+            name := re.search(r":caption: (.*)", token.content)
+        ):
+            assert token.map
+            shown = (page.parent / language).read_text(encoding="utf-8")
+            yield Block("python", name[1], shown, token.map[0] + 1)
         if language in SHOWN_ONLY or directive in SHOWN_ONLY:
             continue
         assert directive in ("", "{code-block}"), f"{page.name}: {token.info} is not known"
