@@ -6,7 +6,7 @@ import pytest
 from vergence.cell import SimulatedDriver, load_cell
 from vergence.control import Guard, InnerLaw, MovingPose, PositionBasedLaw, moved
 from vergence.features import Observation, TargetState
-from vergence.geometry import se3_compose, se3_inverse, se3_log
+from vergence.geometry import se3, se3_compose, se3_inverse, se3_log, so3_exp
 from vergence.planning import Reference
 from vergence.robot import Arm, JointState
 
@@ -127,3 +127,53 @@ def test_without_a_target_the_arm_is_asked_to_stand(
 
 def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> None:
     assert isinstance(PositionBasedLaw(arms["six"][0], 1 / RATE), InnerLaw)
+
+
+def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seconds: float):
+    """Bring what the hand holds to a pose before a fixed camera while it slips (6,), hand axes.
+
+    Returns the distance of the target from the wanted place, (K,) m, and its places, (K, 3).
+    """
+    T_world_camera = se3_compose(arm.forward_kinematics(start), np.diag([1.0, -1, -1, 1]))
+    T_world_camera[:3, 3] += [0.3, 0.4, 0.5]
+    offset = MovingPose(se3(so3_exp(np.array([0.1, 0.2, -0.1])), np.array([0.0, 0.02, 0.1])), slip)
+    T_start = se3_compose(arm.forward_kinematics(start), offset.T)
+    T_wanted = T_start @ se3(so3_exp(np.array([0.3, -0.2, 0.2])), np.array([0.1, -0.1, 0.05]))
+    law = PositionBasedLaw(arm, 1 / RATE, T_world_camera=T_world_camera, **law_settings)
+    reference = Reference(0.0, T_camera_target=se3_compose(se3_inverse(T_world_camera), T_wanted))
+    guard, tick, places, exposed = Guard(arm, start, 1 / RATE), 0, [], [start]
+    for k in range(int(seconds * OUTER)):
+        time = tick / RATE - LATENCY_S
+        T_hand = arm.forward_kinematics(exposed[-2] if k else start)
+        T_target = se3_compose(T_hand, moved(offset, time))
+        twist = np.concatenate((T_hand[:3, :3] @ slip[:3], T_hand[:3, :3] @ slip[3:]))
+        state = TargetState(time, T_target, twist, np.eye(12), True, T_hand)
+        joints = JointState(tick / RATE, guard.position, np.zeros(arm.joint_count))
+        law.command(Observation(time, (), state), reference, joints)
+        while tick < int((k + 1) * RATE / OUTER):
+            guard.step(law.follow(guard.position))
+            tick += 1
+        exposed.append(guard.position)
+        T_hand = arm.forward_kinematics(guard.position)
+        places.append(se3_compose(T_hand, moved(offset, tick / RATE))[:3, 3])
+    return np.linalg.norm(np.array(places) - T_wanted[:3, 3], axis=1), np.array(places)
+
+
+@pytest.mark.parametrize("which", ["six", "seven"])
+def test_what_the_hand_holds_gets_to_its_place_before_a_fixed_camera(
+    which: str, arms: dict[str, tuple[Arm, np.ndarray]]
+) -> None:
+    distance, _ = hold(*arms[which], np.zeros(6), {"filter_hz": 0.5}, 4.0)
+    assert distance[0] > 0.1
+    assert distance[-1] < 1e-4
+
+
+def test_what_slips_in_the_hand_is_held_in_its_place_only_with_feed_forward(
+    arms: dict[str, tuple[Arm, np.ndarray]],
+) -> None:
+    slip = np.array([0.01, 0.02, 0.0, 0.0, 0.0, 0.05])
+    fed, _ = hold(*arms["seven"], slip, {}, 3.0)
+    neither = {"feed_forward": False, "prediction": False}
+    lagging, _ = hold(*arms["seven"], slip, neither, 3.0)
+    assert lagging[-1] > 1e-3
+    assert fed[-1] < 0.1 * lagging[-1]

@@ -29,6 +29,33 @@ def test_it_works_through_rendered_images():
     assert result.summary["max_drift_px"] < 0.5
 
 
+def test_by_pose_two_cameras_bring_a_block_to_its_place_through_rendered_images():
+    result = run_cell(load_cell("eye_to_hand_pose").replace(duration_s=4.0))
+    assert result.outcome.succeeded
+    assert result.summary["max_hand_error_m"] > 0.25
+    assert result.summary["max_hand_error_deg"] > 30.0
+    assert result.summary["final_hand_error_m"] < 1e-3
+    assert result.summary["final_hand_error_deg"] < 0.3
+
+
+def test_by_pose_it_matters_not_where_the_only_camera_is_believed_to_stand():
+    """Where the target is and where it should be are seen by the same camera."""
+    off = {"calibration_error_m": 0.02, "calibration_error_deg": 1.0}
+    cell = load_cell("eye_to_hand_pose").replace(
+        duration_s=8.0, perception={"cameras": ["front"]}, cameras={"front": off}
+    )
+    result = run_cell(cell, images=False)
+    assert result.outcome.succeeded
+    assert result.summary["max_target_error_m"] > 0.01
+    assert result.summary["final_hand_error_m"] < 2e-3
+    assert result.summary["final_hand_error_deg"] < 0.5
+
+
+def test_a_camera_that_moves_with_the_target_is_refused():
+    with pytest.raises(InputError, match=r"task\.camera.*does not move with it"):
+        load_cell("eye_to_hand_pose").replace(cameras={"front": {"arm": "puma"}})
+
+
 def test_a_fixed_camera_and_a_target_that_nobody_carries_are_refused():
     with pytest.raises(InputError, match=r"task\.camera.*target\.carried_by = 'puma'"):
         load_cell("eye_to_hand").replace(target={"carried_by": None})

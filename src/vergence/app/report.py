@@ -13,12 +13,13 @@ from vergence.app.figures import (
     mark_events,
     measures_figure,
     paths_figure,
+    pose_error_figure,
     target_figure,
     twist_figure,
 )
 from vergence.app.pictures import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, run_rows
-from vergence.runtime.recording import Recording
+from vergence.runtime.recording import CameraTrace, Recording
 
 REPORT = "report.html"
 
@@ -96,6 +97,11 @@ def _camera(recording: Recording, name: str) -> str:
         f"Camera {name}",
         _pictures(recording, name),
         _figure(recording, error_figure(trace), "How far the features are from their places."),
+        _figure(
+            recording,
+            pose_error_figure(trace),
+            "How far the target truly is from the pose that is wanted in this camera.",
+        ),
         markup.figure(
             paths_figure(size, trace),
             f"The features' ways through the picture, {size.width} × {size.height} px.",
@@ -132,8 +138,15 @@ def _target(recording: Recording) -> str:
     )
 
 
+def _stands(trace: CameraTrace | None) -> bool:
+    """Whether a camera is known to stand where it was first."""
+    return trace is not None and bool((trace.T_world_camera == trace.T_world_camera[:1]).all())
+
+
 def _arm(recording: Recording, name: str) -> str:
     arm, trace = recording.info.arms[name], recording.arms[name]
+    fixed = _stands(recording.cameras.get(recording.info.task_camera))
+    camera = "the fixed camera as seen from the hand" if fixed else "the camera in its own frame"
     return markup.section(
         f"Arm {name}",
         _figure(
@@ -144,7 +157,7 @@ def _arm(recording: Recording, name: str) -> str:
         _figure(
             recording,
             twist_figure(trace),
-            "Camera twist that the law asked for, in the camera's frame: z is the optical axis.",
+            f"Twist of {camera} that the law asked for; z is the optical axis.",
         ),
         _figure(
             recording,

@@ -233,8 +233,17 @@ def _check_names(cell: Cell) -> None:
         check("perception.cameras", name, cell.cameras)
     if cell.target.carried_by is not None:
         check("target.carried_by", cell.target.carried_by, cell.arms)
+    _check_sight(cell)
+
+
+def _check_sight(cell: Cell) -> None:
+    """Refuse a task whose arm cannot move the target in the task's camera."""
     carrier, arm = cell.cameras[cell.task.camera].arm, cell.task.arm
-    to_hand = carrier is None and cell.target.carried_by == arm and cell.task.kind == "track"
+    held = cell.target.carried_by == arm
+    if carrier == arm and held:
+        given = f"{cell.task.camera}, which {arm} carries as it does the target"
+        raise InputError(str(cell.path), "task.camera", given, "one that does not move with it")
+    to_hand = carrier is None and held and cell.task.kind != "reach"
     if carrier != arm and not to_hand:
         raise InputError(
             str(cell.path),

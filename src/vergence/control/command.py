@@ -11,7 +11,9 @@ class JointCommand:
     """Joint rates for the next outer period, and how the law came to them."""
 
     velocity: FloatArray  # (n,) rad/s or m/s
-    v_camera: FloatArray  # (6,) the camera twist these rates were made from, m/s and rad/s
+    # (6,) the camera twist these rates were made from, m/s and rad/s; of a fixed camera that looks
+    # at the hand, its twist as seen from there.
+    v_camera: FloatArray
     manipulability: float = float("nan")  # w'(q) of [Nelson1995] eq. (26), SI units
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command

@@ -1,14 +1,17 @@
 """Position-based servoing: the hand kept at a wanted pose relative to the target."""
 
+from dataclasses import replace
+
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control.command import JointCommand
+from vergence.control.hand_goal import goal_beside, goal_of_holder
 from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.redundancy import resolve_redundant
 from vergence.features import Observation, TargetState
-from vergence.geometry import se3_compose, se3_inverse
+from vergence.geometry import se3_adjoint, se3_compose, se3_inverse
 from vergence.planning import Reference
 from vergence.robot import Arm, Chain, JointState, forward_kinematics, jacobian
 
@@ -46,16 +49,18 @@ def hand_rates(
 
 
 class PositionBasedLaw:
-    """Moves the hand so that the target keeps a wanted pose in it, [Lippiello2005] section IV.
+    """Moves the hand so that the target keeps a wanted pose in a camera.
 
-    Each picture gives a goal T_world_hand = T_world_target (T*_hand_target)⁻¹. At the inner rate a
-    second-order filter makes a trajectory of it, and closed-loop inverse kinematics gives the joint
-    rates. By default the goal is predicted over the latency and its velocity fed forward; the paper
-    does neither, and so lags.
+    The camera is the hand, [Lippiello2005] section IV, or it is fixed and the hand holds the
+    target. Each picture gives a goal for the hand, see `goal_beside` and `goal_of_holder`. At the
+    inner rate a second-order filter makes a trajectory of it, and closed-loop inverse kinematics
+    gives the joint rates. By default the goal is predicted over the latency and its velocity fed
+    forward; the paper does neither, and so lags.
 
     Args:
-        arm: with the hand (a camera or tool) as its tip.
+        arm: with the hand as its tip: the camera, or the frame `TargetState.T_world_hand` is of.
         period: the inner one, s.
+        T_world_camera: pose of the fixed camera, (4, 4); None for a camera in the hand.
         filter_hz: natural frequency of the interpolating filter.
         damping: of that filter.
         feed_forward: whether the goal's velocity goes into the filter.
@@ -72,6 +77,7 @@ class PositionBasedLaw:
         arm: Arm,
         period: float,
         *,
+        T_world_camera: FloatArray | None = None,
         filter_hz: float = 5.0,
         damping: float = 1.0,
         feed_forward: bool = True,
@@ -80,7 +86,7 @@ class PositionBasedLaw:
         null_space: float = 0.5,
         singular_below: float = 0.02,
     ) -> None:
-        self._arm, self._period = arm, period
+        self._arm, self._period, self._T_world_camera = arm, period, T_world_camera
         self._frequency, self._damping = 2 * np.pi * filter_hz, damping
         self._feed_forward, self._prediction = feed_forward, prediction
         self._gain = 2 * np.pi * closed_loop_hz
@@ -102,7 +108,7 @@ class PositionBasedLaw:
             T_hand = forward_kinematics(self._arm.chain, joints.position)
             self._reference = MovingPose(T_hand, np.zeros(6))
         rates = self._rates(joints.position, self._reference)
-        return JointCommand(rates, jacobian(self._arm.chain, joints.position) @ rates)
+        return JointCommand(rates, self._camera_twist(joints.position, rates))
 
     def follow(self, position: FloatArray) -> FloatArray:
         """Return joint rates (n,) for the next inner period from the last set-point (n,)."""
@@ -122,17 +128,28 @@ class PositionBasedLaw:
         self._goal = self._reference = None
         self._spare = np.zeros(self._arm.joint_count)
 
+    def _camera_twist(self, q: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the camera's twist (6,) in its own frame; a fixed camera's as the hand sees it."""
+        v_hand: FloatArray = jacobian(self._arm.chain, q) @ rates
+        if self._T_world_camera is None:
+            return v_hand
+        T_world_hand = forward_kinematics(self._arm.chain, q)
+        v_camera: FloatArray = (
+            -se3_adjoint(se3_compose(se3_inverse(self._T_world_camera), T_world_hand)) @ v_hand
+        )
+        return v_camera
+
     def _goal_of(self, target: TargetState, wanted: FloatArray, now: float) -> MovingPose:
         """Return where the hand should be now, and how fast that place moves."""
-        seen = MovingPose(target.T_world_target, target.velocity)
-        T_target = moved(seen, now - target.time) if self._prediction else target.T_world_target
-        T_hand = se3_compose(T_target, se3_inverse(wanted))
-        twist = np.zeros(6)
-        if self._feed_forward:
-            lever = T_hand[:3, 3] - T_target[:3, 3]
-            twist[:3] = target.velocity[:3] + np.cross(target.velocity[3:], lever)
-            twist[3:] = target.velocity[3:]
-        return MovingPose(T_hand, twist)
+        if self._prediction:
+            seen = MovingPose(target.T_world_target, target.velocity)
+            T_target = moved(seen, now - target.time)
+            target = replace(target, time=now, T_world_target=T_target)
+        if self._T_world_camera is None:
+            goal = goal_beside(target, wanted)
+        else:
+            goal = goal_of_holder(target, se3_compose(self._T_world_camera, wanted))
+        return goal if self._feed_forward else MovingPose(goal.T, np.zeros(6))
 
     def _rates(self, position: FloatArray, reference: MovingPose) -> FloatArray:
         away = -self._null_space * self._arm.normalized(position)

@@ -4,6 +4,12 @@ from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.extrapolation import extrapolate
+from vergence.estimation.held_target import (
+    HandPose,
+    HeldTarget,
+    blocked_from_hand,
+    seen_from_hand,
+)
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure
@@ -39,6 +45,8 @@ __all__ = [
     "Exposure",
     "FilterHistory",
     "Find",
+    "HandPose",
+    "HeldTarget",
     "IndexSelection",
     "InformationSelection",
     "Joints",
@@ -63,8 +71,10 @@ __all__ = [
     "Visibility",
     "WindowRule",
     "add_obstacles",
+    "blocked_from_hand",
     "extrapolate",
     "pose_from_points",
     "predict_visibility",
+    "seen_from_hand",
     "view_of",
 ]

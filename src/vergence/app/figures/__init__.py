@@ -3,7 +3,12 @@
 from vergence.app.figures.arm import joints_figure, measures_figure, twist_figure
 from vergence.app.figures.image import error_figure, paths_figure
 from vergence.app.figures.layout import Panels, mark_events, panels, svg
-from vergence.app.figures.motion import camera_figure, estimate_figure, target_figure
+from vergence.app.figures.motion import (
+    camera_figure,
+    estimate_figure,
+    pose_error_figure,
+    target_figure,
+)
 
 __all__ = [
     "Panels",
@@ -15,6 +20,7 @@ __all__ = [
     "measures_figure",
     "panels",
     "paths_figure",
+    "pose_error_figure",
     "svg",
     "target_figure",
     "twist_figure",

@@ -173,11 +173,11 @@ class TrackTable(Table):
 
 
 class FollowTable(Table):
-    """Keep a camera, and so the hand that carries it, at a wanted pose relative to the target."""
+    """Keep a camera in the hand, or what the hand holds before a fixed one, at a wanted pose."""
 
     kind: Literal["follow"]
     arm: str  # which moves
-    camera: str  # carried by the arm
+    camera: str  # carried by the arm, or fixed where the arm carries the target
     desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
     target_timeout_s: Positive = 2.0  # with pictures, but the target lost

@@ -21,6 +21,7 @@ from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
 from vergence.errors import InputError
 from vergence.robot import Arm, manipulability_measure, reverse_arm
+from vergence.runtime.assembly.pose import camera_poses
 
 
 def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
@@ -172,8 +173,12 @@ def _depth(driver: SimulatedDriver, camera: str, given: float | str) -> FloatArr
 def _position_based(
     cell: Cell, driver: SimulatedDriver, table: PositionBasedTable
 ) -> PositionBasedLaw:
+    camera, T_world_camera = cell.task.camera, None
+    if fixed := _is_fixed(cell):
+        T_world_camera = camera_poses(cell, driver)(camera, {})
     return PositionBasedLaw(
-        driver.world.arm_to_camera(cell.task.camera),
+        driver.world.arm_to_target() if fixed else driver.world.arm_to_camera(camera),
         1.0 / driver.inner_rate_hz,
+        T_world_camera=T_world_camera,
         **table.model_dump(exclude={"kind"}),
     )

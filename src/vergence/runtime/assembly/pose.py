@@ -1,7 +1,7 @@
 """Perception of a target's pose, as a cell describes it."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
+    HandPose,
+    HeldTarget,
     IndexSelection,
     InformationSelection,
     Joints,
@@ -21,10 +23,13 @@ from vergence.estimation import (
     PoseFilter,
     PosePerception,
     RpyPoseFilter,
+    TargetFilter,
     TargetShape,
+    blocked_from_hand,
+    seen_from_hand,
 )
 from vergence.features import Observation
-from vergence.geometry import se3, se3_compose, so3_exp
+from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp
 from vergence.robot import forward_kinematics
 from vergence.runtime.assembly.measure import (
     CornerWindows,
@@ -84,26 +89,62 @@ def follow_pose(
         measure = with_outliers(measure, table.outliers, np.random.default_rng([cell.seed, 5]))
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
+    surroundings = _surroundings(cell, driver)
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
         "settings": PerceptionSettings(budget=table.budget),
-        "blocked_at": _blocked_at(driver) if table.occlusion else None,
+        "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
     shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
-    camera_pose, start = camera_poses(cell, driver), _rough_pose(cell, driver)
-    covariance = _start_covariance(table)
+    target_filter = _filter(cell)
+    start = target_filter.start(0.0, surroundings.start, covariance=_start_covariance(table))
+    perception = PosePerception(
+        rig, shape, surroundings.camera_pose, measure, target_filter, start, **parts
+    )
+    hand_pose = surroundings.hand_pose
+    return perception if hand_pose is None else HeldTarget(perception, hand_pose)
+
+
+def _filter(cell: Cell) -> TargetFilter[Any]:
+    table = cell.perception
     if table.filter == "rpy":
-        period = 1.0 / max(cell.cameras[name].rate_hz for name in names)
+        period = 1.0 / max(cell.cameras[name].rate_hz for name in cell.watched)
         # The paper has no gate, and one wrong corner then throws its filter off the target.
-        rpy = RpyPoseFilter(frame_period=period, gate=PoseFilter().gate)
-        first = rpy.start(0.0, start, covariance=covariance)
-        return PosePerception(rig, shape, camera_pose, measure, rpy, first, **parts)
-    pose = PoseFilter(
+        return RpyPoseFilter(frame_period=period, gate=PoseFilter().gate)
+    return PoseFilter(
         acceleration_density=table.acceleration_density,
         angular_acceleration_density=table.angular_acceleration_density,
     )
-    belief = pose.start(0.0, start, covariance=covariance)
-    return PosePerception(rig, shape, camera_pose, measure, pose, belief, **parts)
+
+
+class Surroundings(NamedTuple):
+    """What perception knows of the cell, in the frame in which it follows the target."""
+
+    camera_pose: CameraPose
+    blocked_at: Callable[[Joints], Blocked]
+    start: FloatArray  # (4, 4) the target's pose as well as it is known
+    hand_pose: HandPose | None  # where that frame is in the world, if it is the arm's hand
+
+
+def _surroundings(cell: Cell, driver: SimulatedDriver) -> Surroundings:
+    """Return the cell around the target: in the hand's frame if the task's arm holds it."""
+    camera_pose, blocked_at = camera_poses(cell, driver), _blocked_at(driver)
+    start, arm = _rough_pose(cell, driver), cell.task.arm
+    if cell.target.carried_by != arm:
+        return Surroundings(camera_pose, blocked_at, start, None)
+    chain = driver.world.arm_to_target().chain
+
+    def hand_pose(joints: Joints) -> FloatArray:
+        T_world_hand: FloatArray = forward_kinematics(chain, joints[arm])
+        return T_world_hand
+
+    first = hand_pose({arm: driver.world.joint_position(arm)})
+    return Surroundings(
+        seen_from_hand(camera_pose, hand_pose),
+        blocked_from_hand(blocked_at, hand_pose),
+        se3_compose(se3_inverse(first), start),
+        hand_pose,
+    )
 
 
 def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
@@ -140,7 +181,7 @@ def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
     return pose
 
 
-def _blocked_at(driver: SimulatedDriver) -> Any:
+def _blocked_at(driver: SimulatedDriver) -> Callable[[Joints], Blocked]:
     from vergence.cell.obstacles import Obstacles
 
     obstacles = Obstacles(driver.world)

@@ -56,6 +56,7 @@ FEATURES_SCHEMA = _schema(
     true_u=_NUMBERS,
     true_v=_NUMBERS,
     error_px=_NUMBERS,
+    T_camera_target_wanted=_NUMBERS,
     T_world_camera=_NUMBERS,
     T_world_target=_NUMBERS,
 )
@@ -91,6 +92,7 @@ def features_message(
     frame: Frame | None,
     points: ImagePoints | None,
     desired_px: FloatArray | None,
+    T_camera_target_wanted: FloatArray | None,
 ) -> dict[str, Any]:
     """Say what one picture showed, what was wanted, and what was true.
 
@@ -98,7 +100,8 @@ def features_message(
         received: when the loop had it, s.
         frame: the picture; None if the points come from elsewhere.
         points: what was measured in it; None if nothing was.
-        desired_px: (M, 2) where the points should be; None if this camera is only looked through.
+        desired_px: (M, 2) where the points should be; None if that is of no concern here.
+        T_camera_target_wanted: (4, 4) likewise where the target should be.
     """
     message: dict[str, Any] = {"received": received}
     if points is not None:
@@ -113,6 +116,8 @@ def features_message(
         message |= _columns("desired_", desired_px)
         if points is not None and points.points_px.shape == desired_px.shape:
             message["error_px"] = numbers(np.hypot(*(points.points_px - desired_px).T))
+    if T_camera_target_wanted is not None:
+        message["T_camera_target_wanted"] = numbers(T_camera_target_wanted.ravel())
     if frame is not None:
         message["time"] = frame.time
         if frame.truth is not None:

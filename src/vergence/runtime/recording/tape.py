@@ -97,8 +97,8 @@ class Tape:
         self, record: TickRecord, frame: Frame | None, view: ImagePoints | None
     ) -> None:
         camera, time = _source(frame, view)
-        desired = self._desired(record, camera)
-        row = streams.features_message(record.time, frame, view, desired)
+        desired, wanted = self._wanted(record, camera)
+        row = streams.features_message(record.time, frame, view, desired, wanted)
         self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, row)
         truth = frame.truth if frame is not None else None
         marks = messages.annotations(time, view, desired, truth.points_px if truth else None)
@@ -107,10 +107,13 @@ class Tape:
             poses = {camera: truth.T_world_camera, "target": truth.T_world_target}
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
 
-    def _desired(self, record: TickRecord, camera: str) -> FloatArray | None:
-        """Return the wanted points if they are meant for this camera."""
-        meant = camera == self._info.task_camera
-        return record.reference.points_px if record.reference and meant else None
+    def _wanted(
+        self, record: TickRecord, camera: str
+    ) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return the wanted points and the wanted pose of the target that this camera is about."""
+        if record.reference is None or camera != self._info.task_camera:
+            return None, None
+        return record.reference.points_px, record.reference.T_camera_target
 
     def _record_picture(self, frame: Frame) -> None:
         count = self._pictures.get(frame.camera, 0)

@@ -41,6 +41,7 @@ class CameraTrace:
     window_half_px: FloatArray  # (K, M, 2) half the sizes of the windows
     desired_px: FloatArray  # (K, M, 2)
     true_px: FloatArray  # (K, M, 2) truly projected, from a simulated camera
+    T_camera_target_wanted: FloatArray  # (K, 4, 4)
     T_world_camera: FloatArray  # (K, 4, 4) true
     T_world_target: FloatArray  # (K, 4, 4) true
 
@@ -100,6 +101,7 @@ def camera_trace(rows: Sequence[Row]) -> CameraTrace:
         window_half_px=_points(rows, "window_half_", widest),
         desired_px=_points(rows, "desired_", widest),
         true_px=_points(rows, "true_", widest),
+        T_camera_target_wanted=_poses(rows, "T_camera_target_wanted"),
         T_world_camera=_poses(rows, "T_world_camera"),
         T_world_target=_poses(rows, "T_world_target"),
     )

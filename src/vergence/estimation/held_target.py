@@ -1,0 +1,88 @@
+"""A target in an arm's hand, followed in the hand's frame: there it stands still."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.camera import Frame
+from vergence.estimation.measure import CameraPose, Joints
+from vergence.estimation.perception import PosePerception
+from vergence.estimation.visibility import Blocked
+from vergence.features import Observation, TargetState
+from vergence.geometry import se3_compose, se3_inverse, transform_points
+
+HandPose: TypeAlias = Callable[[Joints], FloatArray]  # joints to T_world_hand (4, 4)
+
+
+class HeldTarget:
+    """Follows a target that an arm holds, with cameras that do not move with it.
+
+    The filter works in the frame of the hand, in which the target hardly moves and the cameras do,
+    as the joints tell: what the arm does is known and need not be estimated. What is handed on is
+    the target in the world again, with the pose of the hand.
+
+    Args:
+        perception: set up in the hand's frame, see `seen_from_hand` and `blocked_from_hand`.
+        hand_pose: gives T_world_hand (4, 4) from the joints at the exposure.
+    """
+
+    def __init__(self, perception: PosePerception[Any], hand_pose: HandPose) -> None:
+        self._perception, self._hand_pose = perception, hand_pose
+
+    @property
+    def lost(self) -> str:
+        """Why the target counts as lost; empty while it is followed."""
+        return self._perception.lost
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the pictures show and where the target is, or None without a picture."""
+        observation = self._perception.observe(frames)
+        if observation is None or observation.target is None:
+            return observation
+        newest = max(frames, key=lambda frame: frame.time)
+        held = replace(observation.target, time=newest.time)
+        return replace(observation, target=_in_world(held, self._hand_pose(newest.joints)))
+
+
+def seen_from_hand(camera_pose: CameraPose, hand_pose: HandPose) -> CameraPose:
+    """Return the function that gives T_hand_camera (4, 4) where the other gives T_world_camera."""
+
+    def pose(camera: str, joints: Joints) -> FloatArray:
+        T_hand_camera: FloatArray = se3_compose(
+            se3_inverse(hand_pose(joints)), camera_pose(camera, joints)
+        )
+        return T_hand_camera
+
+    return pose
+
+
+def blocked_from_hand(
+    blocked_at: Callable[[Joints], Blocked], hand_pose: HandPose
+) -> Callable[[Joints], Blocked]:
+    """Return what tells, of an eye and points in the hand's frame, which points are hidden."""
+
+    def at(joints: Joints) -> Blocked:
+        T, blocked = hand_pose(joints), blocked_at(joints)
+
+        def hidden(eye: FloatArray, points: FloatArray) -> BoolArray:
+            return blocked(T[:3, :3] @ eye + T[:3, 3], transform_points(T, points))
+
+        return hidden
+
+    return at
+
+
+def _in_world(held: TargetState, T_world_hand: FloatArray) -> TargetState:
+    """Turn what is known in the hand's frame into world axes."""
+    turn = np.kron(np.eye(4), T_world_hand[:3, :3])
+    return TargetState(
+        held.time,
+        se3_compose(T_world_hand, held.T_world_target),
+        turn[:6, :6] @ held.velocity,
+        turn @ held.covariance @ turn.T,
+        held.consistent,
+        T_world_hand,
+    )
