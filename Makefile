@@ -11,7 +11,7 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-images demo test docs bench peers format clean
+.PHONY: help setup test-images test-browser demo test docs bench peers format clean
 .PHONY: check lint lint-format lint-rules lint-types
 
 help:
@@ -39,10 +39,13 @@ $(RENDERS): $(INSTALLED) scripts/ensure-rendering
 test-images:
 	@scripts/ensure-test-images
 
+test-browser:
+	@scripts/ensure-browser
+
 demo: setup
 	$(BIN)/vergence run puma560
 
-test: setup test-images
+test: setup test-images test-browser
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
 lint: lint-format lint-rules lint-types

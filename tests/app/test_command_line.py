@@ -16,7 +16,18 @@ from vergence.outcome import OutcomeKind
 from vergence.runtime.recording import Recording
 from vergence.studies import Check, Figure, StudyResult
 
-COMMANDS = ["run", "report", "reproduce", "plan", "track", "compare", "map", "bench", "cells"]
+COMMANDS = [
+    "run",
+    "report",
+    "reproduce",
+    "plan",
+    "track",
+    "compare",
+    "map",
+    "watch",
+    "bench",
+    "cells",
+]
 QUICK_RUN = ["run", "puma560", "--no-images", "--set", "duration_s=0.5"]
 
 Command = Callable[..., int]

@@ -8,6 +8,7 @@ from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, ScriptedLaw, flat
 
 from vergence.errors import DriverSilent
 from vergence.outcome import OutcomeKind
+from vergence.robot import Sample
 from vergence.runtime import Patience
 
 
@@ -214,3 +215,46 @@ def test_a_driver_that_falls_silent_ends_the_run_by_name(tick: int) -> None:
     assert outcome.reason == "the robot said nothing for 0.5 s"
     assert outcome.time == pytest.approx(tick / 500)
     assert notes.events[-1][1] == "driver silent"
+
+
+def test_another_law_takes_over_with_the_next_picture() -> None:
+    driver = ScriptedDriver()
+    first, second = ScriptedLaw(np.array([0.3, 0.0])), ScriptedLaw(np.array([0.0, 0.2]))
+    loop = looped(driver, law=first)
+    read = driver.read
+
+    def swapped() -> Sample:
+        sample = read()
+        if len(first.asked) == 15:
+            loop.replace_law(second)
+        return sample
+
+    driver.read = swapped
+    loop.run(1.0)
+    assert len(first.asked) == 15
+    assert len(second.asked) == 15
+    velocities = driver.velocities()
+    np.testing.assert_allclose(velocities[200], [0.3, 0.0])
+    np.testing.assert_allclose(velocities[450], [0.0, 0.2])
+    assert changes_within(velocities, 8.0, 2e-3)
+
+
+def test_a_run_can_be_stopped_from_inside() -> None:
+    driver = ScriptedDriver()
+    loop = looped(driver)
+    read = driver.read
+
+    def stopped() -> Sample:
+        sample = read()
+        if sample.time > 0.5:
+            loop.stop()
+            assert loop.stopping
+        return sample
+
+    driver.read = stopped
+    outcome = loop.run(5.0)
+    assert outcome.kind is OutcomeKind.STOPPED
+    assert 0.5 < outcome.time < 0.54
+    velocities = driver.velocities()
+    np.testing.assert_array_equal(velocities[-1], 0.0)
+    assert changes_within(velocities, 8.0, 2e-3)

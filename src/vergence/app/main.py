@@ -216,6 +216,49 @@ def track(
     raise typer.Exit(command(request, out, as_json))
 
 
+@app.command(epilog="Example: vergence watch puma560 --set law.S=0.01")
+def watch(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="CELL",
+            help="Name of a built-in cell, a cell file or folder.",
+            autocompletion=_cell_names,
+        ),
+    ],
+    out: Out = None,
+    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
+    images: Annotated[
+        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
+    ] = True,
+    image_every: Annotated[
+        int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
+    ] = 5,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Where to listen; only this machine can reach the default.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="8230 or the next free one if absent.")
+    ] = None,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
+    as_json: Json = False,
+) -> None:
+    """Watch a cell run in the browser: turn its knobs, drag its target."""
+    from vergence.app.watch import Request
+    from vergence.app.watch import watch as command
+
+    request = Request(
+        source, out, seed, images, image_every, settings or (), host, port, browser, as_json
+    )
+    raise typer.Exit(command(request))
+
+
 campaign_commands.register(app, _cell_names)
 
 

@@ -95,12 +95,17 @@ class World:
 
         A target that an arm carries stays in its hand.
         """
-        if self._rail < 0:
+        if not self.target_is_free:
             return
         self.data.mocap_pos[self._rail] = T_world_target[:3, 3]
         self.data.mocap_quat[self._rail] = matrix_to_quaternion(
             np.ascontiguousarray(T_world_target[:3, :3])
         )
+
+    @property
+    def target_is_free(self) -> bool:
+        """Whether `move_target` moves it: no arm carries it."""
+        return self._rail >= 0
 
     def place_arm(self, arm: str, position: FloatArray) -> None:
         """Put an arm's joints somewhere (n,), against all physics, and update every pose."""

@@ -4,7 +4,7 @@ from vergence.runtime.assembly import Parts, assemble_parts, build_law
 from vergence.runtime.driver import Driver
 from vergence.runtime.loop import Loop, Patience
 from vergence.runtime.recording import Listener, Recorder, Recording, TickRecord
-from vergence.runtime.run_cell import RunResult, run_cell
+from vergence.runtime.run_cell import RunResult, run_cell, run_driver
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.summary import Summary
 
@@ -24,4 +24,5 @@ __all__ = [
     "assemble_parts",
     "build_law",
     "run_cell",
+    "run_driver",
 ]

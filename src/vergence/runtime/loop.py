@@ -92,6 +92,22 @@ class Loop:
             self._tell(outcome.time, outcome.kind.value, outcome.reason)
         return outcome
 
+    @property
+    def stopping(self) -> bool:
+        """Whether Ctrl-C was pressed or `stop` called: who waits inside the loop should not."""
+        return self._interrupt.asked
+
+    def stop(self) -> None:
+        """End the run within this tick, as Ctrl-C does."""
+        self._interrupt.asked = True
+
+    def replace_law(self, law: Law) -> None:
+        """Go on with another law from the next picture; until then the arm is held.
+
+        To be called from the thread that runs the loop, such as by its driver.
+        """
+        self._law, self._last_command = law, None
+
     def _run_or_stop(self, duration_s: float) -> Outcome:
         try:
             return self._run(duration_s)

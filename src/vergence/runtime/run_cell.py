@@ -1,6 +1,6 @@
 """From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from vergence.cell import Cell, SimulatedDriver
@@ -33,21 +33,46 @@ def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True
     """
     driver = SimulatedDriver(cell, images)
     try:
-        return _run(cell, driver, listeners, images)
+        return run_driver(cell, driver, listeners, images)
     finally:
         driver.close()
 
 
-def _run(
-    cell: Cell, driver: SimulatedDriver, listeners: Sequence[Listener], images: bool
+def run_driver(
+    cell: Cell,
+    driver: SimulatedDriver,
+    listeners: Sequence[Listener],
+    images: bool,
+    *,
+    duration_s: float | None = None,
+    attend: Callable[[Loop], None] | None = None,
 ) -> RunResult:
+    """Run a cell with a driver that stands already, and stays open.
+
+    Args:
+        cell: what to run.
+        driver: of that cell.
+        listeners: hear of every tick.
+        images: whether the driver renders images.
+        duration_s: in place of the cell's; may be infinite.
+        attend: is given the loop before it runs, for whoever wants to change its law on the way.
+
+    Raises:
+        InputError: if the cell cannot be run as it is written.
+    """
     parts = assemble_parts(cell, driver, images)
     summary = Summary(cell.task.camera)
     everyone = (summary, *listeners)
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
     for listener in everyone:
         listener.begin(info)
-    outcome = parts if isinstance(parts, Outcome) else _loop(cell, driver, parts, everyone)
+    if isinstance(parts, Outcome):
+        outcome = parts
+    else:
+        loop = _loop(cell, driver, parts, everyone)
+        if attend is not None:
+            attend(loop)
+        outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
     values = dict(summary.values)
     values["duration_s"] = outcome.time
     for listener in everyone:
@@ -55,10 +80,8 @@ def _run(
     return RunResult(outcome, values)
 
 
-def _loop(
-    cell: Cell, driver: SimulatedDriver, parts: Parts, listeners: Sequence[Listener]
-) -> Outcome:
-    loop = Loop(
+def _loop(cell: Cell, driver: SimulatedDriver, parts: Parts, listeners: Sequence[Listener]) -> Loop:
+    return Loop(
         driver,
         cell.task.arm,
         parts.perception,
@@ -68,4 +91,3 @@ def _loop(
         listeners=listeners,
         patience=Patience(cell.task.image_timeout_s, cell.task.target_timeout_s),
     )
-    return loop.run(parts.duration_s or cell.duration_s)

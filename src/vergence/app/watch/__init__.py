@@ -1,0 +1,5 @@
+"""`vergence watch`: a page in the browser that shows a cell while it runs."""
+
+from vergence.app.watch.command import Request, watch
+
+__all__ = ["Request", "watch"]

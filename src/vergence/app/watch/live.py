@@ -1,0 +1,224 @@
+"""A cell that runs while somebody watches, pauses it, turns its knobs and moves its target."""
+
+import contextlib
+import queue
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vergence.app.watch.board import Board
+from vergence.app.watch.hand import Hand
+from vergence.app.watch.law_desk import LawDesk
+from vergence.app.watch.outline import outline_from, target_corners
+from vergence.app.watch.pace import Pace
+from vergence.app.watch.publisher import Publisher
+from vergence.app.watch.scene import Scene, world_state
+from vergence.app.watch.watched_driver import WatchedDriver
+from vergence.arrays import FloatArray
+from vergence.cell.world import World
+from vergence.errors import InputError
+from vergence.outcome import Outcome, OutcomeKind
+from vergence.runtime import Loop, Recorder, RunResult, run_driver
+
+Command = Mapping[str, Any]
+
+_LOOK_UP_S = 0.1  # the longest wait without a look at whether Ctrl-C was pressed
+
+
+class Live:
+    """Runs a cell beside the wall clock, again and again, and does what pages ask for.
+
+    It runs in the thread that calls `run`; `ask` may be called from any.
+
+    Args:
+        desk: has the cell.
+        images: look through rendered images; if not, at exact projections.
+        out: folder of the recording; runs after a reset get a number behind it.
+        image_every: record every n-th picture.
+
+    Attributes:
+        board: what there is to show.
+        scene: the view in three dimensions.
+        folder: of the newest recording.
+    """
+
+    def __init__(self, desk: LawDesk, images: bool, out: Path, image_every: int) -> None:
+        self._desk, self._images = desk, images
+        self._out, self._image_every = out, image_every
+        self._inbox: queue.Queue[Command] = queue.Queue()
+        self._pace = Pace()
+        self._driver = WatchedDriver(desk.cell, images)
+        self._corners = target_corners(self._driver.world)
+        self._loop: Loop | None = None
+        self._recorder = Recorder(out, image_every)
+        self._runs, self._again = 0, True
+        self.board = Board()
+        self._hand = Hand(self._driver, self.board)
+        self.scene = Scene(self._driver.world.model, self.board, _in_view(self._driver.world))
+
+    @property
+    def folder(self) -> Path:
+        """Where the newest run is recorded."""
+        return self._recorder.folder
+
+    def ask(self, command: Command) -> None:
+        """Ask for something; it is done between two turns of the loop."""
+        self._inbox.put(command)
+
+    def run(self) -> RunResult:
+        """Run the cell until Ctrl-C; return what came of the last run."""
+        while self._again:
+            self._again = False
+            result = self._run_once()
+            if not self._again and result.outcome.kind is not OutcomeKind.STOPPED:
+                self._rest()
+            if self._again:
+                self._stand_up()
+        return result
+
+    def close(self) -> None:
+        """Let go of everything; a recording that is not finished is closed as it is."""
+        reason = "the run broke off before it could say why"
+        self._recorder.close(Outcome(OutcomeKind.STOPPED, reason, self._recorder.now), {})
+        self.scene.close()
+        self._driver.close()
+
+    def _run_once(self) -> RunResult:
+        cell = self._desk.cell
+        about = {
+            "mode": "live",
+            "scene": True,
+            "draggable": self._driver.world.target_is_free,
+            "carried_by": cell.target.carried_by,
+        }
+        publisher = Publisher(self.board, cell, self._driver, about)
+        self._tell()
+        try:
+            return run_driver(
+                cell,
+                self._driver,
+                (self._recorder, publisher),
+                self._images,
+                duration_s=float("inf"),
+                attend=self._attend,
+            )
+        finally:
+            self._loop = None
+            self._driver.between = None
+
+    def _attend(self, loop: Loop) -> None:
+        self._loop = loop
+        self._driver.between = self._between
+
+    def _stand_up(self) -> None:
+        """Begin again from the start, in a new folder."""
+        self._driver.close()
+        self._runs += 1
+        folder = self._out.with_name(f"{self._out.name}-{self._runs + 1}")
+        self._recorder = Recorder(folder, self._image_every)
+        self._driver = WatchedDriver(self._desk.cell, self._images)
+        self._hand = Hand(self._driver, self.board)
+
+    def _rest(self) -> None:
+        """Do what is asked after a run has ended, until it shall begin again, or Ctrl-C."""
+        with contextlib.suppress(KeyboardInterrupt):
+            while not self._again:
+                self._obey(self._inbox.get())
+                self._tell()
+
+    def _between(self, time: float) -> None:
+        """Show the world; wait for the clock; do what was asked."""
+        self._show(time)
+        while not self._stopping and (delay := self._pace.delay(time)) != 0.0:
+            self._tell()
+            with contextlib.suppress(queue.Empty):
+                self._obey(self._inbox.get(timeout=min(delay or _LOOK_UP_S, _LOOK_UP_S)))
+        while not self._inbox.empty():
+            self._obey(self._inbox.get())
+        self._tell()
+
+    @property
+    def _stopping(self) -> bool:
+        return self._loop is not None and self._loop.stopping
+
+    def _show(self, time: float) -> None:
+        world = self._driver.world
+        self.board.state = world_state(world.model, world.data)
+        around = outline_from(self.scene.eye, self._corners, world.target_pose())
+        self.board.status(time=time, outline=around, fovy=self.scene.eye.fovy_deg)
+
+    def _tell(self) -> None:
+        pace = self._pace
+        self.board.status(
+            paused=pace.paused,
+            speed=pace.speed,
+            measured=round(pace.measured, 2),
+            held=self._driver.target.held,
+            law=self._desk.as_json(),
+            folder=str(self.folder),
+        )
+
+    def _obey(self, command: Command) -> None:
+        match command:
+            case {"do": "pause"}:
+                self._pace.pause()
+            case {"do": "resume"}:
+                self._pace.resume()
+            case {"do": "step"}:
+                self._pace.step()
+            case {"do": "speed", "value": float(speed) | int(speed)} if speed > 0:
+                self._pace.set_speed(float(speed))
+            case {"do": "reset"}:
+                self._again = True
+                if self._loop is not None:
+                    self._loop.stop()
+            case {"do": "law" | "knob"}:
+                self._change_law(command)
+            case _:
+                self._move_target(command)
+
+    def _change_law(self, command: Command) -> None:
+        try:
+            match command:
+                case {"do": "law", "name": str(name)}:
+                    law = self._desk.choose(name, self._driver)
+                case {"key": str(key), "value": bool() | int() | float() | str() as value}:
+                    law = self._desk.turn(key, value, self._driver)
+                case _:
+                    return
+        except InputError as error:
+            self._say("law refused", str(error))
+            return
+        if self._loop is not None:
+            self._loop.replace_law(law)
+        changes = self._desk.as_json()["settings"]
+        self._say("law changed", ", ".join(changes) or "back to the cell's own")
+
+    def _move_target(self, command: Command) -> None:
+        if not self._driver.world.target_is_free:
+            return
+        match command:
+            case {"do": "grab", "view": str(view), "u": u, "v": v}:
+                self._hand.grab(view, float(u), float(v), self.scene.eye)
+            case {"do": "move", "view": str(view), "u": u, "v": v, "along": bool(along)}:
+                self._hand.move(view, float(u), float(v), along)
+            case {"do": "release"}:
+                self._hand.release()
+            case {"do": "let go"}:
+                self._driver.target.held = False
+
+    def _say(self, name: str, text: str) -> None:
+        time = self._driver.time
+        self.board.event(time, name, text)
+        if self._recorder.running:
+            self._recorder.event(time, name, text)
+
+
+def _in_view(world: World) -> FloatArray:
+    """Return what the first view should show, (K, 3): arms, cameras, and at last the target."""
+    model, data = world.model, world.data
+    bodies = [data.xpos[body] for body in range(1, model.nbody)]
+    cameras = [data.cam_xpos[camera] for camera in range(model.ncam)]
+    return np.array([*bodies, *cameras, world.target_pose()[:3, 3]])

@@ -1,0 +1,99 @@
+// The law: which one, and its numbers; a number has a field, and a slider over three decades.
+
+const DECADES = 1.5; // to either side of where it was when the law was chosen
+
+export class Law {
+  constructor(section, ask) {
+    this.section = section;
+    this.choice = section.querySelector("select");
+    this.knobs = section.querySelector("#knobs");
+    this.settings = section.querySelector("#settings");
+    this.ask = ask;
+    this.choice.addEventListener("change", () => {
+      this.shown = null;
+      ask({ do: "law", name: this.choice.value });
+    });
+  }
+
+  status(law) {
+    this.section.hidden = !law;
+    if (!law) return;
+    const text = JSON.stringify(law);
+    if (text === this.text) return;
+    this.text = text;
+    const names = [law.choice, ...law.knobs.map(({ key }) => key)].join();
+    if (names !== this.shown) this.build(law);
+    this.shown = names;
+    for (const knob of law.knobs) this.fields.get(knob.key)(knob.value);
+    this.settings.replaceChildren(...command(law.settings));
+  }
+
+  build(law) {
+    this.choice.replaceChildren(...law.choices.map((name) => new Option(name, name)));
+    this.choice.value = law.choice;
+    this.fields = new Map();
+    this.knobs.replaceChildren(...law.knobs.map((knob) => this.knob(knob)));
+  }
+
+  knob(knob) {
+    const row = document.createElement("label");
+    row.className = "knob";
+    row.dataset.key = knob.key;
+    const name = document.createElement("span");
+    name.textContent = knob.label;
+    const turn = (value) => this.ask({ do: "knob", key: knob.key, value });
+    const make = { number: this.number, choice: this.choices, switch: this.flag }[knob.kind];
+    row.append(name, ...make.call(this, knob, turn));
+    return row;
+  }
+
+  number(knob, turn) {
+    const field = document.createElement("input");
+    field.type = "number";
+    field.step = "any";
+    const unit = document.createElement("span");
+    unit.className = "soft";
+    unit.textContent = knob.unit;
+    field.addEventListener("change", () => field.value !== "" && turn(Number(field.value)));
+    const slider = document.createElement("input");
+    slider.type = "range";
+    slider.min = -DECADES;
+    slider.max = DECADES;
+    slider.step = 0.01;
+    slider.ariaLabel = knob.label;
+    const middle = knob.value;
+    slider.disabled = middle <= 0;
+    slider.addEventListener("input", () => { field.value = (middle * 10 ** slider.value).toPrecision(3); });
+    slider.addEventListener("change", () => turn(Number((middle * 10 ** slider.value).toPrecision(3))));
+    this.fields.set(knob.key, (value) => {
+      if (document.activeElement !== field) field.value = value;
+      if (middle > 0 && document.activeElement !== slider) slider.value = Math.log10(Math.max(value, 1e-300) / middle);
+    });
+    return middle > 0 ? [field, unit, slider] : [field, unit];
+  }
+
+  choices(knob, turn) {
+    const field = document.createElement("select");
+    field.className = "wide";
+    field.append(...knob.choices.map((name) => new Option(name.replaceAll("_", " "), name)));
+    field.addEventListener("change", () => turn(field.value));
+    this.fields.set(knob.key, (value) => { field.value = value; });
+    return [field];
+  }
+
+  flag(knob, turn) {
+    const field = document.createElement("input");
+    field.type = "checkbox";
+    field.addEventListener("change", () => turn(field.checked));
+    this.fields.set(knob.key, (value) => { field.checked = value; });
+    return [field];
+  }
+}
+
+// Says how to run the cell with what was changed.
+function command(settings) {
+  if (!settings.length) return [];
+  const code = document.createElement("code");
+  code.textContent = settings.map((setting) => `--set '${setting}'`).join(" ");
+  return ["The same from the command line: ", code];
+}

@@ -1,0 +1,55 @@
+// Time: pause, step, reset, speed, and in a recording the slider.
+export class Transport {
+  constructor(ask) {
+    this.ask = ask;
+    for (const id of ["time", "pause", "step", "reset", "speed", "measured", "badge", "reason", "slider", "seek", "cell"]) {
+      this[id] = document.getElementById(id);
+    }
+    this.pause.addEventListener("click", () => this.toggle());
+    this.step.addEventListener("click", () => ask({ do: "step" }));
+    this.reset.addEventListener("click", () => ask({ do: "reset" }));
+    this.speed.addEventListener("change", () => ask({ do: "speed", value: Number(this.speed.value) }));
+    this.seek.addEventListener("input", () => ask({ do: "seek", value: Number(this.seek.value) }));
+    document.addEventListener("keydown", (event) => {
+      if (event.key !== " " || event.target.matches("input, select, button")) return;
+      event.preventDefault();
+      this.toggle();
+    });
+  }
+
+  begin(about) {
+    this.cell.textContent = about.cell;
+    document.title = `${about.cell} · vergence`;
+    this.recording = about.mode === "recording";
+    this.slider.hidden = !this.recording;
+    if (this.recording) this.seek.max = about.duration;
+    this.reset.textContent = this.recording ? "To the start" : "Reset";
+  }
+
+  toggle() { this.ask({ do: this.paused ? "resume" : "pause" }); }
+
+  connected(open) {
+    if (!open) this.mark("not connected", "plain", "vergence does not answer");
+  }
+
+  status({ time, paused, speed, measured, outcome }) {
+    this.paused = paused;
+    this.time.textContent = time === undefined ? "" : `${time.toFixed(2)} s`;
+    this.pause.textContent = paused ? "Resume" : "Pause";
+    if (document.activeElement !== this.speed) this.speed.value = String(speed);
+    this.measured.textContent = paused || measured === undefined ? "" : `${measured.toFixed(2)} × real time`;
+    if (this.recording && document.activeElement !== this.seek) this.seek.value = time ?? 0;
+    if (this.recording && paused) this.seek.value = time ?? 0;
+    const over = outcome && !this.recording;
+    this.pause.disabled = this.step.disabled = Boolean(over);
+    if (over) this.measured.textContent = "";
+    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}`);
+    else this.mark(paused ? "paused" : "running", paused ? "plain" : "good", "");
+  }
+
+  mark(word, kind, reason) {
+    this.badge.textContent = word;
+    this.badge.className = `badge ${kind}`;
+    this.reason.textContent = reason;
+  }
+}

@@ -1,0 +1,143 @@
+"""Puts every tick of a running cell on the board."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vergence.app.figures.arm import normalized
+from vergence.app.watch.board import Board
+from vergence.app.watch.outline import outline, target_corners
+from vergence.app.watch.plots import Plot, plots_of, row
+from vergence.app.watch.shot import Shot
+from vergence.arrays import FloatArray
+from vergence.camera import Frame, FrameTruth
+from vergence.cell import Cell, SimulatedDriver
+from vergence.features import ImagePoints
+from vergence.geometry import se3_inverse, transform_points
+from vergence.outcome import Outcome
+from vergence.planning import Reference
+from vergence.robot import yoshikawa_measure
+from vergence.runtime.pose_errors import pose_errors
+from vergence.runtime.recording import RunInfo, TickRecord
+
+_MM = 1e3
+
+
+class Publisher:
+    """A listener that hands each tick to the page.
+
+    Args:
+        board: what the page shows.
+        cell: what runs.
+        driver: of that cell.
+        about: what else the page has to know of the run.
+    """
+
+    def __init__(
+        self, board: Board, cell: Cell, driver: SimulatedDriver, about: Mapping[str, object]
+    ) -> None:
+        self._board, self._cell, self._driver = board, cell, driver
+        self._about = about
+        self._corners = target_corners(driver.world)
+        self._plots: tuple[Plot, ...] = ()
+        self._info: RunInfo | None = None
+
+    def begin(self, info: RunInfo) -> None:
+        """Tell the page what is about to run."""
+        self._info = info
+        arm = info.arms[self._cell.task.arm]
+        self._plots = plots_of(self._cell.task.kind, len(self._driver.features), arm)
+        self._board.begin(
+            {
+                "cell": info.cell,
+                "task": self._cell.task.kind,
+                "cameras": [
+                    {"name": name, "width": camera.width, "height": camera.height}
+                    for name, camera in info.cameras.items()
+                    if name in self._cell.watched
+                ],
+                "task_camera": info.task_camera,
+                "plots": [plot.as_json() for plot in self._plots],
+                **self._about,
+            }
+        )
+        self._board.status(outcome=None)
+
+    def tick(self, record: TickRecord) -> None:
+        """Hand on what came in, what was seen and what was asked."""
+        shots = [self._shot(frame, record) for frame in record.sample.frames]
+        self._board.tick(row(record.time, self._plots, self._values(record)), shots)
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Hand on an event."""
+        self._board.event(time, name, text)
+
+    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
+        """Tell the page how it ended."""
+        end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
+        self._board.status(outcome={**end, "succeeded": outcome.succeeded})
+
+    def _shot(self, frame: Frame, record: TickRecord) -> Shot:
+        views = record.observation.views if record.observation else ()
+        mine = (view for view in views if (view.camera, view.time) == (frame.camera, frame.time))
+        view, truth = next(mine, None), frame.truth
+        camera = self._driver.cameras[frame.camera]
+        around = None
+        if truth is not None:
+            T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
+            around = outline(self._corners, T_camera_target, camera)
+        return Shot(
+            frame.camera,
+            frame.time,
+            frame.image,
+            view,
+            self._desired(frame, record.reference),
+            _true(truth, view),
+            truth.T_world_camera if truth else None,
+            truth.T_world_target if truth else None,
+            around,
+        )
+
+    def _desired(self, frame: Frame, reference: Reference | None) -> FloatArray | None:
+        """Return where the points of a picture should be, if the reference speaks of them."""
+        if reference is None or frame.camera != self._cell.task.camera:
+            return None
+        if reference.points_px is not None or reference.T_camera_target is None:
+            return reference.points_px
+        points = transform_points(reference.T_camera_target, self._driver.features)
+        return self._driver.cameras[frame.camera].project(points)
+
+    def _values(self, record: TickRecord) -> dict[str, FloatArray]:
+        assert self._info is not None, "a run begins before it ticks"
+        name = self._cell.task.arm
+        q = record.sample.joints[name].position
+        return {
+            "joints": normalized(self._info.arms[name], q),
+            "manipulability": np.array([yoshikawa_measure(self._driver.arms[name].jacobian(q))]),
+            **self._errors(record),
+        }
+
+    def _errors(self, record: TickRecord) -> dict[str, FloatArray]:
+        if self._cell.task.kind == "follow":
+            errors = pose_errors(record, self._cell.task.camera)
+            if errors is None:
+                return {}
+            return {
+                "hand_mm": np.array([_MM * np.linalg.norm(errors.hand_m)]),
+                "hand_deg": np.array([np.rad2deg(errors.hand_rad)]),
+                "target_mm": np.array([_MM * np.linalg.norm(errors.target_m)]),
+            }
+        views = record.observation.views if record.observation else ()
+        wanted = record.reference.points_px if record.reference else None
+        mine = [view for view in views if view.camera == self._cell.task.camera]
+        if not mine or wanted is None:
+            return {}
+        distance = np.linalg.norm(mine[-1].points_px - wanted, axis=1)
+        return {"error_px": np.where(mine[-1].found, distance, np.nan)}
+
+
+def _true(truth: FrameTruth | None, view: ImagePoints | None) -> FloatArray | None:
+    """Return where the points truly are, those in sight."""
+    if truth is None or view is None:
+        return None
+    return np.where(truth.visible[:, None], truth.points_px, np.nan)

@@ -1,0 +1,125 @@
+"""The cell in three dimensions: MuJoCo Studio's web viewer, shown what the board says.
+
+Only its renderer is used: the browser gets the compiled model once, then the world's state. It
+listens on loopback, whatever the page does.
+"""
+
+import logging
+import threading
+import time
+import zlib
+from typing import Any
+
+import numpy as np
+
+from vergence.app.watch.board import Board
+from vergence.app.watch.eye import Eye
+from vergence.arrays import FloatArray
+
+_PERIOD_S = 1 / 30  # between two states, while no browser sets the pace
+_FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its viewers begin
+
+
+class Scene:
+    """Serves the view on a loopback port.
+
+    Args:
+        model: MuJoCo's.
+        board: has the state to show.
+        looks_at: what to have in view, (K, 3), m, in the world.
+
+    Attributes:
+        port: where it listens, on 127.0.0.1.
+    """
+
+    def __init__(self, model: Any, board: Board, looks_at: FloatArray) -> None:
+        import mujoco
+        from mujoco.studio import ux
+        from mujoco.studio.web import client_camera, headless_ui, state_payload, web_server
+
+        logging.getLogger("WebServer").setLevel(logging.WARNING)  # it writes to stdout
+        self._model, self._board = model, board
+        self._payload, self._mode = state_payload, ux.TUMBLE_CAMERA_IDX
+        bundle = state_payload.serialize_model_bundle(model)
+        self._crc = zlib.crc32(bundle)
+        socket, behind = web_server.bind_loopback_socket(), web_server.bind_loopback_socket()
+        self.port = int(socket.getsockname()[1])
+        self._server = web_server.WebServer(socket, behind, mjb_data=bundle)
+        # Without a user interface behind it, the viewer takes the browser for a mere spectator.
+        self._interface = headless_ui.HeadlessUi("vergence", behind.getsockname()[1], "")
+        self._camera = mujoco.MjvCamera()
+        self._sync = client_camera.ClientCameraSync()
+        self._look_at(looks_at)
+        self._rest: tuple[Any, ...] = (mujoco.MjvPerturb(), mujoco.MjvOption(), model, _FLAGS, [])
+        self._signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._show, name="scene", daemon=True)
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._server.start()
+        self._thread.start()
+
+    @property
+    def eye(self) -> Eye:
+        """From where the browser looks."""
+        camera = self._camera
+        return Eye.around(
+            camera.lookat,
+            camera.distance,
+            camera.azimuth,
+            camera.elevation,
+            float(self._model.vis.global_.fovy),
+        )
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._ending.set()
+        self._server.stop()
+        self._thread.join(timeout=2.0)
+
+    def _look_at(self, points: FloatArray) -> None:
+        """Choose a first view across the way from the first of some points to the last."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        way = points[-1] - points[0]
+        self._camera.lookat[:] = (low + high) / 2
+        self._camera.distance = 1.1 * float(np.linalg.norm(high - low)) + 0.7
+        self._camera.azimuth = float(np.rad2deg(np.arctan2(way[1], way[0]))) + 70.0
+        self._camera.elevation = -22.0
+
+    def _show(self) -> None:
+        while not self._ending.is_set():
+            framed = self._interface.new_frame()
+            moved = self._server.take_client_camera()
+            if moved is not None:
+                self._sync.apply(self._camera, moved)
+            self._publish()
+            if framed:
+                self._interface.end_frame()
+            else:
+                time.sleep(_PERIOD_S)
+
+    def _publish(self) -> None:
+        state = self._board.state
+        if state is None:
+            return
+        browser = self._payload.ViewerInputState(
+            mouse_focus=True,
+            camera_index=self._mode,
+            keyboard_focus=False,
+            camera_generation=self._sync.update_generation(self._camera),
+        )
+        payload = self._payload.serialize_state_payload(
+            self._crc, self._signature, state.tobytes(), self._camera, *self._rest, browser
+        )
+        self._server.update_state(payload)
+
+
+def world_state(model: Any, data: Any) -> FloatArray:
+    """Return the state of a world as the view wants it."""
+    import mujoco
+
+    kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    state = np.empty(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, data, state, kind)
+    return state

@@ -1,0 +1,68 @@
+"""A camera's picture with what is to be drawn over it, ready for the page."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.features import ImagePoints
+from vergence.runtime.recording.numbers import numbers
+
+_JPEG_QUALITY = 80
+_DECIMALS = 3  # of a pixel: nobody sees more
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture, what was measured in it, what was wanted, and what is true."""
+
+    camera: str
+    time: float  # s, of exposure
+    image: ImageArray | None  # (height, width) grey
+    points: ImagePoints | None = None
+    desired_px: FloatArray | None = None  # (M, 2)
+    true_px: FloatArray | None = None  # (M, 2)
+    T_world_camera: FloatArray | None = None  # (4, 4) at exposure, where the truth is known
+    T_world_target: FloatArray | None = None  # (4, 4) likewise
+    outline_px: FloatArray | None = None  # (K, 2) around the target, where it is known
+
+    @cached_property
+    def jpeg(self) -> bytes:
+        """The picture as JPEG; empty without one."""
+        if self.image is None:
+            return b""
+        import cv2
+
+        quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+        return bytes(cv2.imencode(".jpg", self.image, quality)[1])
+
+    @cached_property
+    def header(self) -> dict[str, Any]:
+        """What the page draws over the picture; places in pixels, centres at integers."""
+        header: dict[str, Any] = {"camera": self.camera, "time": self.time, "bytes": len(self.jpeg)}
+        for name in ("desired", "true", "outline"):
+            places = getattr(self, f"{name}_px")
+            if places is not None:
+                header[name] = _places(places)
+        if self.points is not None:
+            header |= _measured(self.points)
+        return header
+
+
+def _measured(points: ImagePoints) -> dict[str, Any]:
+    measured: dict[str, Any] = {
+        "points": _places(points.points_px),
+        "found": np.asarray(points.found, dtype=bool).tolist(),
+        "asked": points.asked.tolist(),
+        "reasons": list(points.reasons),
+    }
+    if points.windows is not None:
+        measured["predicted"] = _places(points.windows.center_px)
+        measured["half"] = _places(points.windows.half_px)
+    return measured
+
+
+def _places(places: FloatArray) -> list[Any]:
+    return numbers(np.round(places, _DECIMALS))

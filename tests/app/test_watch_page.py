@@ -1,0 +1,262 @@
+"""`vergence watch` in a real browser: the page shows a cell that runs, and steers it."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Browser
+
+from vergence.runtime.recording import Recording
+
+SMALL = ("resolution=[320, 240]", "pixel_um=[22.0, 26.0]")  # of puma560: the same view, quicker
+STILL = "target.motion={kind = 'still'}"
+
+ROWS = "watch.plots.rows.length"
+TIME = "watch.plots.rows.at(-1)?.[0] ?? -1"
+ERROR = "watch.plots.rows.at(-1)?.[1][0]"
+VIEW = "watch.pictures.views.get('wrist')"
+# Where the tracked point is in the window, and the target in the view in space.
+POINT = (
+    f"(() => {{ const v = {VIEW}, b = v.canvas.getBoundingClientRect();"
+    "const [x, y] = v.header.points[0];"
+    "return [b.left + (x + 0.5) * b.width / 320, b.top + (y + 0.5) * b.height / 240] })()"
+)
+TARGET = (
+    "(() => { const s = watch.scene, o = s.outline, b = s.stage.getBoundingClientRect();"
+    "const m = [0, 1].map((k) => o.reduce((sum, p) => sum + p[k], 0) / o.length);"
+    "const f = s.focal(b.height);"
+    "return [b.left + b.width / 2 + f * m[0], b.top + b.height / 2 + f * m[1]] })()"
+)
+
+
+class Watched:
+    """The command in a process of its own."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.out = folder / "run"
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "vergence.app.main", "watch", *arguments]
+            + ["--port", "0", "--no-browser", "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        assert self._process.stderr is not None
+        self.said = self._process.stderr.readline() + self._process.stderr.readline()
+        found = re.search(r"http://\S+", self.said)
+        assert found, self.said + self._process.stderr.read()
+        self.address = found[0]
+
+    def stop(self) -> dict[str, object]:
+        """Press Ctrl-C; return the answer."""
+        self._process.send_signal(signal.SIGINT)
+        answer, _ = self._process.communicate(timeout=60)
+        assert self._process.returncode == 0
+        return dict(json.loads(answer))
+
+    def end(self) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    folder = tmp_path_factory.mktemp("watch")
+    settings = [*(f"cameras.wrist.{text}" for text in SMALL), STILL]
+    options = [part for text in settings for part in ("--set", text)]
+    command = Watched(folder, "puma560", "--out", str(folder / "run"), *options)
+    yield command
+    command.end()
+
+
+@pytest.fixture(scope="module")
+def browser(watched: Watched, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    browser = Browser(tmp_path_factory.mktemp("chromium"))
+    browser.open(watched.address)
+    browser.wait("document.readyState === 'complete' && typeof watch === 'object'")
+    browser.wait(ROWS, lambda rows: rows > 5)
+    yield browser
+    browser.close()
+
+
+def resume(browser: Browser) -> None:
+    if browser.value("document.getElementById('badge').textContent") == "paused":
+        browser.click("#pause")
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+
+
+def settled(browser: Browser) -> None:
+    browser.wait(ERROR, lambda error: error is not None and error < 1.0)
+
+
+def test_it_says_that_only_this_machine_can_reach_it(watched: Watched) -> None:
+    assert "http://localhost:" in watched.said
+    assert "Only this machine" in watched.said
+
+
+def test_the_page_shows_a_running_cell(browser: Browser) -> None:
+    assert browser.value("document.getElementById('cell').textContent") == "puma560"
+    before = browser.value(TIME)
+    browser.wait(TIME, lambda time: time > before + 0.5)
+    titles = browser.value(
+        "[...document.querySelectorAll('.plot figcaption')].map(c => c.innerText)"
+    )
+    assert [
+        part for title in titles for part in re.findall(r"\((?:px|±1 = limit|SI units)\)", title)
+    ]
+    assert "joint1" in titles[1]
+    assert "joint6" in titles[1]
+    browser.wait(f"{VIEW}.caption.textContent", lambda text: "1 of 1 found" in text)
+
+
+def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Browser) -> None:
+    browser.wait(
+        "watch.scene.frame.contentDocument?.getElementById('canvas')?.width ?? 0", lambda w: w > 0
+    )
+    browser.wait("watch.scene.outline !== null")
+    corner = browser.value(
+        "(() => { const b = watch.scene.stage.getBoundingClientRect();"
+        "return [b.left + 25, b.bottom - 25] })()"
+    )
+    looks = [browser.picture("#stage")]
+    for _ in range(100):  # until the model has come
+        looks.append(browser.picture("#stage"))
+        if looks[-1].std() > 20.0:
+            break
+    before = looks[-1].astype(float)
+    assert before.std() > 20.0
+    outline = browser.value("JSON.stringify(watch.scene.outline)")
+    browser.drag(corner, (corner[0] + 80, corner[1] - 20))
+    browser.wait("JSON.stringify(watch.scene.outline)", lambda text: text != outline)
+    changed = np.abs(browser.picture("#stage").astype(float) - before).max(axis=2) > 30
+    assert changed.mean() > 0.02
+
+
+def test_marks_are_drawn_where_the_points_are(browser: Browser) -> None:
+    browser.click("#pause")
+    for layer in ("windows", "predicted", "desired"):
+        browser.click(f"[data-layer={layer}]")
+    x, y, share = browser.value(
+        f"(() => {{ const c = {VIEW}.canvas, d = c.getContext('2d').getImageData(0, 0, c.width,"
+        "c.height).data; let n = 0, x = 0, y = 0;"
+        "for (let i = 0; i < d.length; i += 4) {"
+        "const w = d[i + 1] - Math.max(d[i], d[i + 2]); if (w < 60) continue;"
+        "n += w; x += w * (i / 4 % c.width + 0.5); y += w * (Math.floor(i / 4 / c.width) + 0.5) }"
+        "return [x / n * 320 / c.width - 0.5, y / n * 240 / c.height - 0.5, n] })()"
+    )
+    assert share > 0
+    assert [x, y] == pytest.approx(browser.value(f"{VIEW}.header.points[0]"), abs=0.15)
+    for layer in ("windows", "predicted", "desired"):
+        browser.click(f"[data-layer={layer}]")
+    resume(browser)
+
+
+def test_a_click_pauses_and_a_step_goes_on_by_one_picture(browser: Browser) -> None:
+    browser.click("#pause")
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
+    before, rows = browser.value(TIME), browser.value(ROWS)
+    browser.click("#step")
+    after = browser.wait(TIME, lambda time: time > before)
+    assert after - before == pytest.approx(1 / 30, abs=0.003)
+    assert browser.value(ROWS) == rows + 1
+    resume(browser)
+    browser.wait(TIME, lambda time: time > after + 0.1)
+
+
+def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
+    def choose(name: str) -> None:
+        browser.value(
+            f"(() => {{ const s = document.getElementById('law-choice'); s.value = {name!r};"
+            "s.dispatchEvent(new Event('change')) })()"
+        )
+        browser.wait(
+            "document.getElementById('settings').textContent + watch.law.choice.value",
+            lambda text: name in text,
+        )
+
+    def turn(value: str) -> None:
+        browser.value(
+            "(() => { const f = document.querySelector('.knob[data-key=gain] input');"
+            f"f.value = {value!r}; f.dispatchEvent(new Event('change')) }})()"
+        )
+
+    log = "document.getElementById('log').innerText"
+    choose("constrained")
+    assert "1/s" in browser.wait("document.querySelector('.knob[data-key=gain]')?.innerText ?? ''")
+    turn("3.5")
+    browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.5" in t)
+    turn("-1")
+    browser.wait(log, lambda text: "law refused" in text and "law.gain" in text)
+    before = browser.value(TIME)
+    browser.wait(TIME, lambda time: time > before + 0.5)  # and the old one goes on
+    assert "law changed" in browser.value(log)
+    settled(browser)
+
+
+def test_the_arm_follows_the_target_that_the_mouse_drags_in_a_picture(
+    browser: Browser,
+) -> None:
+    settled(browser)
+    joints = browser.value("watch.plots.rows.at(-1)[2]")
+    browser.middle(".picture canvas")
+    start = tuple(browser.value(POINT))
+    browser.drag(start, (start[0] + 60, start[1]))
+    browser.wait(
+        "Math.max(...watch.plots.rows.map((row) => row[1][0] ?? 0))",
+        lambda most: most > 3.0,
+    )
+    settled(browser)
+    moved = np.subtract(browser.value("watch.plots.rows.at(-1)[2]"), joints)
+    assert np.abs(moved).max() > 0.005
+    assert browser.value("document.getElementById('let-go').textContent").startswith("Let it move")
+
+
+def test_the_target_can_be_dragged_in_space_too(browser: Browser) -> None:
+    settled(browser)
+    browser.middle("#stage")
+    joints = browser.value("watch.plots.rows.at(-1)[2]")
+    start = tuple(browser.value(TARGET))
+    browser.drag(start, (start[0] + 15, start[1]), steps=12)
+    browser.wait(
+        "watch.plots.rows.at(-1)[2]",
+        lambda now: float(np.abs(np.subtract(now, joints)).max()) > 0.005,
+    )
+    settled(browser)
+
+
+def test_a_reset_begins_again_from_the_start(browser: Browser) -> None:
+    before = browser.value(TIME)
+    browser.click("#reset")
+    browser.wait(TIME, lambda time: 0 < time < before)
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+
+
+def test_nothing_is_fetched_from_elsewhere_and_nothing_goes_wrong(
+    browser: Browser, watched: Watched
+) -> None:
+    browser.value("0")  # hears what has been said meanwhile
+    own = (watched.address, "blob:", "data:", "about:")
+    assert [address for address in browser.addresses if not address.startswith(own)] == []
+    assert browser.complaints == []
+
+
+def test_ctrl_c_stops_the_arm_and_leaves_a_recording(watched: Watched) -> None:
+    answer = watched.stop()
+    assert answer["outcome"]["kind"] == "stopped"
+    first, last = Recording.open(watched.out), Recording.open(Path(str(answer["run"])))
+    assert str(last.folder).endswith("run-2")
+    for recording in (first, last):
+        assert recording.complete
+        assert np.abs(recording.arms["puma"].velocity[-1]).max() < 0.5
+    assert "law changed" in {event.name for event in first.events}
+    moved = first.cameras["wrist"].T_world_target[[0, -1], :3, 3]
+    assert np.linalg.norm(moved[1] - moved[0]) > 0.02

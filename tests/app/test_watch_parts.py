@@ -1,0 +1,241 @@
+"""What `vergence watch` is made of, each part by itself."""
+
+import http.client
+import json
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from vergence.app.watch.board import Board, Reader
+from vergence.app.watch.eye import Eye
+from vergence.app.watch.grip import Grip
+from vergence.app.watch.knobs import KNOBS, LAWS, knobs, law_choices
+from vergence.app.watch.moved_target import MovedTarget
+from vergence.app.watch.pace import Pace
+from vergence.app.watch.server import Server, is_loopback
+from vergence.app.watch.shot import Shot
+from vergence.cell import built_in_cells, load_cell
+from vergence.errors import InputError
+from vergence.geometry import se3, so3_exp
+
+TURNED = so3_exp(np.array([0.3, -0.2, 0.5]))
+
+
+def own_motion(time: float) -> Any:
+    return se3(np.eye(3), np.array([0.1 * time, 0.0, 0.2]))
+
+
+class TestGrip:
+    GRIP = Grip(se3(TURNED, np.array([1.0, 2.0, 3.0])), 0.8, (0.1, -0.05), np.array([0.0, 0.1, 0]))
+
+    def test_a_mouse_that_rests_moves_nothing(self) -> None:
+        np.testing.assert_allclose(self.GRIP.shift(0.1, -0.05, False), [0.0, 0.1, 0.0])
+
+    def test_the_thing_stays_under_the_mouse(self) -> None:
+        shift = self.GRIP.shift(0.3, 0.1, False) - [0.0, 0.1, 0.0]
+        before = 0.8 * np.array([0.1, -0.05, 1.0])
+        after = before + TURNED.T @ shift
+        np.testing.assert_allclose(after / after[2], [0.3, 0.1, 1.0])
+
+    def test_along_the_axis_up_is_away(self) -> None:
+        shift = self.GRIP.shift(0.3, -0.15, True) - [0.0, 0.1, 0.0]
+        np.testing.assert_allclose(TURNED.T @ shift, [0.0, 0.0, 0.08], atol=1e-12)
+
+
+class TestMovedTarget:
+    def test_by_itself_it_moves_as_the_cell_says(self) -> None:
+        target = MovedTarget(own_motion)
+        for time in (0.0, 0.5, 2.0):
+            np.testing.assert_array_equal(target.pose(time), own_motion(time))
+
+    def test_held_it_stands_and_let_go_it_moves_on_from_there(self) -> None:
+        target = MovedTarget(own_motion)
+        target.pose(1.0)
+        target.held = True
+        np.testing.assert_array_equal(target.pose(5.0), own_motion(1.0))
+        target.held = False
+        np.testing.assert_allclose(target.pose(6.0), own_motion(2.0))
+
+    def test_it_reaches_the_mouse_no_faster_than_a_tracker_can_follow(self) -> None:
+        target = MovedTarget(own_motion)
+        target.held = True
+        target.shift_m = np.array([0.0, 0.4, 0.3])
+        places = np.array([target.pose(time)[:3, 3] for time in np.arange(0.0, 4.0, 0.002)])
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() <= 0.3 * 0.002 + 1e-12
+        np.testing.assert_allclose(places[-1], [0.0, 0.4, 0.5], atol=1e-6)
+
+
+class TestPace:
+    def test_time_passes_as_on_the_wall(self) -> None:
+        pace = Pace()
+        assert pace.delay(0.0) == 0.0
+        delay = pace.delay(10.0)
+        assert delay is not None
+        assert 9.0 < delay <= 10.0
+
+    def test_a_speed_divides_the_wait(self) -> None:
+        pace = Pace()
+        pace.set_speed(100.0)
+        assert pace.delay(0.0) == 0.0
+        delay = pace.delay(1000.0)
+        assert delay is not None
+        assert 9.0 < delay <= 10.0
+
+    def test_what_is_late_is_not_made_up_for(self) -> None:
+        pace = Pace()
+        pace.set_speed(1e6)
+        assert pace.delay(0.0) == 0.0
+        pace.set_speed(1.0)
+        assert pace.delay(500.0) == 0.0
+
+    def test_paused_it_waits_and_a_step_passes_once(self) -> None:
+        pace = Pace()
+        pace.pause()
+        assert pace.delay(1.0) is None
+        pace.step()
+        assert pace.delay(1.0) == 0.0
+        assert pace.delay(2.0) is None
+        pace.resume()
+        assert pace.delay(2.0) == 0.0
+
+
+class TestKnobs:
+    @pytest.mark.parametrize("table", [table for kinds in LAWS.values() for table in kinds])
+    def test_every_number_of_every_law_has_a_label(self, table: Any) -> None:
+        structure = {"kind", "axes", "avoidance_axes", "order", "depth_range"}
+        assert set(table.model_fields) - structure <= set(KNOBS)
+
+    @pytest.mark.parametrize("name", [n for n in built_in_cells() if n not in ("ur5", "panda")])
+    def test_every_choice_is_a_law_that_the_cell_file_takes(self, name: str) -> None:
+        cell = load_cell(name)
+        for toml in law_choices(cell).values():
+            changed = load_cell(name, {"law": toml})
+            assert knobs(changed.law)
+        first = next(iter(law_choices(cell).values()))
+        assert load_cell(name, {"law": first}).law == cell.law
+
+
+class TestBoard:
+    def test_news_are_read_once(self) -> None:
+        board, reader = Board(), Reader()
+        board.begin({"cell": "c"})
+        board.tick([0.0, [1.0]], [Shot("wrist", 0.0, None)])
+        board.event(0.0, "something", "happened")
+        news = board.news(reader)
+        assert news is not None
+        assert news.about == {"cell": "c"}
+        assert (len(news.rows), len(news.events), len(news.shots)) == (1, 1, 1)
+        assert board.news(reader) is None
+        board.tick([0.1, [2.0]], [])
+        news = board.news(reader)
+        assert news is not None
+        assert (news.about, news.rows, news.shots) == (None, [[0.1, [2.0]]], [])
+
+    def test_a_new_run_starts_afresh_for_everyone(self) -> None:
+        board, reader = Board(), Reader()
+        board.begin({"cell": "c"})
+        board.tick([0.0, [1.0]], [])
+        board.news(reader)
+        board.begin({"cell": "c"})
+        news = board.news(reader)
+        assert news is not None
+        assert (news.about, news.rows) == ({"cell": "c"}, [])
+
+
+def test_the_eye_is_where_mujoco_has_its_camera() -> None:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    data, scene = mujoco.MjData(model), mujoco.MjvScene(model, 10)
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance = (0.3, -0.2, 0.7), 2.5
+    camera.azimuth, camera.elevation = 37.0, -21.0
+    mujoco.mjv_updateScene(
+        model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene
+    )
+    seen = [np.array(eye.pos) for eye in scene.camera]
+    eye = Eye.around(camera.lookat, 2.5, 37.0, -21.0, 45.0)
+    np.testing.assert_allclose(eye.T_world_camera[:3, 3], np.mean(seen, axis=0), atol=1e-6)
+    np.testing.assert_allclose(eye.T_world_camera[:3, 2], scene.camera[0].forward, atol=1e-6)
+    np.testing.assert_allclose(eye.T_world_camera[:3, 1], -scene.camera[0].up, atol=1e-6)
+
+
+class TestServer:
+    asked: list[Any]
+
+    @pytest.fixture
+    def server(self) -> Iterator[Server]:
+        board = Board()
+        board.begin({"cell": "made-up"})
+        self.asked = []
+        server = Server("127.0.0.1", 0, board, self.asked.append, None)
+        server.start()
+        yield server
+        server.close()
+
+    def get(self, server: Server, path: str, **headers: str) -> http.client.HTTPResponse:
+        connection = http.client.HTTPConnection("127.0.0.1", server.port)
+        connection.request("GET", path, headers=headers)
+        answer = connection.getresponse()
+        answer.body = answer.read()  # type: ignore[attr-defined]
+        connection.close()
+        return answer
+
+    def test_the_page_and_its_parts_are_served_and_nothing_else(self, server: Server) -> None:
+        assert b"<title>vergence</title>" in self.get(server, "/").body  # type: ignore[attr-defined]
+        assert (
+            self.get(server, "/page/main.js").getheader("Content-Type", "").startswith("text/jav")
+        )
+        for path in ("/page/../command.py", "/page/none.js", "/etc/passwd", "/page/"):
+            assert self.get(server, path).status == 404
+
+    def test_pages_of_other_sites_are_turned_away(self, server: Server) -> None:
+        assert self.get(server, "/", Origin="http://elsewhere.example").status == 403
+        assert self.get(server, "/", Host="elsewhere.example").status == 403
+        with (
+            pytest.raises(InvalidStatus),
+            connect(f"ws://127.0.0.1:{server.port}/live", origin="http://elsewhere.example"),
+        ):
+            pass
+
+    def test_a_page_is_told_and_may_ask(self, server: Server) -> None:
+        origin = f"http://127.0.0.1:{server.port}"
+        with connect(f"ws://127.0.0.1:{server.port}/live", origin=origin) as line:
+            message = line.recv(10)
+            length = int.from_bytes(message[:4], "little")
+            assert json.loads(message[4 : 4 + length])["about"] == {"cell": "made-up"}
+            line.send("not JSON")
+            line.send(json.dumps({"do": "pause"}))
+            line.send(json.dumps({"do": "more"}))
+            line.ping().wait(10)
+        assert self.asked == [{"do": "pause"}]
+
+    def test_it_listens_on_loopback_only(self, server: Server) -> None:
+        assert server.address == f"http://localhost:{server.port}/"
+        with pytest.raises(OSError, match=r"refused|timed out|unreachable"):
+            socket.create_connection((_own_address(), server.port), timeout=2)
+
+    def test_a_port_in_use_is_bad_input(self, server: Server) -> None:
+        with pytest.raises(InputError, match="--port"):
+            Server("127.0.0.1", server.port, Board(), self.asked.append, None)
+
+
+def test_loopback_is_known_by_its_names() -> None:
+    assert all(map(is_loopback, ("localhost", "127.0.0.1", "127.1.2.3", "::1")))
+    assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.1.2", "robot")))
+
+
+def _own_address() -> str:
+    """An address of this machine that is not loopback."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing
+        except OSError:  # no network: any address that is not ours is refused as well
+            return "192.0.2.1"
+        return str(probe.getsockname()[0])
