@@ -10,8 +10,9 @@ from harness import calls, loops, row
 from peer_programs import visp
 from vergence.arrays import FloatArray
 from vergence.cell import SimulatedDriver, load_cell
-from vergence.control.constrained import ConstrainedLaw, constrained_rates
-from vergence.control.image_based import ImageBased
+from vergence.control.constrained_rates import constrained_rates
+from vergence.control.constrained_solver import ConstrainedSolver
+from vergence.control.constraints import DEPTH, pack_features
 from vergence.control.objective import least_squares_objective
 from vergence.features import interaction_matrix_points
 from vergence.robot import Arm, yoshikawa_measure
@@ -23,11 +24,10 @@ class Tick(NamedTuple):
     """What one tick is made from; the same every time."""
 
     arm: Arm
-    law: ConstrainedLaw
+    solver: ConstrainedSolver
     q: FloatArray
-    points: FloatArray
     wanted: FloatArray
-    depth: FloatArray
+    features: FloatArray
 
 
 def tick_of(cell: str, count: int) -> Tick:
@@ -40,42 +40,38 @@ def tick_of(cell: str, count: int) -> Tick:
     grid = np.linspace(-0.09, 0.13, side)
     points = np.array([(x, y) for x in grid for y in grid])[:count]
     depth = np.linspace(0.9, 1.1, count)
-    law = ConstrainedLaw(
-        arm,
-        camera,
-        ImageBased(camera, GAIN),
-        depth,
-        manipulability_min=0.5 * yoshikawa_measure(arm.jacobian(q)),
-        S=1e-3,
-    )
-    return Tick(arm, law, q, points, points + np.array([0.06, -0.04]), depth)
+    lowest = 0.5 * yoshikawa_measure(arm.jacobian(q))
+    solver = ConstrainedSolver(arm, camera, manipulability_min=lowest, S=1e-3)
+    features = pack_features(points, np.zeros_like(points), depth)
+    return Tick(arm, solver, q, points + np.array([0.06, -0.04]), features)
 
 
 @njit
-def one_tick(chain, limits, q, points, wanted, depth, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def one_tick(chain, limits, q, wanted, features, R, settings, avoidance):  # type: ignore[no-untyped-def]
     """From features and joints to joint rates, image-based under every constraint."""
-    L = interaction_matrix_points(points, depth)
-    error = -GAIN * (points - wanted)
-    twist = least_squares_objective(L, error.ravel(), np.ones(len(L)), R)
-    still, rest = np.zeros_like(points), np.zeros(len(q))
+    points = features[:, :2]
+    L = interaction_matrix_points(points, features[:, DEPTH])
+    error = (-GAIN * (points - wanted)).ravel()
+    twist = least_squares_objective(L, error, np.ones(len(L)), R)
+    rest = np.zeros(len(q))
     return constrained_rates(
-        chain, limits, q, rest, twist.H, twist.g, points, still, depth, PERIOD, settings, avoidance
+        chain, limits, q, rest, twist.H, twist.g, rest, features, PERIOD, settings, avoidance
     ).rates
 
 
 @njit
-def repeat(count, chain, limits, q, points, wanted, depth, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def repeat(count, chain, limits, q, wanted, features, R, settings, avoidance):  # type: ignore[no-untyped-def]
     q, total = q.copy(), 0.0
     for _ in range(count):
         q[0] += 1e-9
-        total += one_tick(chain, limits, q, points, wanted, depth, R, settings, avoidance)[0]
+        total += one_tick(chain, limits, q, wanted, features, R, settings, avoidance)[0]
     return total
 
 
 def arguments(tick: Tick) -> tuple[Any, ...]:
-    law, R = tick.law, np.full(6, 1e-6)
-    before = (tick.arm.chain, law._limits, tick.q, tick.points, tick.wanted, tick.depth, R)
-    return (*before, law._settings, law._avoidance)
+    solver, R = tick.solver, np.full(6, 1e-6)
+    before = (tick.arm.chain, solver.limits, tick.q, tick.wanted, tick.features, R)
+    return (*before, solver.settings, solver.avoidance)
 
 
 def from_python(tick: Tick) -> Callable[[], object]:

@@ -5,21 +5,19 @@ import pytest
 
 from vergence.cell import SimulatedDriver, load_cell
 from vergence.control.constrained import ConstrainedLaw
+from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.constraints import (
-    HARD,
+    ACCELERATION,
     JOINT_MARGIN,
-    KIND_NAMES,
     SINGULARITY,
+    SOFT,
     VIEW,
     constraint_rows,
+    pack_features,
 )
 from vergence.control.image_based import ImageBased
 from vergence.errors import InputError
-from vergence.features import (
-    ImagePoints,
-    Observation,
-    interaction_matrix_points,
-)
+from vergence.features import ImagePoints, Observation
 from vergence.planning import Reference
 from vergence.robot import JointState, yoshikawa_measure
 
@@ -37,7 +35,8 @@ def scene():
 
 def law_for(scene, **settings):
     arm, camera, truth, _ = scene
-    return ConstrainedLaw(arm, camera, ImageBased(camera, gain=2.0), truth.depth_m, **settings)
+    solver = ConstrainedSolver(arm, camera, **settings)
+    return ConstrainedLaw(solver, ImageBased(camera, gain=2.0), truth.depth_m)
 
 
 def observe(camera, points_px, time=0.0):
@@ -87,9 +86,8 @@ def test_features_stay_in_view_although_the_goal_is_outside(scene, depth_error):
     law_depth = truth.depth_m * depth_error
     wanted = truth.points_px + (400.0, 0.0)
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
-    law = ConstrainedLaw(
-        arm, camera, ImageBased(camera, 2.0), law_depth, depth_range=(0.3, 3.4), view_margin_px=10.0
-    )
+    solver = ConstrainedSolver(arm, camera, depth_range=(0.3, 3.4), view_margin_px=10.0)
+    law = ConstrainedLaw(solver, ImageBased(camera, 2.0), law_depth)
     rates = np.zeros(6)
     for k in range(150):
         time = k * PERIOD
@@ -154,9 +152,9 @@ def test_a_conflict_names_what_was_given_up(scene):
 def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
     arm, camera, truth, q = scene
     law = law_for(scene, manipulability_min=1e-3)
-    settings = law._settings
+    settings = law.solver.settings
     points = camera.normalize(truth.points_px)
-    L = interaction_matrix_points(points, truth.depth_m)
+    features = pack_features(points, 0 * points, truth.depth_m)
     J = arm.jacobian(q)
     limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
     step = 1e-6 * np.eye(6)
@@ -168,7 +166,7 @@ def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
     )
     w = yoshikawa_measure(J)
     rows = constraint_rows(
-        q, 0 * q, limits, PERIOD, L[:, :3].copy(), L[:, 3:].copy(), J, points, 0 * points, w, slope,
+        q, 0 * q, limits, PERIOD, J, features, w, slope,
         settings._replace(depth_low=1.0, depth_high=1.0),
     )  # fmt: skip
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
@@ -179,10 +177,10 @@ def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
         np.testing.assert_allclose(view[:, :, 0, 0], (moved - back) / 2e-6, atol=1e-6)
         np.testing.assert_allclose(view[:, :, 1, 0], -(moved - back) / 2e-6, atol=1e-6)
     np.testing.assert_array_equal(rows.C[rows.kind == SINGULARITY][0], slope)
-    assert set(rows.kind) == {HARD, JOINT_MARGIN, VIEW, SINGULARITY}
+    assert set(rows.kind) == {ACCELERATION, JOINT_MARGIN, VIEW, SINGULARITY}
 
 
 def test_unknown_constraints_are_refused_with_the_nearest_name(scene):
     with pytest.raises(InputError, match="did you mean view"):
         law_for(scene, order=("vieww",))
-    assert len(KIND_NAMES) == 4
+    assert SOFT[0] == "view"

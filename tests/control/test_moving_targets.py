@@ -11,6 +11,7 @@ from vergence.camera import Camera
 from vergence.cell import SimulatedDriver, load_cell
 from vergence.control import (
     ConstrainedLaw,
+    ConstrainedSolver,
     ImageBased,
     Law,
     OptimalTracking,
@@ -40,12 +41,16 @@ def plain_tracking(arm, camera, depth, smoothing):
 
 
 def constrained_image_based(arm, camera, depth, smoothing):
-    return ConstrainedLaw(arm, camera, ImageBased(camera, 2.0), depth, flow_smoothing_s=smoothing)
+    objective = ImageBased(camera, 2.0)
+    return ConstrainedLaw(
+        ConstrainedSolver(arm, camera), objective, depth, flow_smoothing_s=smoothing
+    )
 
 
 def constrained_tracking(arm, camera, depth, smoothing):
+    objective = OptimalTracking(camera, Q=5e-7)
     return ConstrainedLaw(
-        arm, camera, OptimalTracking(camera, Q=5e-7), depth, flow_smoothing_s=smoothing
+        ConstrainedSolver(arm, camera), objective, depth, flow_smoothing_s=smoothing
     )
 
 

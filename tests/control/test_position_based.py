@@ -8,7 +8,7 @@ from vergence.control import Guard, InnerLaw, MovingPose, PositionBasedLaw, move
 from vergence.features import Observation, TargetState
 from vergence.geometry import se3, se3_compose, se3_inverse, se3_log, so3_exp
 from vergence.planning import Reference
-from vergence.robot import Arm, JointState
+from vergence.robot import Arm, JointState, Setpoint
 
 RATE, OUTER = 500, 26
 LATENCY_S = 1 / OUTER
@@ -46,7 +46,7 @@ def follow(
         joints = JointState(time, guard.position, np.zeros(arm.joint_count))
         law.command(observation, Reference(time, T_camera_target=WANTED), joints)
         while tick < int((k + 1) * RATE / OUTER):
-            guard.step(law.follow(guard.position))
+            guard.step(law.follow(guard.setpoint))
             tick += 1
         T_hand = arm.forward_kinematics(guard.position)
         T_wanted = se3_compose(moved(target, tick / RATE), se3_inverse(WANTED))
@@ -119,10 +119,10 @@ def test_without_a_target_the_arm_is_asked_to_stand(
     T_target = se3_compose(arm.forward_kinematics(start), WANTED)
     seen = Observation(0.0, (), target_state(MovingPose(T_target, np.ones(6)), 0.0))
     law.command(seen, Reference(0.0, T_camera_target=WANTED), joints)
-    assert law.follow(start).any()
+    assert law.follow(Setpoint(start, 0 * start)).any()
     command = law.command(Observation(0.1, ()), Reference(0.1, T_camera_target=WANTED), joints)
     assert not command.velocity.any()
-    assert not law.follow(start).any()
+    assert not law.follow(Setpoint(start, 0 * start)).any()
 
 
 def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> None:
@@ -151,7 +151,7 @@ def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seco
         joints = JointState(tick / RATE, guard.position, np.zeros(arm.joint_count))
         law.command(Observation(time, (), state), reference, joints)
         while tick < int((k + 1) * RATE / OUTER):
-            guard.step(law.follow(guard.position))
+            guard.step(law.follow(guard.setpoint))
             tick += 1
         exposed.append(guard.position)
         T_hand = arm.forward_kinematics(guard.position)

@@ -10,6 +10,7 @@ from vergence.control.conditioning import (
     resolvability,
 )
 from vergence.control.constrained import ConstrainedLaw
+from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.guard import Guard, guarded_step, guarded_steps, stoppable_speed
 from vergence.control.image_based import ImageBased
@@ -40,6 +41,7 @@ from vergence.control.tracking_kernels import (
 
 __all__ = [
     "ConstrainedLaw",
+    "ConstrainedSolver",
     "EyeToHandLaw",
     "FeatureState",
     "ImageBased",

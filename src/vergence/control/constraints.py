@@ -7,9 +7,15 @@ from numba import njit
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.control.guard import stoppable_speed
+from vergence.features import interaction_matrix_points
 
-HARD, JOINT_MARGIN, VIEW, SINGULARITY = range(4)  # kinds of rows
-KIND_NAMES = ("joint limits", "joint margin", "view", "singularity")
+# Kinds of rows. The first three are what the arm can do: they never bend.
+KIND_NAMES = (
+    "joint positions", "joint rates", "joint accelerations", "view", "singularity", "joint margin",
+)  # fmt: skip
+POSITION, RATE, ACCELERATION, VIEW, SINGULARITY, JOINT_MARGIN = range(6)
+SOFT = KIND_NAMES[3:]  # in the order in which they are kept, unless the user says otherwise
+X, Y, X_FLOW, Y_FLOW, DEPTH, X_SPREAD, Y_SPREAD = range(7)  # columns of `pack_features`
 
 
 class ConstraintSettings(NamedTuple):
@@ -22,7 +28,22 @@ class ConstraintSettings(NamedTuple):
     depth_low: float  # the true depth is at least this factor of the believed one
     depth_high: float  # and at most this
     manipulability_min: float  # √det(J Jᵀ) is kept above it; 0 for no such row
-    rank: IntArray  # (4,) by kind: 0 never bends, then the order of bending
+    rank: IntArray  # (K,) by kind: 0 never bends, then the order of bending
+
+
+def pack_features(
+    points: FloatArray, flow: FloatArray, depth: FloatArray, spread: FloatArray | None = None
+) -> FloatArray:
+    """Return what the constraints know of the features, one row each, (M, 7).
+
+    Args:
+        points: now, normalized coordinates, (M, 2).
+        flow: their motion by the target's own, (M, 2), 1/s.
+        depth: (M,), m.
+        spread: how far off they may lie, normalized, (M, 2); exact if None.
+    """
+    off = np.zeros_like(points) if spread is None else spread
+    return np.column_stack((points, flow, depth, off))
 
 
 class ConstraintRows(NamedTuple):
@@ -39,11 +60,8 @@ def constraint_rows(
     velocity: FloatArray,
     limits: FloatArray,
     period: float,
-    L_translation: FloatArray,
-    L_rotation: FloatArray,
     J_camera: FloatArray,
-    points: FloatArray,
-    flow: FloatArray,
+    features: FloatArray,
     yoshikawa: float,
     yoshikawa_gradient: FloatArray,
     settings: ConstraintSettings,
@@ -60,30 +78,23 @@ def constraint_rows(
         velocity: joint rates now, (n,).
         limits: rows q_min, q_max, rate_max, acceleration_max, (4, n).
         period: how long the command will act, s.
-        L_translation: the first three columns of the interaction matrix, (2M, 3).
-        L_rotation: its last three, (2M, 3).
         J_camera: (6, n).
-        points: features now, normalized coordinates, (M, 2).
-        flow: their motion by the target's own, (M, 2), 1/s.
+        features: of `pack_features`, (M, 7).
         yoshikawa: √det(J Jᵀ).
         yoshikawa_gradient: its gradient, (n,).
         settings: what is kept.
     """
-    n, M = len(q), len(points)
+    n, M = len(q), len(features)
     m = 4 * n + 8 * M + 1
     C, d = np.zeros((m, n)), np.full(m, -np.inf)
     kind = np.zeros(m, dtype=np.int64)
     gamma = settings.approach_rate
     for i in range(n):
         a = limits[3, i]
-        up = min(limits[2, i], stoppable_speed(limits[1, i] - q[i], a, period))
-        down = min(limits[2, i], stoppable_speed(q[i] - limits[0, i], a, period))
-        # What cannot be reached within the acceleration is brought as near as it can be.
-        up = max(min(up, velocity[i] + a * period), velocity[i] - a * period)
-        low = min(max(-down, velocity[i] - a * period), velocity[i] + a * period)
+        up, kind[2 * i] = fastest(limits[1, i] - q[i], velocity[i], limits[2, i], a, period)
+        down, kind[2 * i + 1] = fastest(q[i] - limits[0, i], -velocity[i], limits[2, i], a, period)
         C[2 * i, i], d[2 * i] = -1.0, -up
-        C[2 * i + 1, i], d[2 * i + 1] = 1.0, min(low, up)
-        kind[2 * i] = kind[2 * i + 1] = HARD
+        C[2 * i + 1, i], d[2 * i + 1] = 1.0, min(-down, up)
         span = limits[1, i] - limits[0, i]
         row = 2 * n + 2 * i
         kind[row] = kind[row + 1] = JOINT_MARGIN
@@ -91,27 +102,63 @@ def constraint_rows(
             margin = settings.joint_margin * span
             C[row, i], d[row] = -1.0, -gamma * (limits[1, i] - margin - q[i])
             C[row + 1, i], d[row + 1] = 1.0, -gamma * (q[i] - limits[0, i] - margin)
-    near, far = 1.0 / settings.depth_low, 1.0 / settings.depth_high
-    for j in range(M):
-        for a in range(2):
-            row = 4 * n + 8 * j + 4 * a
-            below = points[j, a] - settings.view_low[a]
-            above = settings.view_high[a] - points[j, a]
-            kind[row : row + 4] = VIEW
-            for i in range(n):
-                moved, turned = 0.0, 0.0  # image motion by the camera's translation and rotation
-                for k in range(3):
-                    moved += L_translation[2 * j + a, k] * J_camera[k, i]
-                    turned += L_rotation[2 * j + a, k] * J_camera[k + 3, i]
-                C[row, i], C[row + 1, i] = near * moved + turned, far * moved + turned
-                C[row + 2, i], C[row + 3, i] = -C[row, i], -C[row + 1, i]
-            d[row] = d[row + 1] = -gamma * below - flow[j, a]
-            d[row + 2] = d[row + 3] = -gamma * above + flow[j, a]
-            for side in range(4):
-                if not np.isfinite(d[row + side]):
-                    d[row + side] = -np.inf
+    view_rows(C[4 * n : m - 1], d[4 * n : m - 1], J_camera, features, settings)
+    kind[4 * n : m - 1] = VIEW
     kind[m - 1] = SINGULARITY
     if settings.manipulability_min > 0.0:
         C[m - 1] = yoshikawa_gradient
         d[m - 1] = -gamma * (yoshikawa - settings.manipulability_min)
     return ConstraintRows(C, d, kind)
+
+
+@njit(cache=True, error_model="numpy")
+def fastest(
+    room: float, velocity: float, rate_max: float, a: float, period: float
+) -> tuple[float, int]:
+    """Return how fast a joint may move towards a limit, and the kind of what says so.
+
+    What cannot be reached within the acceleration is brought as near as it can be.
+    """
+    speed, kind = rate_max, RATE
+    stoppable = stoppable_speed(room, a, period)
+    if stoppable < speed:
+        speed, kind = stoppable, POSITION
+    if velocity + a * period < speed:
+        return velocity + a * period, ACCELERATION
+    return max(speed, velocity - a * period), kind
+
+
+@njit(cache=True, error_model="numpy")
+def view_rows(
+    C: FloatArray,
+    d: FloatArray,
+    J_camera: FloatArray,
+    features: FloatArray,
+    settings: ConstraintSettings,
+) -> None:
+    """Fill eight rows a feature, C (8M, n) and d (8M,): four borders, at two depths each.
+
+    A feature behind the camera has no rows, and a border at infinity has none either.
+    """
+    L = interaction_matrix_points(features[:, :2], features[:, DEPTH])
+    near, far = 1.0 / settings.depth_low, 1.0 / settings.depth_high
+    for j in range(len(features)):
+        if not features[j, DEPTH] > 0.0:
+            continue
+        for a in range(2):
+            row, image, flow = 8 * j + 4 * a, 2 * j + a, features[j, X_FLOW + a]
+            room = 0.5 * (settings.view_high[a] - settings.view_low[a])
+            spread = min(features[j, X_SPREAD + a], 0.5 * room)  # or nowhere would be far enough in
+            below = features[j, a] - settings.view_low[a] - spread
+            above = settings.view_high[a] - features[j, a] - spread
+            for i in range(C.shape[1]):
+                moved, turned = 0.0, 0.0  # image motion by the camera's translation and rotation
+                for k in range(3):
+                    moved += L[image, k] * J_camera[k, i]
+                    turned += L[image, k + 3] * J_camera[k + 3, i]
+                C[row, i], C[row + 1, i] = near * moved + turned, far * moved + turned
+                C[row + 2, i], C[row + 3, i] = -C[row, i], -C[row + 1, i]
+            if np.isfinite(below):
+                d[row] = d[row + 1] = -settings.approach_rate * below - flow
+            if np.isfinite(above):
+                d[row + 2] = d[row + 3] = -settings.approach_rate * above + flow

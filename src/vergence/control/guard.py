@@ -161,6 +161,11 @@ class Guard:
         return self._position
 
     @property
+    def setpoint(self) -> Setpoint:
+        """The last set-point."""
+        return Setpoint(self._position, self._velocity)
+
+    @property
     def moving(self) -> bool:
         """Whether the set-point still moves."""
         return bool(np.any(np.abs(self._velocity) > 1e-9))
@@ -170,4 +175,4 @@ class Guard:
         self._position, self._velocity, self.at_limit = guarded_step(
             self._position, self._velocity, wanted, self._limits, self._dt
         )
-        return Setpoint(self._position, self._velocity)
+        return self.setpoint

@@ -4,17 +4,18 @@ from typing import Protocol, runtime_checkable
 
 from vergence.arrays import FloatArray
 from vergence.control.law import Law
+from vergence.robot import Setpoint
 
 
 @runtime_checkable
 class InnerLaw(Law, Protocol):
     """A law that makes a trajectory between pictures."""
 
-    def follow(self, position: FloatArray) -> FloatArray:
+    def follow(self, setpoint: Setpoint) -> FloatArray:
         """Return joint rates (n,) for the next inner period.
 
         Args:
-            position: of the last set-point, (n,), rad or m.
+            setpoint: the last one.
         """
         ...
 

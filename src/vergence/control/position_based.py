@@ -7,15 +7,35 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control.command import JointCommand
+from vergence.control.constrained_rates import ConstrainedRates
 from vergence.control.hand_goal import goal_beside, goal_of_holder
 from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.redundancy import resolve_redundant
+from vergence.control.target_keeper import TargetKeeper, held_back
 from vergence.features import Observation, TargetState
 from vergence.geometry import se3_adjoint, se3_compose, se3_inverse
 from vergence.planning import Reference
-from vergence.robot import Arm, Chain, JointState, forward_kinematics, jacobian
+from vergence.robot import Arm, Chain, JointState, Setpoint, forward_kinematics, jacobian
 
 _ONSET_S = 0.5  # of the motion of redundant joints, so that no joint meets its acceleration limit
+
+
+@njit(cache=True)
+def hand_twist(chain: Chain, q: FloatArray, reference: MovingPose, gain: float) -> FloatArray:
+    """Return the twist that keeps the hand on a reference trajectory, in its own axes, (6,).
+
+    twist + gain · Δ(reference, hand), of the closed-loop inverse kinematics.
+
+    Args:
+        chain: with the hand as its tip.
+        q: joint set-points, (n,).
+        reference: where the hand should be, and how fast it should move.
+        gain: 1/s.
+    """
+    T = forward_kinematics(chain, q)
+    twist = reference.twist + gain * pose_difference(reference.T, T)
+    R = np.ascontiguousarray(T[:3, :3].T)
+    return np.concatenate((R @ twist[:3], R @ twist[3:]))
 
 
 @njit(cache=True)
@@ -28,24 +48,19 @@ def hand_rates(
     rate_max: FloatArray,
     singular_below: float,
 ) -> FloatArray:
-    """Return joint rates that keep the hand on a reference trajectory, (n,).
-
-    q̇ = J⁺ (twist + gain · Δ(reference, hand)), the closed-loop inverse kinematics.
+    """Return joint rates that keep the hand on a reference trajectory, (n,): q̇ = J⁺ twist.
 
     Args:
         chain: with the hand as its tip.
         q: joint set-points, (n,).
         reference: where the hand should be, and how fast it should move.
-        gain: 1/s.
+        gain: see `hand_twist`.
         spare: rates wanted of redundant joints, (n,).
         rate_max: (n,).
         singular_below: see `resolve_redundant`.
     """
-    T = forward_kinematics(chain, q)
-    twist = reference.twist + gain * pose_difference(reference.T, T)
-    R = np.ascontiguousarray(T[:3, :3].T)
-    twist_hand = np.concatenate((R @ twist[:3], R @ twist[3:]))
-    return resolve_redundant(jacobian(chain, q), twist_hand, spare, rate_max, singular_below)
+    twist = hand_twist(chain, q, reference, gain)
+    return resolve_redundant(jacobian(chain, q), twist, spare, rate_max, singular_below)
 
 
 class PositionBasedLaw:
@@ -70,6 +85,8 @@ class PositionBasedLaw:
             in the middle of the joint's range.
         singular_below: singular values of the weighted Jacobian, relative to the largest, below
             which a direction is damped.
+        keeper: keeps limits, view and distance from singularities on the way; without one the hand
+            is moved with nothing else in mind, and the guard alone keeps the joints.
     """
 
     def __init__(
@@ -85,12 +102,14 @@ class PositionBasedLaw:
         closed_loop_hz: float = 5.0,
         null_space: float = 0.5,
         singular_below: float = 0.02,
+        keeper: TargetKeeper | None = None,
     ) -> None:
         self._arm, self._period, self._T_world_camera = arm, period, T_world_camera
         self._frequency, self._damping = 2 * np.pi * filter_hz, damping
         self._feed_forward, self._prediction = feed_forward, prediction
         self._gain = 2 * np.pi * closed_loop_hz
         self._null_space, self._singular_below = null_space, singular_below
+        self._keeper = keeper
         self._goal: MovingPose | None = None
         self._reference: MovingPose | None = None
         self._spare = np.zeros(arm.joint_count)  # what redundant joints do, gently begun
@@ -107,19 +126,27 @@ class PositionBasedLaw:
         if self._reference is None:
             T_hand = forward_kinematics(self._arm.chain, joints.position)
             self._reference = MovingPose(T_hand, np.zeros(6))
-        rates = self._rates(joints.position, self._reference)
+        if self._keeper is not None:
+            self._keeper.see(target, wanted, joints.time)
+            said = self._keeper.report()
+            answer = self._keep(self._keeper, joints, self._reference)[0]
+            measures = answer.manipulability, answer.penalty
+            return JointCommand(answer.rates, answer.v_camera, *measures, said)
+        rates = self._rates(joints, self._reference)[0]
         return JointCommand(rates, self._camera_twist(joints.position, rates))
 
-    def follow(self, position: FloatArray) -> FloatArray:
-        """Return joint rates (n,) for the next inner period from the last set-point (n,)."""
+    def follow(self, setpoint: Setpoint) -> FloatArray:
+        """Return joint rates (n,) for the next inner period from the last set-point."""
         if self._goal is None or self._reference is None:
             return np.zeros(self._arm.joint_count)
         ahead = interpolate(
             self._reference, self._goal, self._frequency, self._damping, self._period
         )
         # The place of now with the velocity that leads to the next one: no tick of lead or lag.
-        rates = self._rates(position, MovingPose(self._reference.T, ahead.twist))
-        self._reference = ahead
+        rates, free = self._rates(setpoint, MovingPose(self._reference.T, ahead.twist))
+        self._reference = ahead if free else self._moving_hand(setpoint.position, rates)
+        if self._keeper is not None:
+            self._keeper.advance()
         self._goal = MovingPose(moved(self._goal, self._period), self._goal.twist)
         return rates
 
@@ -151,16 +178,41 @@ class PositionBasedLaw:
             goal = goal_of_holder(target, se3_compose(self._T_world_camera, wanted))
         return goal if self._feed_forward else MovingPose(goal.T, np.zeros(6))
 
-    def _rates(self, position: FloatArray, reference: MovingPose) -> FloatArray:
-        away = -self._null_space * self._arm.normalized(position)
-        self._spare = self._spare + self._period / _ONSET_S * (away - self._spare)
+    def _rates(
+        self, joints: JointState | Setpoint, reference: MovingPose
+    ) -> tuple[FloatArray, bool]:
+        """Return joint rates (n,), and whether nothing that is kept held the hand back."""
+        if self._keeper is not None:
+            answer, free = self._keep(self._keeper, joints, reference)
+            return answer.rates, free
         rates: FloatArray = hand_rates(
             self._arm.chain,
-            position,
+            joints.position,
             reference,
             self._gain,
-            self._spare,
+            self._spare_rates(joints.position),
             self._arm.rate_max,
             self._singular_below,
         )
-        return rates
+        return rates, True
+
+    def _keep(
+        self, keeper: TargetKeeper, joints: JointState | Setpoint, reference: MovingPose
+    ) -> tuple[ConstrainedRates, bool]:
+        twist = hand_twist(self._arm.chain, joints.position, reference, self._gain)
+        spare = self._spare_rates(joints.position)
+        answer = keeper.rates(joints.position, joints.velocity, twist, spare)
+        return answer, not held_back(answer, twist)
+
+    def _spare_rates(self, position: FloatArray) -> FloatArray:
+        """Return what redundant joints should do, (n,), gently begun."""
+        away = -self._null_space * self._arm.normalized(position)
+        self._spare = self._spare + self._period / _ONSET_S * (away - self._spare)
+        return self._spare
+
+    def _moving_hand(self, position: FloatArray, rates: FloatArray) -> MovingPose:
+        """Return where the hand will be, so that the trajectory goes on from there."""
+        after = position + self._period * rates
+        T = forward_kinematics(self._arm.chain, after)
+        v_hand = jacobian(self._arm.chain, after) @ rates
+        return MovingPose(T, np.concatenate((T[:3, :3] @ v_hand[:3], T[:3, :3] @ v_hand[3:])))

@@ -12,7 +12,7 @@ from vergence.errors import DriverSilent
 from vergence.features import ImagePoints, Observation
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.planning import Reference
-from vergence.robot import Sample
+from vergence.robot import Sample, Setpoint
 from vergence.runtime import endings
 from vergence.runtime.driver import Driver
 from vergence.runtime.interrupt import Interrupt
@@ -165,7 +165,7 @@ class Loop:
             return None, Outcome(*command.fault, time)
         return command, None
 
-    def _rates(self, command: JointCommand | None) -> Callable[[FloatArray], FloatArray]:
+    def _rates(self, command: JointCommand | None) -> Callable[[Setpoint], FloatArray]:
         """Return what says, given the last set-point, how fast it shall move."""
         law = self._law
         if isinstance(law, InnerLaw):
@@ -175,12 +175,12 @@ class Loop:
         rates = self._still if command is None else command.velocity
         return lambda _: rates
 
-    def _move(self, rates: Callable[[FloatArray], FloatArray], until_tick: int) -> list[str]:
+    def _move(self, rates: Callable[[Setpoint], FloatArray], until_tick: int) -> list[str]:
         """Step the driver to an inner tick; return the joints stuck at a limit all the while."""
         guard = self._guards[self._arm]
         stuck = np.ones(guard.joint_count, dtype=np.bool_)
         while self._inner_tick < until_tick and not self._interrupt.asked:
-            wanted = rates(guard.position)
+            wanted = rates(guard.setpoint)
             setpoints = {
                 name: other.step(wanted if name == self._arm else np.zeros(other.joint_count))
                 for name, other in self._guards.items()

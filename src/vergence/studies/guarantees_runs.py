@@ -12,6 +12,7 @@ from vergence.cell import IdealCell, IdealDriver, load_cell
 from vergence.cell.ideal_driver import ARM, CAMERA
 from vergence.control import Law, OptimalTrackingLaw
 from vergence.control.constrained import ConstrainedLaw
+from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.image_based import ImageBased
 from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.plain import PlainLaw
@@ -127,6 +128,7 @@ def run_ideal(
 def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
     """Make one of `LAWS`."""
     arm, camera, period = cell.arm, cell.camera, 1.0 / cell.rate_hz
+    solver = ConstrainedSolver(arm, camera, period=period, S=1e-3)
     match law:
         case "plain":
             return PlainLaw(arm, camera, ImageBased(camera, gain=2.0), depth, singular_below=0.0)
@@ -138,12 +140,12 @@ def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
             )  # fmt: skip
         case "constrained image-based":
             objective = ImageBased(camera, gain=2.0)
-            return ConstrainedLaw(arm, camera, objective, depth, period=period, S=1e-3)
+            return ConstrainedLaw(solver, objective, depth)
         case _:
             # Depth is free as well: where the arm has to look back over its base it moves up.
             with_depth = ("x", "y", "z", "rx", "ry")
             tracking = OptimalTracking(camera, with_depth, R=1.0, period=period)
-            return ConstrainedLaw(arm, camera, tracking, depth, period=period, S=1e-3)
+            return ConstrainedLaw(solver, tracking, depth)
 
 
 def arms() -> tuple[Arm, ...]:

@@ -13,6 +13,7 @@ from vergence.cell.schema.laws import (
     OptimalTrackingTable,
     PathTrackingTable,
     PlainTable,
+    PoseTrajectoryTable,
     PositionBasedTable,
 )
 from vergence.cell.schema.tables import (
@@ -55,6 +56,7 @@ __all__ = [
     "Placement",
     "PlainTable",
     "PoseMotion",
+    "PoseTrajectoryTable",
     "PositionBasedTable",
     "Positive",
     "RandomMotion",

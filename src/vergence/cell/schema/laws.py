@@ -24,55 +24,64 @@ class OptimalTrackingTable(Table):
     flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the target stands if absent
 
 
-class PositionBasedTable(Table):
-    """The target's pose and a wanted relative pose make the hand's trajectory."""
+Objective = Literal["image_based", "optimal_tracking", "position_based"]
 
-    kind: Literal["position_based"]
+
+class PoseTrajectoryTable(Table):
+    """How a hand gets from where it is to where the target wants it, between pictures."""
+
     filter_hz: Positive = 5.0  # natural frequency of the second-order interpolating filter
     damping: Positive = 1.0  # of that filter
     feed_forward: bool = True  # the target's velocity goes through to the hand
     prediction: bool = True  # the target's pose is predicted from the exposure to now
     closed_loop_hz: Positive = 5.0  # how fast the joints make up for what they are behind
     null_space: Annotated[float, Field(ge=0)] = 0.5  # 1/s, pull of spare joints to mid-range
+
+
+class PositionBasedTable(PoseTrajectoryTable):
+    """The target's pose and a wanted relative pose make the hand's trajectory."""
+
+    kind: Literal["position_based"]
     singular_below: Annotated[float, Field(ge=0)] = 0.02  # damping below it, of the largest value
 
 
-class ConstrainedTable(Table):
-    """Any objective in the image under hard joint limits, with view and singularities kept."""
+class ImageObjectiveTable(Table):
+    """What the camera should do about features in the image."""
 
-    kind: Literal["constrained"]
-    objective: Literal["image_based", "optimal_tracking"] = "image_based"  # what is minimised
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
     Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
-    S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
     depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
-    depth_range: tuple[Positive, Positive] = (0.5, 2.0)  # factors between which the truth lies
+
+
+class ConstrainedTable(ImageObjectiveTable, PoseTrajectoryTable):
+    """Any objective under hard joint limits, with view and singularities kept."""
+
+    kind: Literal["constrained"]
+    objective: Objective | None = None  # position_based to follow, else image_based
+    S: Annotated[float, Field(ge=0)] = 0.0  # on 1/w', the penalty taken joint by joint
+    depth_range: tuple[Positive, Positive] | None = (
+        None  # of depths: [0.5, 2]; with a filter [0.9, 1.1]
+    )
     order: tuple[Literal["view", "singularity", "joint margin"], ...] = (
         "view",
         "singularity",
         "joint margin",
     )  # what is kept, most important first; joint limits always are
-    view_margin_px: Annotated[float, Field(ge=0)] = 10.0  # kept from the border of the image
-    joint_margin: Annotated[float, Field(ge=0, lt=0.5)] = 0.03  # share of each joint's range
+    view_margin_px: Annotated[float, Field(ge=0)] | None = None  # 10, or half a plan's
+    joint_margin: Annotated[float, Field(ge=0)] | None = None  # of a range: 0.03, or half a plan's
     manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
     approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second
     flow_smoothing_s: Annotated[float, Field(ge=0)] = 0.1  # of the target's motion in the image
 
 
-class PlainTable(Table):
+class PlainTable(ImageObjectiveTable):
     """Any objective in the image by itself, through the inverse of the Jacobian: no limits kept."""
 
     kind: Literal["plain"]
     objective: Literal["image_based", "optimal_tracking"] = "image_based"  # what is minimised
-    gain: Positive = 1.0  # λ of image_based, 1/s
-    interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
-    Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
-    R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
-    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
     flow_smoothing_s: Annotated[float, Field(ge=0)] | None = None  # the target stands if absent
     singular_below: Annotated[float, Field(ge=0)] = 0.02  # where the law gives up
 

@@ -9,19 +9,23 @@ from vergence.cell.schema import (
     OptimalTrackingTable,
     PathTrackingTable,
     PlainTable,
+    PoseTrajectoryTable,
     PositionBasedTable,
+    ReachTable,
 )
 from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
 from vergence.control.constrained import ConstrainedLaw
+from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
 from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
+from vergence.control.target_keeper import TargetKeeper
 from vergence.errors import InputError
 from vergence.robot import Arm, manipulability_measure, reverse_arm
-from vergence.runtime.assembly.pose import camera_poses
+from vergence.runtime.assembly.pose import camera_poses, target_shape
 
 
 def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
@@ -35,8 +39,7 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
             _require_task(cell, "track")
             return _to_hand(cell, _optimal_tracking(cell, driver, cell.law))
         case ConstrainedTable():
-            _require_task(cell, "track")
-            return _to_hand(cell, _constrained(cell, driver, cell.law))
+            return _constrained(cell, driver, cell.law)
         case PlainTable():
             _require_task(cell, "track")
             return _to_hand(cell, _plain(cell, driver, cell.law))
@@ -104,31 +107,65 @@ def _optimal_tracking(
     )
 
 
-def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -> ConstrainedLaw:
-    name = cell.task.camera
-    arm, camera = _arm(cell, driver), driver.cameras[name]
-    period = 1.0 / cell.cameras[name].rate_hz
-    low, high = table.depth_range
-    if not low <= 1.0 <= high:
-        raise InputError(
-            str(cell.path), "law.depth_range", table.depth_range, "a factor up to 1 and one from 1"
-        )
-    q = driver.read().joints[cell.task.arm].position
+_OBJECTIVES = {  # that suit a task, the usual one first
+    "track": ("image_based", "optimal_tracking"),
+    "follow": ("position_based",),
+    "reach": ("image_based",),
+}
+
+
+def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -> Law:
+    suitable = _OBJECTIVES[cell.task.kind]
+    objective = table.objective or suitable[0]
+    if objective not in suitable:
+        allowed = f"for the task {cell.task.kind}: {', '.join(suitable)}"
+        raise InputError(str(cell.path), "law.objective", objective, allowed)
+    if objective == "position_based":
+        return _constrained_pose(cell, driver, table)
+    depth = _depth(driver, cell.task.camera, table.depth_m)
+    solver = _solver(cell, driver, table, 1.0 / cell.cameras[cell.task.camera].rate_hz, (0.5, 2.0))
+    wanted = _objective(cell, driver, table, objective)
+    law = ConstrainedLaw(solver, wanted, depth, flow_smoothing_s=table.flow_smoothing_s)
+    return _to_hand(cell, law)
+
+
+def _constrained_pose(
+    cell: Cell, driver: SimulatedDriver, table: ConstrainedTable
+) -> PositionBasedLaw:
+    if _is_fixed(cell):
+        given = f"{cell.task.camera}, which stands, with objective = 'position_based'"
+        raise InputError(str(cell.path), "task.camera", given, "a camera in the hand")
+    period = 1.0 / driver.inner_rate_hz
+    solver = _solver(cell, driver, table, period, (0.9, 1.1))
+    keeper = TargetKeeper(solver, target_shape(cell, driver).corners)
+    trajectory = table.model_dump(include=set(PoseTrajectoryTable.model_fields))
+    return PositionBasedLaw(_arm(cell, driver), period, **trajectory, keeper=keeper)
+
+
+def _solver(
+    cell: Cell,
+    driver: SimulatedDriver,
+    table: ConstrainedTable,
+    period: float,
+    depth_range: tuple[float, float],
+) -> ConstrainedSolver:
+    arm, task = _arm(cell, driver), cell.task
+    q = driver.read().joints[task.arm].position
     start = manipulability_measure(arm.jacobian(q[::-1] if _is_fixed(cell) else q))
-    return ConstrainedLaw(
+    view_px, joint = 10.0, 0.03
+    if isinstance(task, ReachTable):  # a plan is made to be followed to within its own margins
+        view_px, joint = 0.5 * task.margin_px, 0.5 * task.margin_joint / 2.0
+    return ConstrainedSolver(
         arm,
-        camera,
-        _objective(cell, driver, table),
-        _depth(driver, name, table.depth_m),
+        driver.cameras[task.camera],
         period=period,
         order=table.order,
-        view_margin_px=table.view_margin_px,
-        joint_margin=table.joint_margin,
+        view_margin_px=view_px if table.view_margin_px is None else table.view_margin_px,
+        joint_margin=joint if table.joint_margin is None else table.joint_margin,
         manipulability_min=table.manipulability_share * start,
         approach_rate=table.approach_rate_hz,
-        depth_range=(low, high),
+        depth_range=table.depth_range or depth_range,
         S=table.S,
-        flow_smoothing_s=table.flow_smoothing_s,
     )
 
 
@@ -137,7 +174,7 @@ def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
     return PlainLaw(
         _arm(cell, driver),
         driver.cameras[name],
-        _objective(cell, driver, table),
+        _objective(cell, driver, table, table.objective),
         _depth(driver, name, table.depth_m),
         flow_smoothing_s=np.inf if smoothing is None else smoothing,
         singular_below=table.singular_below,
@@ -145,10 +182,10 @@ def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
 
 
 def _objective(
-    cell: Cell, driver: SimulatedDriver, table: ConstrainedTable | PlainTable
+    cell: Cell, driver: SimulatedDriver, table: ConstrainedTable | PlainTable, kind: str
 ) -> Objective:
     camera = driver.cameras[cell.task.camera]
-    if table.objective == "image_based":
+    if kind == "image_based":
         return ImageBased(camera, table.gain, table.interaction)
     _check_weights(cell, table)
     period = 1.0 / cell.cameras[cell.task.camera].rate_hz
