@@ -10,7 +10,7 @@ import cv2
 import pytest
 
 from vergence.app.main import main
-from vergence.runtime.campaign import Ledger, TrialResult
+from vergence.runtime.campaign import Crew, Ledger, Trial, TrialResult, WorkersLostError
 
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
@@ -94,6 +94,19 @@ def test_what_is_done_is_kept_when_the_user_stops_it(
     monkeypatch.setattr(Ledger, "add", add)
     assert command(*COMPARE, "--out", "c") == 0
     assert len(Path("c/results.jsonl").read_text().splitlines()) == 5
+
+
+def test_workers_that_die_end_in_a_message(
+    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose(*_: object) -> None:
+        raise WorkersLostError([Trial("own/3", {})], "something killed 4 workers")
+
+    monkeypatch.setattr(Crew, "run", lose)
+    assert command(*COMPARE, "--out", "c") == 1
+    said = capsys.readouterr().err
+    assert "4 workers, waiting for run own/3" in said
+    assert "--out c goes on from here" in said
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 """Campaigns: the same results wherever they are run, nothing lost, laws that begin alike."""
 
 import json
+import os
 import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime import RunResult
+from vergence.runtime.batch import IdealRun
 from vergence.runtime.campaign import (
     OWN,
     PRESETS,
@@ -23,18 +26,21 @@ from vergence.runtime.campaign import (
     Ending,
     Trial,
     TrialResult,
+    WorkersLostError,
     heading_trials,
     law_table,
     place_trials,
     random_starts,
     run_campaign,
     run_trial,
+    run_trials,
     scores,
     start_trials,
 )
 
 QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
 ALONE = Crew(workers=1)
+RUN_TRIAL = "vergence.runtime.campaign.run_trial"
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +68,48 @@ def test_every_trial_has_a_result_in_the_order_of_the_trials(trials, results):
 def test_a_result_is_a_function_of_cell_and_trial(source, trials, results):
     assert run_trial(source, trials[0], 2.0) == results[0]
     assert TrialResult.from_json(json.loads(json.dumps(results[0].as_json()))) == results[0]
+
+
+@pytest.fixture(scope="module")
+def quick_trials(source):
+    """Trials of the cell's own law, which the batch kernel knows."""
+    cell = source.load()
+    near, far = place_trials(cell, 0.3, 3, 0.2), heading_trials(cell, 3.0, 3, (1.0, 3.0))
+    return [*near, *far, *start_trials(cell, [OWN], 5, seed=3, spread=0.3)]
+
+
+@pytest.fixture(scope="module")
+def quick_results(source, quick_trials):
+    return run_trials(source, quick_trials, 2.0)
+
+
+def test_a_batch_of_trials_comes_to_what_each_of_them_comes_to_in_the_loop(
+    source, quick_trials, quick_results, monkeypatch
+):
+    in_batch = quick_results
+    monkeypatch.setattr(sys.modules[RUN_TRIAL], "covers", lambda _: False)
+    for one, other in zip(in_batch, run_trials(source, quick_trials, 2.0), strict=True):
+        assert (one.key, one.ending, one.reason) == (other.key, other.ending, other.reason)
+        for name, value in one.as_json().items():
+            if isinstance(value, float | tuple):
+                assert value == pytest.approx(getattr(other, name), abs=1e-6), name
+    assert {result.ending for result in in_batch} >= {Ending.CONVERGED, Ending.OUT_OF_VIEW}
+
+
+def test_physics_ends_the_runs_alike(source, quick_trials, quick_results):
+    for ideal, trial in zip(quick_results[:9], quick_trials, strict=False):
+        real = run_trial(source, trial, 2.0, physics=True)
+        assert real.ending is ideal.ending
+        assert real.max_error_px == pytest.approx(ideal.max_error_px, abs=1.0)
+
+
+def test_a_feature_that_the_arm_itself_hides_is_not_seen_by_the_batch_either():
+    source = CellSource.of("puma560", {}, None)
+    places = place_trials(source.load(), 0.5, 11, 0.1)
+    hidden = next(trial for trial in places if trial.key == "own/place/4/10")
+    found = run_trial(source, hidden, 2.0)
+    assert found.ending is Ending.LOST
+    assert found.time_s == pytest.approx(run_trial(source, hidden, 2.0, physics=True).time_s)
 
 
 def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
@@ -108,10 +156,12 @@ def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
 
 def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
     stopped = RunResult(Outcome(OutcomeKind.STOPPED, "stopped by the user", 0.5))
-    module = sys.modules["vergence.runtime.campaign.run_trial"]
+    module = sys.modules[RUN_TRIAL]
     monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
-    with pytest.raises(KeyboardInterrupt):
-        run_trial(source, trials[0], 2.0)
+    monkeypatch.setattr(IdealRun, "in_loop", lambda *_: stopped.outcome)
+    for physics in (True, False):
+        with pytest.raises(KeyboardInterrupt):
+            run_trial(source, trials[0], 2.0, physics=physics)
 
 
 def test_endings_are_told_apart(source):
@@ -173,9 +223,17 @@ def test_an_address_without_a_scheduler_is_refused(source, trials, tmp_path):
 
 
 class Cluster:
-    """A Dask scheduler and two workers, each a process of its own."""
+    """A Dask scheduler and two workers, each a process of its own.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: for its files.
+        deaths: of workers over the same task until that is given up.
+    """
+
+    def __init__(self, folder: Path, deaths: int = 3) -> None:
+        self.environment = os.environ | {
+            "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(deaths - 1)
+        }
         self.file = folder / "scheduler.json"
         where = ["--scheduler-file", str(self.file), "--no-dashboard"]
         self.processes = [self._start("scheduler", [*where, "--port", "0", "--host", "127.0.0.1"])]
@@ -188,7 +246,8 @@ class Cluster:
 
     def _start(self, part: str, options: list[str]) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", f"distributed.cli.dask_{part}", *options]
-        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        return subprocess.Popen(command, env=self.environment, **quiet)
 
     def close(self) -> None:
         for process in reversed(self.processes):
@@ -230,3 +289,33 @@ def cluster_wait(cluster: Cluster) -> None:
 
 def test_processes_of_this_machine_find_the_same(source, trials, results, tmp_path):
     assert run_campaign(source, trials[:4], tmp_path, crew=Crew(workers=2)) == results[:4]
+
+
+def test_a_cluster_runs_batches_too(source, quick_trials, quick_results, tmp_path):
+    cluster = Cluster(tmp_path)
+    try:
+        cluster_wait(cluster)
+        crew = Crew(scheduler=cluster.address)
+        found = run_campaign(source, quick_trials, tmp_path / "run", crew=crew)
+    finally:
+        cluster.close()
+    assert list(found) == quick_results
+
+
+@pytest.mark.parametrize(
+    ("whom", "said"),
+    [(slice(1, 3), "something killed 1 worker"), (slice(0, 1), "the scheduler is gone")],
+    ids=["workers", "scheduler"],
+)
+def test_a_run_that_nobody_survives_ends_in_a_clear_message(source, trials, tmp_path, whom, said):
+    endless = Trial("endless", {**trials[0].changes, "duration_s": 3600.0})
+    cluster = Cluster(tmp_path, deaths=1)
+    try:
+        cluster_wait(cluster)
+        killing = Timer(1.0, lambda: [process.kill() for process in cluster.processes[whom]])
+        killing.start()
+        with pytest.raises(WorkersLostError, match=f"{said}.*run endless"):
+            list(Crew(scheduler=cluster.address).run(source, [endless], 2.0))
+        killing.join()
+    finally:
+        cluster.close()

@@ -24,6 +24,14 @@ class Running:
     tolerance_px: float
     workers: int | None  # processes of this machine; None for one a core
     scheduler: str | None  # address of a Dask scheduler
+    physics: bool  # whether to simulate physics for every cell
+
+    @property
+    def motion(self) -> str:
+        """Say how arms moved."""
+        if self.physics:
+            return "arms moved in simulated physics"
+        return "a lone arm with one camera moved exactly as it was told, others in physics"
 
 
 def prepare(
@@ -34,6 +42,7 @@ def prepare(
     tolerance_px: float,
     workers: int | None,
     scheduler: str | None,
+    physics: bool,
 ) -> "tuple[CellSource, Running]":
     """Return what the options of a command mean: which cell, and how to run it.
 
@@ -46,12 +55,12 @@ def prepare(
 
     source = CellSource.of(cell, overrides(settings), None)
     folder = out or new_folder(f"{source.load().name}-{command}")
-    return source, Running(folder, tolerance_px, workers, scheduler)
+    return source, Running(folder, tolerance_px, workers, scheduler, physics)
 
 
 def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
     """Run a campaign with a progress bar; Ctrl-C keeps what is done."""
-    from vergence.runtime.campaign import Crew, run_campaign
+    from vergence.runtime.campaign import Crew, WorkersLostError, run_campaign
 
     with bar("{task.completed} of {task.total} runs") as progress:
         task = progress.add_task("runs", total=len(trials))
@@ -66,10 +75,14 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
                 how.folder,
                 crew=Crew(how.workers, how.scheduler),
                 tolerance_px=how.tolerance_px,
+                physics=how.physics,
                 progress=show,
             )
         except KeyboardInterrupt:
             warn(f"interrupted: the same command with --out {how.folder} goes on from here")
+            raise SystemExit(FAILURE) from None
+        except WorkersLostError as error:
+            warn(f"{error}; the same command with --out {how.folder} goes on from here")
             raise SystemExit(FAILURE) from None
 
 

@@ -27,6 +27,10 @@ _Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="A Dask scheduler, whose workers run it instead."),
 ]
+_Physics = Annotated[
+    bool,
+    typer.Option("--physics", help="Simulate physics too: slower, with servos that lag."),
+]
 
 
 def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
@@ -56,6 +60,7 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         tolerance_px: _Tolerance = 2.0,
         workers: _Workers = None,
         scheduler: _Scheduler = None,
+        physics: _Physics = False,
         out: _Out = None,
         settings: _Set = None,
         as_json: _Json = False,
@@ -65,7 +70,7 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         from vergence.app.compare import compare as command
 
         source, how = prepare(
-            "compare", cell, settings or (), out, tolerance_px, workers, scheduler
+            "compare", cell, settings or (), out, tolerance_px, workers, scheduler, physics
         )
         raise typer.Exit(command(source, _names(laws), starts, seed, spread, how, as_json))
 
@@ -93,6 +98,7 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         tolerance_px: _Tolerance = 2.0,
         workers: _Workers = None,
         scheduler: _Scheduler = None,
+        physics: _Physics = False,
         out: _Out = None,
         settings: _Set = None,
         as_json: _Json = False,
@@ -105,7 +111,9 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         if over not in ("places", "headings"):
             raise InputError("--over", "", over, "places, headings")
         region = Region(over, extent, steps, _speeds(speeds), _names(laws))
-        source, how = prepare("map", cell, settings or (), out, tolerance_px, workers, scheduler)
+        source, how = prepare(
+            "map", cell, settings or (), out, tolerance_px, workers, scheduler, physics
+        )
         raise typer.Exit(command(source, region, how, as_json))
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _REMARK = (
     "Every law sets out from the same random joints, from which it sees the target, for the same "
-    "picture; on exact projections, under the cell's rate and acceleration limits."
+    "picture; on exact projections, under the cell's rate and acceleration limits; {motion}."
 )
 
 
@@ -136,4 +136,6 @@ def _write_page(
         markup.section("Why", reasons_table(results, "{law}, start {start}")),
     ]
     title = f"{cell.name}: {len(found)} laws from {found[0].trials} starts"
-    return write_page(how.folder, "vergence compare", title, _REMARK, parts)
+    return write_page(
+        how.folder, "vergence compare", title, _REMARK.format(motion=how.motion), parts
+    )

@@ -102,7 +102,7 @@ def _write_page(
     ]
     title = f"{cell.name}: where does {' and '.join(region.laws)} work?"
     remark = (
-        f"{len(results)} runs on exact projections; converged: every feature within "
+        f"{len(results)} runs on exact projections; {how.motion}; converged: every feature within "
         f"{how.tolerance_px:g} px at the end."
     )
     return write_page(how.folder, "vergence map", title, remark, parts), picture

@@ -1,18 +1,21 @@
 """A cell without physics and without images: for thousands of runs."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera, Frame, FrameTruth, picture_tick
 from vergence.cell.motion import TargetPoses
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm, JointState, Sample, Setpoint
 
 ARM, CAMERA = "arm", "camera"
+
+# From joint positions (n,) and T_world_target (4, 4) to the features that nothing hides, (M,).
+Sees = Callable[[FloatArray, FloatArray], BoolArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,7 @@ class IdealCell:
     latency_frames: int = 0
     dropped: float = 0.0  # share of the pictures that never arrive
     seed: int = 0  # of what is dropped
+    sees: Sees | None = None  # what nothing hides; everything if None
 
 
 class IdealDriver:
@@ -108,4 +112,6 @@ class IdealDriver:
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = cell.camera.project(points[in_front])
         visible = in_front & cell.camera.in_view(points)
+        if cell.sees is not None and visible.any():
+            visible &= cell.sees(self._position, T_world_target)
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)

@@ -40,6 +40,7 @@ class World:
         self.data: Any = mujoco.MjData(self.model)
         self.cameras = {name: intrinsics(table) for name, table in cell.cameras.items()}
         self.arms = {name: self._arm(name) for name in cell.arms}
+        self._to_camera: dict[str, Arm] = {}  # made when asked for
         self._joints = {name: self._joint_ids(name) for name in cell.arms}
         self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
         self._qvel = {n: self.model.jnt_dofadr[ids] for n, ids in self._joints.items()}
@@ -84,7 +85,9 @@ class World:
             raise InputError(
                 "cell", f"cameras.{camera}", "a fixed camera", "one that an arm carries"
             )
-        return self._arm(name, camera)
+        if camera not in self._to_camera:
+            self._to_camera[camera] = self._arm(name, camera)
+        return self._to_camera[camera]
 
     def target_pose(self) -> FloatArray:
         """Return T_world_target (4, 4), as of the last `update`."""

@@ -2,11 +2,11 @@
 
 from vergence.runtime.campaign.aim import Aim
 from vergence.runtime.campaign.campaign import run_campaign
-from vergence.runtime.campaign.crew import Crew
+from vergence.runtime.campaign.crew import Crew, WorkersLostError
 from vergence.runtime.campaign.ledger import RESULTS, Ledger
 from vergence.runtime.campaign.presets import OWN, PRESETS, law_table
 from vergence.runtime.campaign.region import heading_trials, place_trials
-from vergence.runtime.campaign.run_trial import run_trial
+from vergence.runtime.campaign.run_trial import run_trial, run_trials
 from vergence.runtime.campaign.score import Score, scores
 from vergence.runtime.campaign.source import CellSource
 from vergence.runtime.campaign.starts import random_starts, start_trials
@@ -26,12 +26,14 @@ __all__ = [
     "Trial",
     "TrialResult",
     "TrialTrace",
+    "WorkersLostError",
     "heading_trials",
     "law_table",
     "place_trials",
     "random_starts",
     "run_campaign",
     "run_trial",
+    "run_trials",
     "scores",
     "start_trials",
 ]

@@ -8,13 +8,25 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from vergence.errors import InputError
-from vergence.runtime.campaign.run_trial import run_trial
+from vergence.cell import Cell
+from vergence.errors import InputError, VergenceError
+from vergence.runtime.campaign.ideal import is_quick
+from vergence.runtime.campaign.run_trial import run_trials
 from vergence.runtime.campaign.source import CellSource
 from vergence.runtime.campaign.trial import Trial, TrialResult
 
 _CONNECT_S = 10
+_CHUNK = 256  # quick trials handed out at once: about a second of one core
 _SCHEDULER = "a Dask scheduler, such as tcp://10.0.0.1:8786"
+
+
+class WorkersLostError(VergenceError):
+    """Nobody is left to do some trials, or nobody survives them."""
+
+    def __init__(self, trials: Sequence[Trial], what: str) -> None:
+        first, more = trials[0].key, len(trials) - 1
+        runs = f"run {first} and {more} more" if more else f"run {first}"
+        super().__init__(f"{what}, waiting for {runs}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,27 +37,57 @@ class Crew:
     scheduler: str | None = None  # address of a Dask scheduler, such as tcp://10.0.0.1:8786
 
     def run(
-        self, source: CellSource, trials: Sequence[Trial], tolerance_px: float
+        self,
+        source: CellSource,
+        trials: Sequence[Trial],
+        tolerance_px: float,
+        physics: bool = False,
     ) -> Iterator[TrialResult]:
         """Yield results as they come, in any order.
 
-        Trials of a worker that dies are given to another.
+        Trials of a worker that dies are given to another. Without a scheduler quick trials run in
+        this process, on as many cores: a thousand of them take less than processes to start.
 
         Raises:
             InputError: if there is no scheduler at the address.
+            WorkersLostError: if every worker dies that is given the same trials.
         """
         count = self.workers or os.cpu_count() or 1
-        if self.scheduler is None and min(count, len(trials)) <= 1:
-            for trial in trials:
-                yield run_trial(source, trial, tolerance_px)
-            return
+        quick, slow = _by_pace(source, trials, physics)
+        if self.scheduler is None:
+            for some in quick:
+                yield from run_trials(source, some, tolerance_px, physics, count)
+            quick = []
+        tasks = [*quick, *slow]
+        if self.scheduler is None and min(count, len(tasks)) <= 1:
+            for some in tasks:
+                yield from run_trials(source, some, tolerance_px, physics)
+        else:
+            yield from self._distribute(source, tasks, tolerance_px, physics, count)
+
+    def _distribute(
+        self,
+        source: CellSource,
+        tasks: Sequence[Sequence[Trial]],
+        tolerance_px: float,
+        physics: bool,
+        count: int,
+    ) -> Iterator[TrialResult]:
         distributed: Any = import_module("distributed")
-        with self._client(min(count, len(trials))) as client:
-            futures = client.map(
-                run_trial, [source] * len(trials), trials, [tolerance_px] * len(trials), pure=False
-            )
-            for future in distributed.as_completed(futures):
-                yield future.result()
+        with self._client(min(count, len(tasks))) as client:
+            given = {
+                client.submit(run_trials, source, task, tolerance_px, physics, pure=False): task
+                for task in tasks
+            }
+            for future in distributed.as_completed(given):
+                try:
+                    yield from future.result()
+                except distributed.scheduler.KilledWorker as error:
+                    count = error.allowed_failures + 1
+                    what = f"something killed {count} workers in turn (out of memory?)"
+                    raise WorkersLostError(given[future], what) from None
+                except distributed.client.FutureCancelledError:
+                    raise WorkersLostError(given[future], "the scheduler is gone") from None
 
     @contextmanager
     def _client(self, count: int) -> Iterator[Any]:
@@ -66,9 +108,29 @@ class Crew:
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address=":0",  # any free port
                 silence_logs=logging.ERROR,
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
             yield client
+
+
+def _by_pace(
+    source: CellSource, trials: Sequence[Trial], physics: bool
+) -> tuple[list[tuple[Trial, ...]], list[tuple[Trial, ...]]]:
+    """Return trials for the batch kernel, by the chunk, and all others, one at a time."""
+    cell = source.load()
+    quick: list[Trial] = []
+    slow: list[Trial] = []
+    for trial in trials:
+        (slow if physics or not _is_quick(cell, trial) else quick).append(trial)
+    chunks = [tuple(quick[i : i + _CHUNK]) for i in range(0, len(quick), _CHUNK)]
+    return chunks, [(trial,) for trial in slow]
+
+
+def _is_quick(cell: Cell, trial: Trial) -> bool:
+    try:
+        return is_quick(cell.replace(**trial.changes))
+    except InputError:  # becomes its result
+        return False
