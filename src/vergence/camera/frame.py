@@ -10,9 +10,9 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray
 class FrameTruth:
     """What only a simulated camera knows about its picture; for evaluation and exact perception."""
 
-    T_world_target: FloatArray  # (4, 4)
+    T_world_target: FloatArray  # (4, 4) of what it looks at: the target, or a tool
     T_world_camera: FloatArray  # (4, 4)
-    points_px: FloatArray  # (M, 2) the target's features, truly projected
+    points_px: FloatArray  # (M, 2) its features, truly projected
     depth_m: FloatArray  # (M,) their depth along the optical axis
     visible: BoolArray  # (M,) in the picture and in front of the camera
 

@@ -41,7 +41,21 @@ def assemble(cell: Cell) -> Any:
     for name, camera in cell.cameras.items():
         _add_camera(spec, cell, name, camera)
     _add_target(spec, cell)
+    if cell.tool is not None:
+        model = _read(cell, "task.tool.model", cell.tool.model)
+        spec.attach(
+            model, frame=_held(spec, cell, "tool", model, cell.tool, cell.task.arm), prefix="tool/"
+        )
     return spec
+
+
+def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, arm: str) -> Any:
+    """Return the frame in an arm's last body to attach a model to, its weight compensated."""
+    for body in model.bodies:
+        body.gravcomp = 1.0
+    holder = spec.body(f"{arm}/{cell.arms[arm].body}").add_body(name=name)
+    _place(holder, placement)
+    return holder.add_frame()
 
 
 def _add_target(spec: Any, cell: Cell) -> None:
@@ -49,13 +63,10 @@ def _add_target(spec: Any, cell: Cell) -> None:
     model = _read(cell, "target.model", cell.target.model)
     arm = cell.target.carried_by
     if arm is None:
-        holder = spec.worldbody.add_body(name="target", mocap=True)
+        frame = spec.worldbody.add_body(name="target", mocap=True).add_frame()
     else:
-        for body in model.bodies:
-            body.gravcomp = 1.0
-        holder = spec.body(f"{arm}/{cell.arms[arm].body}").add_body(name="target")
-        _place(holder, cell.target)
-    spec.attach(model, frame=holder.add_frame(), prefix="target/")
+        frame = _held(spec, cell, "target", model, cell.target, arm)
+    spec.attach(model, frame=frame, prefix="target/")
 
 
 def _read(cell: Cell, key: str, model: Path, last_body: str | None = None) -> Any:

@@ -19,6 +19,8 @@ from vergence.cell.schema import (
     Table,
     TargetTable,
     Task,
+    ToolTable,
+    TrackTable,
 )
 from vergence.errors import InputError, nearest
 
@@ -57,6 +59,11 @@ class Cell(Table):
     def outer_rate_hz(self) -> float:
         """The rate of the fastest camera."""
         return max(camera.rate_hz for camera in self.cameras.values())
+
+    @property
+    def tool(self) -> ToolTable | None:
+        """What the task's arm holds before a second camera, if it does."""
+        return self.task.tool if isinstance(self.task, TrackTable) else None
 
     @property
     def watched(self) -> tuple[str, ...]:
@@ -234,6 +241,23 @@ def _check_names(cell: Cell) -> None:
     if cell.target.carried_by is not None:
         check("target.carried_by", cell.target.carried_by, cell.arms)
     _check_sight(cell)
+    if cell.tool is not None:
+        check("task.tool.camera", cell.tool.camera, cell.cameras)
+        _check_tool(cell, cell.tool)
+
+
+def _check_tool(cell: Cell, tool: ToolTable) -> None:
+    """Refuse a tool that is not seen as it should be: by a fixed camera, beside one in the hand."""
+
+    def refuse(key: str, given: str, allowed: str) -> None:
+        raise InputError(str(cell.path), key, given, allowed)
+
+    if (carrier := cell.cameras[tool.camera].arm) is not None:
+        refuse("task.tool.camera", f"{tool.camera}, which {carrier} carries", "a fixed camera")
+    if cell.cameras[cell.task.camera].arm is None:
+        refuse("task.tool", "a second fixed camera", "a task.camera that the arm carries")
+    if cell.law.kind != "plain":
+        refuse("law.kind", cell.law.kind, "plain, the law that serves two cameras at once")
 
 
 def _check_sight(cell: Cell) -> None:

@@ -185,10 +185,10 @@ class SimulatedDriver:
         return Frame(camera, self.time, image, joints, self._truth(camera, blind))
 
     def _truth(self, camera: str, blind: bool) -> FrameTruth:
-        T_world_target = self.world.target_pose()
+        T_world_target, features = self._subject(camera)
         T_world_camera = self.world.camera_pose(camera)
         T_camera_target = se3_inverse(T_world_camera) @ T_world_target
-        points = transform_points(T_camera_target, self._features)
+        points = transform_points(T_camera_target, features)
         intrinsics = self.cameras[camera]
         depth = points[:, 2].copy()
         in_front = depth > 1e-3
@@ -197,6 +197,13 @@ class SimulatedDriver:
         visible = intrinsics.in_view(points) & in_front & np.bool_(not blind)
         in_sight = np.flatnonzero(visible)
         if len(in_sight):
-            points_world = transform_points(T_world_target, self._features[in_sight])
+            points_world = transform_points(T_world_target, features[in_sight])
             visible[in_sight] = self.world.sees(camera, points_world)
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
+
+    def _subject(self, camera: str) -> tuple[FloatArray, FloatArray]:
+        """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""
+        tool = self.cell.tool
+        if tool is None or tool.camera != camera:
+            return self.world.target_pose(), self._features
+        return self.world.tool_pose(), np.array(tool.features)

@@ -93,6 +93,10 @@ class World:
         """Return T_world_target (4, 4), as of the last `update`."""
         return self._body_pose(self._target)
 
+    def tool_pose(self) -> FloatArray:
+        """Return T_world_tool (4, 4) of what the task's arm holds, as of the last `update`."""
+        return self._body_pose(int(self.model.body("tool").id))
+
     def move_target(self, T_world_target: FloatArray) -> None:
         """Put the target somewhere; it takes effect with the next step or `update`.
 

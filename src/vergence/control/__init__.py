@@ -1,5 +1,6 @@
 """Control: the laws, how a camera twist becomes joint rates, and the guard behind them."""
 
+from vergence.control.camera_share import CameraShare
 from vergence.control.command import JointCommand
 from vergence.control.conditioning import (
     CameraDirections,
@@ -26,6 +27,7 @@ from vergence.control.plain import PlainLaw
 from vergence.control.position_based import PositionBasedLaw, hand_rates
 from vergence.control.redundancy import resolve_redundant
 from vergence.control.resolve import resolve_twist
+from vergence.control.several_cameras import SeveralCamerasLaw
 from vergence.control.tracking_kernels import (
     PackedSetup,
     TrackingGains,
@@ -40,6 +42,7 @@ from vergence.control.tracking_kernels import (
 )
 
 __all__ = [
+    "CameraShare",
     "ConstrainedLaw",
     "ConstrainedSolver",
     "EyeToHandLaw",
@@ -50,6 +53,7 @@ __all__ = [
     "OptimalTracking",
     "PathTrackingLaw",
     "PlainLaw",
+    "SeveralCamerasLaw",
     "TwistObjective",
     "CameraDirections",
     "Resolvability",

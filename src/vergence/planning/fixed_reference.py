@@ -1,5 +1,7 @@
 """A goal that stays."""
 
+from dataclasses import replace
+
 from vergence.planning.reference import Reference
 
 
@@ -15,5 +17,4 @@ class FixedReference:
 
     def reference(self, time: float) -> Reference:
         """Return the goal, stamped with the time."""
-        goal = self._goal
-        return Reference(time, goal.points_px, goal.velocity_px, goal.depth_m, goal.T_camera_target)
+        return replace(self._goal, time=time)

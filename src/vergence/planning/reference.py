@@ -1,6 +1,7 @@
 """What the law should reach now."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 from vergence.arrays import FloatArray
@@ -15,6 +16,8 @@ class Reference:
     velocity_px: FloatArray | None = None  # (M, 2) ds*/dt, px/s
     depth_m: FloatArray | None = None  # (M,) depth of the points as the planner knows it
     T_camera_target: FloatArray | None = None  # (4, 4) wanted relative pose
+    # Wanted features (M, 2) in the pictures of further cameras, by their names.
+    elsewhere_px: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def at(self, time: float) -> Self:
         """Return the reference moved on, at its velocity, to a time near its own."""

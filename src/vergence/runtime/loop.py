@@ -73,7 +73,7 @@ class Loop:
         self._still = np.zeros(driver.arms[arm].joint_count)
         self._inner_tick = 0
         self._last_picture = self._last_seen = 0.0
-        self._lost: set[int] = set()
+        self._lost: dict[str, set[int]] = {}  # features, by camera
         self._target_lost = False
         self._last_command: JointCommand | None = None
 
@@ -220,15 +220,18 @@ class Loop:
             text = endings.why_lost(_reasons(observation)) if lost else "it is back"
             self._tell(time, "target out of sight" if lost else "target in sight", text)
         if observation.target is None and not lost:
-            self._report_features(time, observation.views[-1])
+            for view in {view.camera: view for view in observation.views}.values():
+                self._report_features(time, view)
 
     def _report_features(self, time: float, view: ImagePoints) -> None:
+        before = self._lost.get(view.camera, set())
         lost = set(np.flatnonzero(~view.found).tolist())
-        for feature in sorted(lost - self._lost):
-            self._tell(time, "feature lost", f"feature {feature}: {view.reasons[feature]}")
-        for feature in sorted(self._lost - lost):
-            self._tell(time, "feature found", f"feature {feature} is back")
-        self._lost = lost
+        for feature in sorted(lost - before):
+            text = f"feature {feature} in {view.camera}: {view.reasons[feature]}"
+            self._tell(time, "feature lost", text)
+        for feature in sorted(before - lost):
+            self._tell(time, "feature found", f"feature {feature} in {view.camera} is back")
+        self._lost[view.camera] = lost
 
     def _tell(self, time: float, name: str, text: str) -> None:
         for listener in self._listeners:

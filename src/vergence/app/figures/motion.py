@@ -9,13 +9,15 @@ from vergence.runtime.recording import CameraTrace, TargetTrace
 
 
 def target_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
-    """Draw how the target moved from where it was first, as it did and as a filter believed."""
+    """Draw how the target moved from where it was first, and what a filter believed, if it did."""
     known = np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
         return None
+    place = trace.T_world_target[known, :3, 3]
+    if estimate is None and (place == place[:1]).all():
+        return None
     out = panels(1)
     axes = out.axes[0]
-    place = trace.T_world_target[known, :3, 3]
     for index, axis in enumerate("xyz"):
         axes.plot(trace.time[known], place[:, index] - place[0, index], label=axis, **curve(index))
     if estimate is not None:

@@ -34,6 +34,7 @@ from vergence.cell.schema.tables import (
     StillMotion,
     TargetTable,
     Task,
+    ToolTable,
     TrackTable,
     Waypoints,
 )
@@ -68,6 +69,7 @@ __all__ = [
     "Table",
     "TargetTable",
     "Task",
+    "ToolTable",
     "TrackTable",
     "Vector3",
     "Waypoints",
@@ -87,6 +89,7 @@ TABLES: dict[str, type[Table]] = {
     "step": StepMotion,
     "random": RandomMotion,
     "track": TrackTable,
+    "tool": ToolTable,
     "follow": FollowTable,
     "reach": ReachTable,
     "perception": PerceptionTable,

@@ -158,6 +158,17 @@ class TargetTable(Placement):
         return self
 
 
+class ToolTable(Placement):
+    """What the arm holds in its hand; its placement is in the arm's last body."""
+
+    model: Path  # MJCF
+    camera: str  # the fixed one that looks at it
+    features: tuple[Vector3, ...] = Field(min_length=1)  # x, y, z of each, in the tool
+    desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = (
+        "initial"  # in that camera, as for the task
+    )
+
+
 class TrackTable(Table):
     """Keep features where they are wanted in one camera's image."""
 
@@ -168,6 +179,7 @@ class TrackTable(Table):
     desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = (
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
+    tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
     image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
     target_timeout_s: Positive = 0.2  # with pictures, but none of the features found
 

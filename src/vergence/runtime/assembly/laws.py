@@ -13,7 +13,13 @@ from vergence.cell.schema import (
     PositionBasedTable,
     ReachTable,
 )
-from vergence.control import Law, OptimalTrackingLaw, PositionBasedLaw
+from vergence.control import (
+    CameraShare,
+    Law,
+    OptimalTrackingLaw,
+    PositionBasedLaw,
+    SeveralCamerasLaw,
+)
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
@@ -42,6 +48,8 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
             return _constrained(cell, driver, cell.law)
         case PlainTable():
             _require_task(cell, "track")
+            if cell.tool is not None:
+                return _several_cameras(cell, driver, cell.law, cell.tool.camera)
             return _to_hand(cell, _plain(cell, driver, cell.law))
         case PositionBasedTable():
             _require_task(cell, "follow")
@@ -76,7 +84,13 @@ def _arm(cell: Cell, driver: SimulatedDriver) -> Arm:
     world = driver.world
     if not _is_fixed(cell):
         return world.arm_to_camera(cell.task.camera)
-    return reverse_arm(world.arm_to_body(cell.task.arm), world.camera_pose(cell.task.camera))
+    return _arm_backwards(cell, driver, cell.task.camera)
+
+
+def _arm_backwards(cell: Cell, driver: SimulatedDriver, camera: str) -> Arm:
+    """Return the arm that carries a fixed camera as the hand of the task's arm sees it."""
+    hand = driver.world.arm_to_body(cell.task.arm)
+    return reverse_arm(hand, driver.world.camera_pose(camera))
 
 
 def _optimal_tracking(
@@ -124,7 +138,7 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
         return _constrained_pose(cell, driver, table)
     depth = _depth(driver, cell.task.camera, table.depth_m)
     solver = _solver(cell, driver, table, 1.0 / cell.cameras[cell.task.camera].rate_hz, (0.5, 2.0))
-    wanted = _objective(cell, driver, table, objective)
+    wanted = _objective(cell, driver, table, objective, cell.task.camera)
     law = ConstrainedLaw(solver, wanted, depth, flow_smoothing_s=table.flow_smoothing_s)
     return _to_hand(cell, law)
 
@@ -174,22 +188,44 @@ def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
     return PlainLaw(
         _arm(cell, driver),
         driver.cameras[name],
-        _objective(cell, driver, table, table.objective),
+        _objective(cell, driver, table, table.objective, name),
         _depth(driver, name, table.depth_m),
         flow_smoothing_s=np.inf if smoothing is None else smoothing,
         singular_below=table.singular_below,
     )
 
 
+def _several_cameras(
+    cell: Cell, driver: SimulatedDriver, table: PlainTable, fixed: str
+) -> SeveralCamerasLaw:
+    carried, smoothing = cell.task.camera, table.flow_smoothing_s
+    arms = {carried: _arm(cell, driver), fixed: _arm_backwards(cell, driver, fixed)}
+    shares = {
+        name: CameraShare(
+            arm,
+            driver.cameras[name],
+            _objective(cell, driver, table, table.objective, name),
+            _depth(driver, name, table.depth_m),
+            backwards=name == fixed,
+        )
+        for name, arm in arms.items()
+    }
+    return SeveralCamerasLaw(shares, flow_smoothing_s=np.inf if smoothing is None else smoothing)
+
+
 def _objective(
-    cell: Cell, driver: SimulatedDriver, table: ConstrainedTable | PlainTable, kind: str
+    cell: Cell,
+    driver: SimulatedDriver,
+    table: ConstrainedTable | PlainTable,
+    kind: str,
+    name: str,
 ) -> Objective:
-    camera = driver.cameras[cell.task.camera]
+    camera = driver.cameras[name]
     if kind == "image_based":
         return ImageBased(camera, table.gain, table.interaction)
     _check_weights(cell, table)
-    period = 1.0 / cell.cameras[cell.task.camera].rate_hz
-    count = len(_depth(driver, cell.task.camera, table.depth_m))
+    period = 1.0 / cell.cameras[name].rate_hz
+    count = len(_depth(driver, name, table.depth_m))
     return OptimalTracking(camera, table.axes, table.Q / count, table.R, period)
 
 

@@ -1,11 +1,13 @@
 """The task `track`: features kept where they are wanted in one camera's image."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import FrameTruth
 from vergence.cell import Cell, SimulatedDriver
-from vergence.cell.schema import TrackTable
+from vergence.cell.schema import ToolTable, TrackTable
 from vergence.errors import InputError
 from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.tracked_points import TrackedPoints
@@ -13,6 +15,7 @@ from vergence.geometry import transform_points
 from vergence.planning import FixedReference, Reference
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
+from vergence.runtime.several_cameras import SeveralCameras
 from vergence.runtime.stages import Perception
 
 _WINDOW_PX = 32.0  # of the tracker, at the finest level
@@ -21,26 +24,35 @@ _WINDOW_PX = 32.0  # of the tracker, at the finest level
 def track_parts(cell: Cell, task: TrackTable, driver: SimulatedDriver, images: bool) -> Parts:
     """Put together what tracks features in the image."""
     points_px, perception = _look(cell, task, driver, images)
-    desired = _desired_points(cell, task, driver, points_px)
-    planner = FixedReference(Reference(0.0, desired))
-    return Parts(perception, planner, build_law(cell, driver))
+    desired = _desired_points(cell, "task.desired", task, driver, points_px)
+    reference, tool = Reference(0.0, desired), task.tool
+    if tool is not None:
+        points_px, second = _follow(cell, "task.tool", tool.camera, driver, images)
+        desired = _desired_points(cell, "task.tool.desired", tool, driver, points_px)
+        reference = replace(reference, elsewhere_px={tool.camera: desired})
+        perception = SeveralCameras((perception, second))
+    return Parts(perception, FixedReference(reference), build_law(cell, driver))
 
 
 def _look(
     cell: Cell, task: TrackTable, driver: SimulatedDriver, images: bool
 ) -> tuple[FloatArray, Perception]:
     """Find the features in the first picture; return where they are and what follows them."""
-    name = task.camera
-    frame = driver.first_frame(name)
     if cell.target.features is None:
-        points_px = _pick(cell, task, driver)
-        driver.anchor(name, points_px)
-        frame = driver.first_frame(name)
+        driver.anchor(task.camera, _pick(cell, task, driver))
+    return _follow(cell, "target", task.camera, driver, images)
+
+
+def _follow(
+    cell: Cell, key: str, name: str, driver: SimulatedDriver, images: bool
+) -> tuple[FloatArray, Perception]:
+    """Return where a camera sees the features that are known, and what follows them from there."""
+    frame = driver.first_frame(name)
     assert frame.truth is not None
     if not frame.truth.visible.all():
         raise InputError(
             str(cell.path),
-            "target",
+            key,
             f"at the start camera {name} does not see {_unseen(driver, name, frame.truth)}",
             "a start from which the camera sees every feature",
         )
@@ -127,9 +139,13 @@ def _grid(width: int, height: int, count: int) -> FloatArray:
 
 
 def _desired_points(
-    cell: Cell, task: TrackTable, driver: SimulatedDriver, points_px: FloatArray
+    cell: Cell,
+    key: str,
+    task: TrackTable | ToolTable,
+    driver: SimulatedDriver,
+    points_px: FloatArray,
 ) -> FloatArray:
-    """Return s* (M, 2), as the task wants it."""
+    """Return s* (M, 2), as the task wants it in its camera."""
     wanted = task.desired
     if wanted == "initial":
         return points_px
@@ -139,10 +155,8 @@ def _desired_points(
         return centred
     desired = np.array(wanted, dtype=np.float64)
     if desired.shape != points_px.shape:
-        raise InputError(
-            str(cell.path), "task.desired", f"{len(desired)} points", f"{len(points_px)} points"
-        )
+        raise InputError(str(cell.path), key, f"{len(desired)} points", f"{len(points_px)} points")
     if not camera.contains(desired).all():
         allowed = f"points inside {camera.width} x {camera.height}"
-        raise InputError(str(cell.path), "task.desired", wanted, allowed)
+        raise InputError(str(cell.path), key, wanted, allowed)
     return desired

@@ -104,15 +104,19 @@ class Tape:
         marks = messages.annotations(time, view, desired, truth.points_px if truth else None)
         self._file.typed(f"/camera/{camera}/annotations", self.now, marks)
         if truth is not None:
-            poses = {camera: truth.T_world_camera, "target": truth.T_world_target}
+            poses = {camera: truth.T_world_camera}
+            if camera == self._info.task_camera:  # another may look at a tool
+                poses["target"] = truth.T_world_target
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
 
     def _wanted(
         self, record: TickRecord, camera: str
     ) -> tuple[FloatArray | None, FloatArray | None]:
         """Return the wanted points and the wanted pose of the target that this camera is about."""
-        if record.reference is None or camera != self._info.task_camera:
+        if record.reference is None:
             return None, None
+        if camera != self._info.task_camera:
+            return record.reference.elsewhere_px.get(camera), None
         return record.reference.points_px, record.reference.T_camera_target
 
     def _record_picture(self, frame: Frame) -> None:

@@ -1,0 +1,25 @@
+"""Several perceptions beside each other, each with a camera of its own."""
+
+from collections.abc import Sequence
+
+from vergence.camera import Frame
+from vergence.features import Observation
+from vergence.runtime.stages import Perception
+
+
+class SeveralCameras:
+    """Observes with each of several perceptions, and hands on what all have seen.
+
+    Args:
+        perceptions: one a camera.
+    """
+
+    def __init__(self, perceptions: Sequence[Perception]) -> None:
+        self._perceptions = perceptions
+
+    def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
+        """Return all views in the frames that arrived, oldest first, or None if there are none."""
+        seen = [perception.observe(frames) for perception in self._perceptions]
+        views = [view for observation in seen if observation for view in observation.views]
+        views.sort(key=lambda view: view.time)
+        return Observation(views[-1].time, tuple(views)) if views else None
