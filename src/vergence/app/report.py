@@ -17,26 +17,12 @@ from vergence.app.figures import (
     target_figure,
     twist_figure,
 )
+from vergence.app.marks_legend import marks_legend
 from vergence.app.pictures import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, run_rows
 from vergence.runtime.recording import CameraTrace, Recording
 
 REPORT = "report.html"
-
-_MARKS = """<p class="marks">
-<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="5" fill="none" stroke="#14e696"
-stroke-width="2"/></svg>tracked</span>
-<span><svg viewBox="0 0 16 16"><path d="M4 4l8 8M12 4l-8 8" stroke="#ff6e0a"
-stroke-width="2"/></svg>not found</span>
-<span><svg viewBox="0 0 16 16"><path d="M6 6l4 4M10 6l-4 4" stroke="#aaaaaa"
-stroke-width="2"/></svg>not looked for</span>
-<span><svg viewBox="0 0 16 16"><path d="M2.5 2.5h11v11h-11z" fill="none" stroke="#ebebeb"
-stroke-width="1"/></svg>window around the predicted place</span>
-<span><svg viewBox="0 0 16 16"><path d="M8 2v12M2 8h12" stroke="#f0e442"
-stroke-width="2"/></svg>desired</span>
-<span><svg viewBox="0 0 16 16"><circle cx="8" cy="8" r="2.5" fill="none" stroke="#64c8ff"
-stroke-width="2"/></svg>true</span>
-</p>"""
 
 
 def write_report(folder: Path) -> Path:
@@ -118,7 +104,7 @@ def _pictures(recording: Recording, camera: str) -> str:
         markup.picture(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
     )
     player = markup.film(film(recording, camera), poster=frames[0].jpeg)
-    return f'{player}{_MARKS}<div class="frames">{stills}</div>'
+    return f'{player}{marks_legend(recording.cameras[camera])}<div class="frames">{stills}</div>'
 
 
 def _target(recording: Recording) -> str:

@@ -39,6 +39,8 @@ def camera_rows(trace: CameraTrace) -> list[Row]:
         share = np.count_nonzero(trace.found & trace.asked) / asked
         note = "" if trace.asked.all() else "of those looked for"
         rows.append(Row("points found", f"{100 * share:.1f}", "%", note))
+    if (looked := np.count_nonzero(trace.asked.any(axis=1))) < len(trace.time):
+        rows.insert(1, Row("looked into", str(looked), "", "of the others no corner was chosen"))
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
         rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last picture"))
@@ -109,5 +111,9 @@ def _summary_row(name: str, value: float | str) -> Row:
     """Read the unit off a name's end, as our names have it."""
     ending = next((end for end in _UNITS if name.endswith(end)), "")
     words = name.removesuffix(ending).replace("_", " ")
-    shown = value if isinstance(value, str) else f"{value:.3g}"
-    return Row(words, shown, _UNITS.get(ending, ""))
+    unit = _UNITS.get(ending, "")
+    if isinstance(value, str):
+        return Row(words, value, unit)
+    if unit == "m" and abs(value) < 0.1:
+        value, unit = 1e3 * value, "mm"
+    return Row(words, f"{value:.3g}", unit)

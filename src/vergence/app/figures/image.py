@@ -83,7 +83,7 @@ def _ends(
     trace: CameraTrace, paths: FloatArray
 ) -> list[tuple[FloatArray, str, str, dict[str, Any]]]:
     """Return the points to mark, each kind with its marker, name and style."""
-    hollow = {"color": "#222", "markerfacecolor": "white", "markersize": 5, "zorder": 3}
+    hollow = {"color": "#222", "markerfacecolor": "white", "markersize": 7, "zorder": 3}
     solid = {"color": "#222", "markersize": 5, "zorder": 3}
     wanted = {"color": "#222", "markersize": 9, "markeredgewidth": 1.2, "zorder": 4}
     return [
