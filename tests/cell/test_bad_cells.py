@@ -9,15 +9,15 @@ import pytest
 
 from vergence.cell import built_in_cells, choose_renderer, load_cell
 from vergence.cell import renderer as renderer_module
-from vergence.cell.cell import BUILT_IN
 from vergence.errors import InputError, RenderingError
+from vergence.places import CELLS
 from vergence.runtime import run_cell
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A copy of the Puma's cell that may be spoilt."""
-    return Path(shutil.copytree(BUILT_IN / "puma560", tmp_path / "cell"))
+    return Path(shutil.copytree(CELLS / "puma560", tmp_path / "cell"))
 
 
 def spoil(file: Path, old: str, new: str) -> None:

@@ -9,8 +9,8 @@ import pytest
 from vergence.camera import Camera, write_camera
 from vergence.cell import Cell, load_cell
 from vergence.cell.build import intrinsics
-from vergence.cell.cell import BUILT_IN
 from vergence.errors import InputError
+from vergence.places import CELLS
 from vergence.runtime import run_cell
 
 BARREL = (-0.28, 0.09, 1e-3, -1.5e-3, 0.0)
@@ -53,13 +53,13 @@ def test_a_known_object_is_followed_by_its_pose_through_distorting_lenses() -> N
 
 def calibrated_cell(folder: Path, camera: Camera, extra: str = "") -> Path:
     """The eye-to-hand cell with a camera file in place of a lens."""
-    source = BUILT_IN / "eye_to_hand"
+    source = CELLS / "eye_to_hand"
     text = (source / "cell.toml").read_text()
     for old in ("resolution = [640, 480]\n", "focal_px = [900.0, 900.0]\n"):
         assert old in text
         text = text.replace(old, "")
     text = text.replace("rate_hz = 30.0", f'rate_hz = 30.0\ncalibration = "eye.yaml"\n{extra}')
-    text = text.replace('"../', f'"{BUILT_IN}/').replace('"plate', f'"{source}/plate')
+    text = text.replace('"../', f'"{CELLS}/').replace('"plate', f'"{source}/plate')
     tomllib.loads(text)
     write_camera(camera, folder / "eye.yaml")
     (folder / "cell.toml").write_text(text)

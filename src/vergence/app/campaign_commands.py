@@ -1,12 +1,13 @@
 """The options of `vergence compare` and `vergence map`."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vergence.errors import InputError
+from vergence.app import names
+from vergence.errors import InputError, nearest
+from vergence.places import find_cell
 
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 _Out = Annotated[
@@ -33,10 +34,10 @@ _Physics = Annotated[
 ]
 
 
-def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
+def register(app: typer.Typer) -> None:
     """Add the two commands to the command line."""
     cell_argument = typer.Argument(
-        help="Name of a built-in cell, a cell file or folder.", autocompletion=cell_names
+        help="Name of a built-in cell, a cell file or folder.", autocompletion=names.cells
     )
 
     @app.command(
@@ -49,7 +50,8 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
             typer.Option(
                 help="Names, with commas between: own (the cell's law), a name in the file's laws, "
                 "image_based, image_based_desired, image_based_mean, optimal_tracking, "
-                "constrained, constrained_tracking."
+                "constrained, constrained_tracking.",
+                autocompletion=names.laws,
             ),
         ] = "own,image_based,constrained",
         starts: Annotated[int, typer.Option(min=1, help="How many, for each law.")] = 20,
@@ -66,6 +68,7 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         as_json: _Json = False,
     ) -> None:
         """Run several laws from the same random starts: one table, and where each fails."""
+        find_cell(cell)  # a mistake is told before all is loaded
         from vergence.app.campaign import prepare
         from vergence.app.compare import compare as command
 
@@ -81,7 +84,10 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         cell: Annotated[str, cell_argument],
         over: Annotated[
             str,
-            typer.Option(help="places: the target goes to points of a square; or headings."),
+            typer.Option(
+                help="places: the target goes to points of a square; or headings.",
+                autocompletion=names.over,
+            ),
         ] = "places",
         extent: Annotated[
             float, typer.Option(min=0.0, help="Half a side of the square, or the way, in m.")
@@ -93,7 +99,10 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
             str, typer.Option(help="Of the target, m/s, with commas; places take the first.")
         ] = "0.1",
         laws: Annotated[
-            str, typer.Option(help="One or several, as for `vergence compare`.")
+            str,
+            typer.Option(
+                help="One or several, as for `vergence compare`.", autocompletion=names.laws
+            ),
         ] = "own",
         tolerance_px: _Tolerance = 2.0,
         workers: _Workers = None,
@@ -104,12 +113,13 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
         as_json: _Json = False,
     ) -> None:
         """Map where a cell's law works: how far it follows the target, and what ends it."""
+        if over not in names.OVER:
+            raise InputError("--over", "", over, nearest(over, names.OVER))
+        find_cell(cell)  # a mistake is told before all is loaded
         from vergence.app.campaign import prepare
         from vergence.app.map_region import Region
         from vergence.app.map_region import map_region as command
 
-        if over not in ("places", "headings"):
-            raise InputError("--over", "", over, "places, headings")
         region = Region(over, extent, steps, _speeds(speeds), _names(laws))
         source, how = prepare(
             "map", cell, settings or (), out, tolerance_px, workers, scheduler, physics
@@ -118,10 +128,10 @@ def register(app: typer.Typer, cell_names: Callable[[], list[str]]) -> None:
 
 
 def _names(text: str) -> tuple[str, ...]:
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    if not names:
+    given = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not given:
         raise InputError("--laws", "", text, "names with commas between")
-    return names
+    return given
 
 
 def _speeds(text: str) -> tuple[float, ...]:

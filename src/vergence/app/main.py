@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from vergence.app import campaign_commands
+from vergence.app import campaign_commands, names
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
+from vergence.places import find_recording
 
 app = typer.Typer(
     name="vergence",
@@ -34,16 +35,6 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
   vergence reproduce nelson1995 --quick                   a paper's experiments, checked
   vergence --help                 all commands
 """
-
-
-def _cell_names() -> list[str]:
-    """Return the built-in cells' names, for completion: from their folders, which is quick."""
-    cells = Path(__file__).parents[1] / "cells"
-    return sorted(folder.name for folder in cells.iterdir() if (folder / "cell.toml").is_file())
-
-
-def _papers() -> list[str]:
-    return list(PAPERS)
 
 
 def main() -> None:
@@ -75,7 +66,7 @@ def run(
     cell: Annotated[
         str,
         typer.Argument(
-            help="Name of a built-in cell, a cell file or folder.", autocompletion=_cell_names
+            help="Name of a built-in cell, a cell file or folder.", autocompletion=names.cells
         ),
     ],
     out: Out = None,
@@ -100,10 +91,17 @@ def run(
 
 @app.command(epilog="Example: vergence report runs/puma560-20250131-120000")
 def report(
-    run: Annotated[Path, typer.Argument(help="A run folder, finished or cut off.")],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="A run folder, finished or cut off, or its recording alone.",
+            autocompletion=names.recordings,
+        ),
+    ],
     as_json: Json = False,
 ) -> None:
     """Make the report of a recording again."""
+    find_recording(run)
     from vergence.app.report import write_report
 
     path = write_report(run)
@@ -119,11 +117,15 @@ def plan(
         str,
         typer.Argument(
             help="Name of a built-in cell, a cell file or folder, whose task is to reach.",
-            autocompletion=_cell_names,
+            autocompletion=names.cells,
         ),
     ],
     planner: Annotated[
-        str | None, typer.Option(help="optimised or potential_field, instead of the cell's.")
+        str | None,
+        typer.Option(
+            help="optimised or potential_field, instead of the cell's.",
+            autocompletion=names.planners,
+        ),
     ] = None,
     out: Out = None,
     seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
@@ -146,7 +148,7 @@ def plan(
 @app.command(epilog="Example: vergence reproduce nelson1995 --quick")
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(help=f"Which paper: {', '.join(PAPERS)}.", autocompletion=_papers)
+        str, typer.Argument(help=f"Which paper: {', '.join(PAPERS)}.", autocompletion=names.papers)
     ],
     quick: Annotated[
         bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
@@ -223,7 +225,7 @@ def watch(
         typer.Argument(
             metavar="CELL",
             help="Name of a built-in cell, a cell file or folder.",
-            autocompletion=_cell_names,
+            autocompletion=names.cells,
         ),
     ],
     out: Out = None,
@@ -259,32 +261,32 @@ def watch(
     raise typer.Exit(command(request))
 
 
-campaign_commands.register(app, _cell_names)
+campaign_commands.register(app)
 
 
 @app.command(epilog="Example: vergence bench control")
 def bench(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Which benchmarks; all if none.")
+    chosen: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="NAMES", help="Which benchmarks; all if none.", autocompletion=names.benchmarks
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the benchmarks, peers beside us."""
     from vergence.app.bench import bench as command
 
-    raise typer.Exit(command(names or (), as_json))
+    raise typer.Exit(command(chosen or (), as_json))
 
 
 @app.command(epilog="Example: vergence cells")
 def cells(as_json: Json = False) -> None:
     """List the cells that come with vergence."""
-    from vergence.cell import built_in_cells
-
-    names = built_in_cells()
     if as_json:
-        emit({"command": "cells", "cells": list(names)})
+        emit({"command": "cells", "cells": names.cells()})
         return
-    for name in names:
+    for name in names.cells():
         say(name)
 
 

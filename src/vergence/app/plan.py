@@ -31,13 +31,9 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
     Raises:
         InputError: if the cell cannot be read, or its task is not to reach.
     """
-    from vergence.app.plan_page import write_plan_page
-    from vergence.app.progress import working
     from vergence.app.run import overrides
     from vergence.cell import load_cell
     from vergence.cell.schema import ReachTable
-    from vergence.planning import Path as PlannedPath
-    from vergence.planning import Trajectory
 
     changes = overrides(request.settings)
     if request.planner is not None:
@@ -45,6 +41,11 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
     cell = load_cell(request.cell, changes, request.seed)
     if not isinstance(cell.task, ReachTable):
         raise InputError(str(cell.path), "task.kind", cell.task.kind, "reach")
+    from vergence.app.plan_page import write_plan_page
+    from vergence.app.progress import working
+    from vergence.planning import Path as PlannedPath
+    from vergence.planning import Trajectory
+
     with working("planning"):
         found = _planned(cell, cell.task, request.images)
     answer: dict[str, object] = {"command": "plan", "cell": cell.name, "found": bool(found)}

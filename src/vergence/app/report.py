@@ -20,19 +20,24 @@ from vergence.app.figures import (
 from vergence.app.marks_legend import marks_legend
 from vergence.app.pictures import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, run_rows
+from vergence.places import RECORDING
 from vergence.runtime.recording import CameraTrace, Recording
 
 REPORT = "report.html"
 
 
-def write_report(folder: Path) -> Path:
-    """Write the report of a run into its folder and return where it is.
+def write_report(run: Path) -> Path:
+    """Write the report of a run beside its recording and return where it is.
+
+    Args:
+        run: the run folder, or the recording alone.
 
     Raises:
         InputError: if the folder holds no recording.
     """
-    recording = Recording.open(folder)
-    path = recording.folder / REPORT
+    recording = Recording.open(run)
+    own = recording.path.name == RECORDING
+    path = recording.folder / REPORT if own else recording.path.with_suffix(".html")
     path.write_text(make_report(recording), encoding="utf-8")
     return path
 

@@ -21,10 +21,10 @@ def reproduce(paper: str, quick: bool, out: Path | None, in_json: bool) -> int:
     Raises:
         InputError: if there is no such paper.
     """
-    from vergence.app.study_page import write_study_page
-
     if paper not in PAPERS:
         raise InputError("paper", "", paper, nearest(paper, PAPERS))
+    from vergence.app.study_page import write_study_page
+
     folder = out or new_folder(paper)
     folder.mkdir(parents=True, exist_ok=True)
     result = _study(paper, folder, quick)

@@ -23,12 +23,13 @@ def run(
     as_json: bool,
 ) -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
+    from vergence.cell import load_cell
+
+    loaded = load_cell(cell, overrides(settings), seed)  # a mistake is told before all is loaded
     from vergence.app.progress import working
     from vergence.app.report import write_report
-    from vergence.cell import load_cell
     from vergence.runtime import Recorder
 
-    loaded = load_cell(cell, overrides(settings), seed)
     recorder = Recorder(out or new_folder(loaded.name), image_every)
     result = _recorded(loaded, recorder, images)
     with working("writing the report"):

@@ -1,5 +1,6 @@
 """A work cell as its file describes it."""
 
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +8,6 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
-from vergence.camera import read_camera
 from vergence.cell.schema import (
     TABLES,
     ArmTable,
@@ -23,8 +23,7 @@ from vergence.cell.schema import (
     TrackTable,
 )
 from vergence.errors import InputError, nearest
-
-BUILT_IN = Path(__file__).parents[1] / "cells"
+from vergence.places import find_cell
 
 
 class Cell(Table):
@@ -77,11 +76,6 @@ class Cell(Table):
         return _validate(values, self._path, self._text)
 
 
-def built_in_cells() -> tuple[str, ...]:
-    """Return the names of the cells that come with vergence."""
-    return tuple(sorted(folder.name for folder in BUILT_IN.iterdir() if _cell_file(folder)))
-
-
 def load_cell(
     name_or_path: str | Path, overrides: Mapping[str, str] | None = None, seed: int | None = None
 ) -> Cell:
@@ -96,7 +90,7 @@ def load_cell(
     Raises:
         InputError: if there is no such cell or anything in it cannot be used.
     """
-    path = _find(name_or_path)
+    path = find_cell(name_or_path)
     try:
         text = path.read_text()
         values = tomllib.loads(text)
@@ -109,21 +103,6 @@ def load_cell(
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
     return _validate(values, path, text)
-
-
-def _find(name_or_path: str | Path) -> Path:
-    for candidate in (Path(name_or_path), BUILT_IN / name_or_path):
-        if candidate.is_file():
-            return candidate.resolve()
-        if found := _cell_file(candidate):
-            return found.resolve()
-    allowed = "a cell file, or a built-in cell: " + nearest(str(name_or_path), built_in_cells())
-    raise InputError("cell", "", name_or_path, allowed)
-
-
-def _cell_file(folder: Path) -> Path | None:
-    file = folder / "cell.toml"
-    return file if file.is_file() else None
 
 
 def _nested(key: str, value: str) -> dict[str, Any]:
@@ -177,6 +156,8 @@ def _with_calibrations(values: dict[str, Any], path: Path) -> dict[str, Any]:
 
 def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, Any]:
     """Return a camera's table with the lens of its camera file."""
+    from vergence.camera import read_camera
+
     own = {key: value for key, value in table.items() if key != "calibration"}
     for key in ("resolution", "focal_mm", "pixel_um", "focal_px", "principal_px", "distortion"):
         if key in own:
@@ -204,6 +185,9 @@ def _explain(error: ValidationError, source: str, values: Any) -> InputError:
     if first["type"] == "union_tag_invalid":
         given, tags = first["ctx"]["tag"], first["ctx"]["expected_tags"].replace("'", "")
         return InputError(source, f"{key}.kind", given, nearest(given, tags.split(", ")))
+    if first["type"] == "literal_error":
+        choices = re.findall(r"'([^']*)'", first["ctx"]["expected"])
+        return InputError(source, key, first["input"], nearest(str(first["input"]), choices))
     message = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return InputError(source, key, first["input"], message)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vergence.cell import Cell, load_cell
-from vergence.cell.cell import BUILT_IN
+from vergence.places import CELLS
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class CellSource:
     ) -> "CellSource":
         """Return the source of a cell; refuse what `load_cell` refuses."""
         path = load_cell(name_or_path, overrides, seed).path
-        name = path.parent.name if path.parent.parent == BUILT_IN.resolve() else str(path)
+        name = path.parent.name if path.parent.parent == CELLS.resolve() else str(path)
         return cls(name, dict(overrides), seed)
 
     def load(self) -> Cell:

@@ -11,10 +11,10 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
+from vergence.places import find_recording
 from vergence.runtime.recording import wire
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
 from vergence.runtime.recording.run_info import RunInfo
-from vergence.runtime.recording.tape import RECORDING
 from vergence.runtime.recording.traces import (
     ArmTrace,
     CameraTrace,
@@ -41,7 +41,7 @@ class Event:
 class Recording:
     """A run as its folder tells it; open one with `Recording.open`."""
 
-    folder: Path
+    path: Path  # of the file
     info: RunInfo
     version: str  # of the vergence that wrote it
     arms: Mapping[str, ArmTrace]
@@ -53,19 +53,22 @@ class Recording:
     complete: bool  # whether the file ends as it should
 
     @classmethod
-    def open(cls, folder: str | Path) -> Self:
-        """Read the recording in a run folder, up to the cut if it was cut off.
+    def open(cls, run: str | Path) -> Self:
+        """Read a recording, up to the cut if it was cut off.
+
+        Args:
+            run: the run folder, or the recording alone.
 
         Raises:
             InputError: if there is no recording, or it is not one of ours.
         """
-        path = _recording_path(Path(folder))
+        path = find_recording(run)
         contents = McapContents.read(path, leave_out=_PICTURES)
         info, version = _introduction(path, contents)
         target = _rows(contents, "/target")
         end = contents.metadata.get("outcome")
         return cls(
-            folder=path.parent,
+            path=path,
             info=info,
             version=version,
             arms={
@@ -82,6 +85,11 @@ class Recording:
             summary=json.loads(end["summary"]) if end else {},
             complete=contents.complete and end is not None,
         )
+
+    @property
+    def folder(self) -> Path:
+        """The run folder."""
+        return self.path.parent
 
     @property
     def duration(self) -> float:
@@ -113,14 +121,7 @@ class Recording:
 
     def _pictures(self, camera: str) -> Iterator[wire.Fields]:
         topic = f"/camera/{camera}{_PICTURES}"
-        return map(wire.fields, messages_on(self.folder / RECORDING, topic))
-
-
-def _recording_path(folder: Path) -> Path:
-    path = folder / RECORDING if folder.is_dir() else folder
-    if path.name != RECORDING or not path.is_file():
-        raise InputError(str(folder), "", "no recording there", f"a run folder with a {RECORDING}")
-    return path
+        return map(wire.fields, messages_on(self.path, topic))
 
 
 def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:

@@ -11,15 +11,14 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Frame
 from vergence.features import ImagePoints
 from vergence.outcome import Outcome
+from vergence.places import CELL, RECORDING
 from vergence.runtime.recording import messages, streams
 from vergence.runtime.recording.mcap_file import McapFile
 from vergence.runtime.recording.numbers import finite
 from vergence.runtime.recording.run_info import RunInfo
 from vergence.runtime.recording.tick import TickRecord
 
-RECORDING = "recording.mcap"
 SUMMARY = "summary.json"
-CELL = "cell.toml"
 
 _FLUSH_PERIOD = 1.0  # s of the run that a killed process may lose
 

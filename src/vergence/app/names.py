@@ -1,0 +1,58 @@
+"""What the shell completes: looked up without loading anything heavy, for Tab must be quick."""
+
+from pathlib import Path
+
+from vergence.app.reproduce import PAPERS
+from vergence.places import RECORDING, built_in_cells
+
+LAWS = (  # the cell's own, and those that `vergence.runtime.campaign` knows
+    "own",
+    "image_based",
+    "image_based_desired",
+    "image_based_mean",
+    "optimal_tracking",
+    "constrained",
+    "constrained_tracking",
+)
+PLANNERS = ("optimised", "potential_field")
+OVER = ("places", "headings")
+_BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
+
+
+def cells() -> list[str]:
+    """Return the names of the cells that come with vergence."""
+    return list(built_in_cells())
+
+
+def papers() -> list[str]:
+    """Return the studies that can be reproduced."""
+    return list(PAPERS)
+
+
+def planners() -> list[str]:
+    """Return the planners."""
+    return list(PLANNERS)
+
+
+def over() -> list[str]:
+    """Return what a map can be made over."""
+    return list(OVER)
+
+
+def benchmarks() -> list[str]:
+    """Return the benchmarks of a source checkout."""
+    return sorted(path.stem.removeprefix("bench_") for path in _BENCHMARKS.glob("bench_*.py"))
+
+
+def recordings(incomplete: str) -> list[str]:
+    """Return run folders: those here, and those in runs/, the newest first."""
+    found = [*Path().glob(f"*/{RECORDING}"), *Path("runs").glob(f"*/{RECORDING}")]
+    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    return [name for path in newest if (name := str(path.parent)).startswith(incomplete)]
+
+
+def laws(incomplete: str) -> list[str]:
+    """Return the lists of laws that a list with commas may go on to."""
+    done, comma, begun = incomplete.rpartition(",")
+    taken = done.split(",")
+    return [done + comma + law for law in LAWS if law.startswith(begun) and law not in taken]

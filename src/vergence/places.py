@@ -1,0 +1,46 @@
+"""Where cells and recordings are found by the names that people type."""
+
+from pathlib import Path
+
+from vergence.errors import InputError, nearest
+
+CELLS = Path(__file__).parent / "cells"  # those that come with vergence
+CELL = "cell.toml"
+RECORDING = "recording.mcap"
+
+
+def built_in_cells() -> tuple[str, ...]:
+    """Return the names of the cells that come with vergence."""
+    return tuple(sorted(folder.name for folder in CELLS.iterdir() if (folder / CELL).is_file()))
+
+
+def find_cell(name_or_path: str | Path) -> Path:
+    """Return the file of a cell.
+
+    Args:
+        name_or_path: the name of a built-in cell, a cell file, or a folder that holds `cell.toml`.
+
+    Raises:
+        InputError: if there is no such cell.
+    """
+    for candidate in (Path(name_or_path), CELLS / name_or_path):
+        for file in (candidate, candidate / CELL):
+            if file.is_file():
+                return file.resolve()
+    allowed = "a cell file, or a built-in cell: " + nearest(str(name_or_path), built_in_cells())
+    raise InputError("cell", "", name_or_path, allowed)
+
+
+def find_recording(path: str | Path) -> Path:
+    """Return the file of a recording.
+
+    Args:
+        path: a run folder, or the recording alone under whatever name.
+
+    Raises:
+        InputError: if there is none.
+    """
+    for file in (Path(path), Path(path) / RECORDING):
+        if file.is_file():
+            return file
+    raise InputError(str(path), "", "no recording there", f"a run folder with a {RECORDING}")
