@@ -1,8 +1,11 @@
 """The command line answers in words or JSON, with the exit code that fits."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -118,6 +121,31 @@ def test_a_mistake_is_one_message_and_exit_code_two(
     assert written.out == ""
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "puma56"],
+        ["run", "puma560", "--set", "durations_s=3"],
+        ["plan", "gantry", "--planner", "none"],
+        ["compare", "puma56"],
+        ["map", "puma560", "--over", "heading"],
+        ["report", "nowhere"],
+        ["reproduce", "nelson1996"],
+    ],
+)
+def test_a_mistake_is_told_before_anything_heavy_is_loaded(arguments: list[str]) -> None:
+    script = (
+        "import sys; from vergence.app.main import main\n"
+        f"sys.argv = ['vergence', *{arguments}]\n"
+        "try: main()\nexcept SystemExit: print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert "given" in done.stderr
+    assert not {"numba", "cv2", "mujoco", "matplotlib", "foxglove"} & set(done.stdout.split())
+
+
 def test_a_folder_that_cannot_be_written_is_a_mistake(
     command: Command, capsys: object, tmp_path: Path
 ) -> None:
@@ -149,9 +177,69 @@ def test_an_interrupted_run_leaves_a_recording_and_says_where(
     assert recording.duration == pytest.approx(29 / 30)
 
 
+def test_ctrl_c_ends_a_run_with_a_whole_recording(tmp_path: Path) -> None:
+    run = subprocess.Popen(
+        [sys.executable, "-m", "vergence.app.main", "run", "puma560", "--out", "cut"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    recording = tmp_path / "cut" / "recording.mcap"
+    while run.poll() is None and not (recording.is_file() and recording.stat().st_size > 500_000):
+        time.sleep(0.05)
+    run.send_signal(signal.SIGINT)
+    said, error = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert error == ""
+    assert said.startswith("stopped at")
+    assert "stopped by the user" in said
+    kept = Recording.open(recording)
+    assert kept.complete
+    assert kept.outcome.kind is OutcomeKind.STOPPED
+    assert (tmp_path / "cut" / "report.html").is_file()
+
+
 def test_a_report_is_made_again(command: Command, capsys: object, run_folder: Path) -> None:
     assert command("report", str(run_folder), "--json") == 0
     assert json.loads(capsys.readouterr().out)["report"] == str(run_folder / "report.html")
+
+
+def test_a_recording_sent_alone_has_a_report_under_its_name(
+    command: Command, run_folder: Path
+) -> None:
+    Path("from-anna.mcap").write_bytes((run_folder / "recording.mcap").read_bytes())
+    assert command("report", "from-anna.mcap") == 0
+    assert "made-up" in Path("from-anna.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("run pum", ["puma560"]),
+        ("reproduce mez", ["mezouar2001"]),
+        ("compare panda --laws own,opt", ["own,optimal_tracking"]),
+        ("plan gantry --planner p", ["potential_field"]),
+        ("map puma560 --over h", ["headings"]),
+        ("report runs/", ["runs/mine-1"]),
+        ("bench loo", ["loop"]),
+    ],
+)
+def test_tab_completes(tmp_path: Path, line: str, expected: list[str]) -> None:
+    (tmp_path / "runs" / "mine-1").mkdir(parents=True)
+    (tmp_path / "runs" / "mine-1" / "recording.mcap").touch()
+    words = f"vergence {line}"
+    asked = {"_VERGENCE_COMPLETE": "complete_bash", "COMP_WORDS": words}
+    place = {"COMP_CWORD": str(len(words.split()) - 1)}
+    program = "import sys; sys.argv[0] = 'vergence'; from vergence.app.main import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=os.environ | asked | place,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == expected
 
 
 def test_built_in_cells_are_listed(command: Command, capsys: object) -> None:

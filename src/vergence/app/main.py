@@ -28,12 +28,15 @@ Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of r
 
 _NEXT = """vergence servoes robot arms by what their cameras see.
 
-  vergence run puma560            a Puma 560 follows a moving board; ends with a report to open
-  vergence run puma560 --no-images --set duration_s=5     the same in a blink, without pictures
-  vergence cells                  the cells that come with vergence
-  vergence compare panda          several laws from the same random starts
-  vergence reproduce nelson1995 --quick                   a paper's experiments, checked
-  vergence --help                 all commands
+  vergence run puma560                    an arm follows a moving board; ends with a report to open
+  vergence watch puma560                  the same in your browser, as it happens
+  vergence run puma560 --no-images --set duration_s=5     in a blink, without pictures
+  vergence cells                          the cells that come with vergence
+  vergence compare panda                  several laws from the same random starts
+  vergence reproduce nelson1995 --quick   a paper's experiments, checked
+
+  vergence --help                         all commands; each has --help with an example
+  vergence --install-completion           names at the press of Tab
 """
 
 
