@@ -87,6 +87,15 @@ def test_through_rendered_images_both_pictures_come_out_as_wanted():
     np.testing.assert_allclose(ends.position, GOAL, atol=np.deg2rad(0.3))
 
 
+def test_the_constrained_law_serves_both_within_its_margins():
+    ends = Ends()
+    law = {"kind": "constrained", "gain": 2.0, "view_margin_px": 40.0}
+    result = run_cell(load_cell("wrist_and_wall").replace(law=law), [ends], images=False)
+    assert result.outcome.succeeded
+    assert max(ends.error_px.values()) < 0.5
+    np.testing.assert_allclose(ends.position, GOAL, atol=np.deg2rad(0.5))
+
+
 def test_a_wall_camera_that_goes_blind_is_told_of_and_leaves_the_rest_to_the_wrist():
     ends = Ends()
     blind = {"wall": {"blind_s": [[0.3, 9.0]]}}
@@ -100,7 +109,8 @@ def test_a_wall_camera_that_goes_blind_is_told_of_and_leaves_the_rest_to_the_wri
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"law": {"kind": "constrained"}}, r"law\.kind.*plain, the law that serves two"),
+        ({"law": {"kind": "optimal_tracking"}}, r"law\.kind.*plain or constrained"),
+        ({"law": {"objective": "optimal_tracking"}}, r"law\.objective.*image_based"),
         ({"cameras": {"wall": {"arm": "puma"}}}, r"task\.tool\.camera.*a fixed camera"),
         ({"task": {"tool": {"camera": "walls"}}}, r"task\.tool\.camera.*wall"),
         ({"task": {"tool": {"desired": [[1, 1]]}}}, r"task\.tool\.desired.*2 points"),

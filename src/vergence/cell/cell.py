@@ -240,8 +240,8 @@ def _check_tool(cell: Cell, tool: ToolTable) -> None:
         refuse("task.tool.camera", f"{tool.camera}, which {carrier} carries", "a fixed camera")
     if cell.cameras[cell.task.camera].arm is None:
         refuse("task.tool", "a second fixed camera", "a task.camera that the arm carries")
-    if cell.law.kind != "plain":
-        refuse("law.kind", cell.law.kind, "plain, the law that serves two cameras at once")
+    if cell.law.kind not in ("plain", "constrained"):
+        refuse("law.kind", cell.law.kind, "plain or constrained, which serve two cameras at once")
 
 
 def _check_sight(cell: Cell) -> None:

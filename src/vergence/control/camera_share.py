@@ -1,37 +1,35 @@
 """One camera's share in a task that several cameras look after."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control.objective import Objective
-from vergence.robot import Arm, JointState
+from vergence.geometry import se3_adjoint, se3_inverse
 
 
 @dataclass(frozen=True, slots=True)
 class CameraShare:
-    """What one camera is to see, and how the arm moves it.
+    """What one camera is to see: of the world, from the hand, or of the hand, from where it stands.
 
-    A fixed camera that looks at the hand is carried by the arm walked backwards, see
-    `vergence.robot.reverse_arm`: its joints are those of the task's arm from the hand to the base.
+    What a fixed camera sees of the hand moves as if the hand stood and the camera moved, with the
+    twist v = -Ad(T_camera_hand) v_hand: its objective is one in the twist of the hand as well.
     """
 
-    arm: Arm  # up to the camera
     camera: Camera
     objective: Objective
     depth_m: FloatArray  # (M,) believed depth of its features
-    backwards: bool = False  # whether the camera is fixed
+    T_world_camera: FloatArray | None = None  # (4, 4) of a fixed camera; None for one in the hand
 
-    def joints(self, joints: JointState) -> JointState:
-        """Return the task's arm's joints in the order of this camera's arm."""
-        if not self.backwards:
-            return joints
-        position, velocity = frozen(joints.position[::-1]), frozen(joints.velocity[::-1])
-        return replace(joints, position=position, velocity=velocity)
+    def twist_of(self, T_world_hand: FloatArray) -> FloatArray:
+        """Return A (6, 6): this camera's twist is A v_hand, both in their own axes.
 
-    def jacobian(self, joints: JointState) -> FloatArray:
-        """Return J (6, n) of this camera, columns in the order of the task's arm."""
-        J = self.arm.jacobian(self.joints(joints).position)
-        return np.ascontiguousarray(J[:, ::-1]) if self.backwards else J
+        Args:
+            T_world_hand: (4, 4); a camera in the hand is itself the hand.
+        """
+        if self.T_world_camera is None:
+            return np.eye(6)
+        A: FloatArray = -se3_adjoint(se3_inverse(self.T_world_camera) @ T_world_hand)
+        return A

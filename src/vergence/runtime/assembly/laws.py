@@ -84,13 +84,7 @@ def _arm(cell: Cell, driver: SimulatedDriver) -> Arm:
     world = driver.world
     if not _is_fixed(cell):
         return world.arm_to_camera(cell.task.camera)
-    return _arm_backwards(cell, driver, cell.task.camera)
-
-
-def _arm_backwards(cell: Cell, driver: SimulatedDriver, camera: str) -> Arm:
-    """Return the arm that carries a fixed camera as the hand of the task's arm sees it."""
-    hand = driver.world.arm_to_body(cell.task.arm)
-    return reverse_arm(hand, driver.world.camera_pose(camera))
+    return reverse_arm(world.arm_to_body(cell.task.arm), world.camera_pose(cell.task.camera))
 
 
 def _optimal_tracking(
@@ -138,6 +132,8 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
         return _constrained_pose(cell, driver, table)
     depth = _depth(driver, cell.task.camera, table.depth_m)
     solver = _solver(cell, driver, table, 1.0 / cell.cameras[cell.task.camera].rate_hz, (0.5, 2.0))
+    if cell.tool is not None:
+        return _several_cameras(cell, driver, table, cell.tool.camera, solver)
     wanted = _objective(cell, driver, table, objective, cell.task.camera)
     law = ConstrainedLaw(solver, wanted, depth, flow_smoothing_s=table.flow_smoothing_s)
     return _to_hand(cell, law)
@@ -196,21 +192,30 @@ def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
 
 
 def _several_cameras(
-    cell: Cell, driver: SimulatedDriver, table: PlainTable, fixed: str
+    cell: Cell,
+    driver: SimulatedDriver,
+    table: ConstrainedTable | PlainTable,
+    fixed: str,
+    solver: ConstrainedSolver | None = None,
 ) -> SeveralCamerasLaw:
-    carried, smoothing = cell.task.camera, table.flow_smoothing_s
-    arms = {carried: _arm(cell, driver), fixed: _arm_backwards(cell, driver, fixed)}
+    if table.objective == "optimal_tracking":
+        raise InputError(str(cell.path), "law.objective", table.objective, "image_based")
+    world, smoothing = driver.world, table.flow_smoothing_s
     shares = {
         name: CameraShare(
-            arm,
             driver.cameras[name],
-            _objective(cell, driver, table, table.objective, name),
+            _objective(cell, driver, table, "image_based", name),
             _depth(driver, name, table.depth_m),
-            backwards=name == fixed,
+            world.camera_pose(name) if name == fixed else None,
         )
-        for name, arm in arms.items()
+        for name in (cell.task.camera, fixed)
     }
-    return SeveralCamerasLaw(shares, flow_smoothing_s=np.inf if smoothing is None else smoothing)
+    return SeveralCamerasLaw(
+        _arm(cell, driver),
+        shares,
+        solver=solver,
+        flow_smoothing_s=np.inf if smoothing is None else smoothing,
+    )
 
 
 def _objective(
