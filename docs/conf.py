@@ -25,7 +25,7 @@ extensions = [
     "mathml",
     "references",
 ]
-exclude_patterns = ["_build", "extensions"]
+exclude_patterns = ["_build", "extensions", "**/_*.md"]  # what begins with _ is included
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

@@ -9,6 +9,7 @@ import contextlib
 import io
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,8 +19,11 @@ from typing import NamedTuple
 import pytest
 from markdown_it import MarkdownIt
 
+from vergence.app.main import main
+
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
+README = DOCS.parent / "README.md"
+PAGES = [README, *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 SHOWN_ONLY = {"{literalinclude}", "{toctree}", "{eval-rst}", "{cell-file}", "{command-line}"}
 SHOWN_ONLY |= {"{figure}", "{image}", "{note}", "{checks}", "{include}"}
 
@@ -63,21 +67,39 @@ def run_python(block: Block, names: dict[str, object], page: Path) -> str:
 
 
 def run_shell(block: Block) -> str:
+    """Run a block: a command of ours in this process, which spares its start, else by a shell."""
     ending = re.fullmatch(r"ends with exit code (\d)", block.caption)
+    plain = block.text.startswith("vergence ") and not re.search(r"[$|&;<>]|\n.", block.text)
+    code, said = run_command(shlex.split(block.text)) if plain else run_in_shell(block.text)
+    assert code == (int(ending[1]) if ending else 0), f"line {block.line}:\n{said}"
+    return said
+
+
+def run_command(words: list[str]) -> tuple[int, str]:
+    said, code = io.StringIO(), None
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+    ):
+        patch.setattr(sys, "argv", words)
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+    return (code if isinstance(code, int) else 0), said.getvalue()
+
+
+def run_in_shell(text: str) -> tuple[int, str]:
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     run = subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", block.text],
-        env=os.environ
-        | {
-            "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-            "PYTHONPATH": str(DOCS.parent / "src"),
-            "COLUMNS": "120",
-        },
-        capture_output=True,
+        ["bash", "-e", "-o", "pipefail", "-c", text],
+        env=os.environ | {"PATH": path, "PYTHONPATH": str(DOCS.parent / "src")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
     )
-    said = run.stdout + run.stderr
-    assert run.returncode == (int(ending[1]) if ending else 0), f"line {block.line}:\n{said}"
-    return said
+    return run.returncode, run.stdout
 
 
 def assert_prints(shown: str, said: str, where: str) -> None:
@@ -87,13 +109,13 @@ def assert_prints(shown: str, said: str, where: str) -> None:
         assert any(re.fullmatch(pattern, line) for line in lines), f"{where}: {wanted}\n{said}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS.parent).as_posix())
 def test_every_snippet_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "__main__"}
     said = ""
     for block in blocks(page):
-        if block.language == "text":
+        if block.language == "text" and not block.caption:
             assert_prints(block.text, said, f"line {block.line}")
         elif block.language == "sh":
             said = run_shell(block)

@@ -1,0 +1,108 @@
+"""Make what the documentation shows of our own runs: figures, checks, the table of the laws.
+
+    scripts/make_docs_figures.py [nelson1995 lippiello2005 mezouar2001 guarantees laws]
+
+It runs `vergence reproduce` and `vergence compare` in full, which takes about half an hour, and
+writes pictures into docs/images and tables into docs/papers and docs/guide. What is already in
+build/docs is not run again: delete it to start afresh.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+PROJECT = Path(__file__).parents[1]
+DOCS = PROJECT / "docs"
+BUILD = PROJECT / "build" / "docs"
+VERGENCE = Path(sys.executable).with_name("vergence")
+
+PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees")
+LAWS = "image_based,image_based_desired,image_based_mean,optimal_tracking,constrained"
+STARTS = 40
+COMPARED = ("ur5", "panda")
+
+
+def answer(name: str, *command: str) -> dict[str, Any]:
+    """Run a command of vergence once; return what it answers."""
+    file = BUILD / f"{name}.json"
+    if not file.is_file():
+        print("vergence", *command, flush=True)
+        BUILD.mkdir(parents=True, exist_ok=True)
+        run = subprocess.run(
+            [VERGENCE, *command, "--out", BUILD / name, "--json"], stdout=subprocess.PIPE
+        )
+        file.write_bytes(run.stdout)
+    result: dict[str, Any] = json.loads(file.read_text())
+    return result
+
+
+def reproduce(paper: str) -> None:
+    """Write a study's checks and figures."""
+    checks = answer(paper, "reproduce", paper)["checks"]
+    lines = ["| check | the paper | measured | holds |", "|---|---|--:|---|"]
+    for check in checks:
+        measured = f"{check['measured']:.3g} {check['unit']}".strip()
+        said = check["paper"].replace("|", "\\|")
+        holds = "yes" if check["holds"] else "**no**"
+        lines.append(f"| `{check['name']}` | {said} | {measured} | {holds} |")
+    held = sum(check["holds"] for check in checks)
+    lines += ["", f"{held} of {len(checks)} checks hold. What was measured besides:", ""]
+    lines += [f"- `{check['name']}`: {check['note']}" for check in checks if check["note"]]
+    (DOCS / "papers" / f"_{paper}.md").write_text("\n".join(lines) + "\n")
+    pictures = DOCS / "images" / paper
+    pictures.mkdir(parents=True, exist_ok=True)
+    for old in pictures.glob("*.svg"):
+        old.unlink()
+    for drawing in sorted((BUILD / paper).glob("*.svg")):
+        (pictures / drawing.name).write_text(slim(drawing.read_text()))
+
+
+def slim(svg: str) -> str:
+    """Drop what of an SVG no screen shows: digits, comments, indents."""
+    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"\s*\n\s*", "\n", svg)
+    svg = re.sub(r"-?\d{2,}\.\d{2,}", lambda number: f"{float(number[0]):.1f}", svg)
+    return re.sub(r"-?\d\.\d{3,}", lambda number: f"{float(number[0]):.2g}", svg)
+
+
+def compare() -> None:
+    """Write the table of the laws."""
+    lines = []
+    for cell in COMPARED:
+        options = ("--laws", LAWS, "--starts", str(STARTS))
+        still = ("--set", 'target.motion={kind="still"}', "--set", "duration_s=8")
+        found = answer(f"laws-{cell}", "compare", cell, *options, *still)
+        lines += [f"**{cell}**", "", *_table(found["laws"]), ""]
+    (DOCS / "guide" / "_laws.md").write_text("\n".join(lines))
+
+
+def _table(laws: list[dict[str, Any]]) -> list[str]:
+    endings = [
+        key for key in laws[0] if key not in ("law", "starts") and not key.startswith("median")
+    ]
+    shown = [key for key in endings if any(law[key] for law in laws)]
+    titles = ["law", *(key.replace("_", " ") for key in shown), "time (s)", "path (m)"]
+    lines = ["| " + " | ".join(titles) + " |", "|---" + "|--:" * (len(titles) - 1) + "|"]
+    for law in laws:
+        medians = (law["median_time_s"], law["median_path_m"])
+        counts = [str(law[key]) for key in shown]
+        cells = [f"`{law['law']}`", *counts, *("–" if m is None else f"{m:.2f}" for m in medians)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def main() -> None:
+    """Make what is named on the command line, or all."""
+    wanted = sys.argv[1:] or [*PAPERS, "laws"]
+    for name in wanted:
+        if name == "laws":
+            compare()
+        else:
+            reproduce(name)
+
+
+if __name__ == "__main__":
+    main()

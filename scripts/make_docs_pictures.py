@@ -1,0 +1,126 @@
+"""Make the pictures of the documentation's guides; the report's needs Chromium on the path.
+
+It reads the cell of docs/guide/own-arm.md from that page, so picture and page go together.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from vergence.cell import choose_renderer
+
+choose_renderer()
+
+import cv2  # noqa: E402
+import mujoco  # noqa: E402
+import numpy as np  # noqa: E402
+
+from vergence.cell import load_cell  # noqa: E402
+from vergence.cell.world import World  # noqa: E402
+from vergence.runtime import run_cell  # noqa: E402
+
+DOCS = Path(__file__).parents[1] / "docs"
+VERGENCE = Path(sys.executable).with_name("vergence")
+GREEN, ORANGE, WHITE = (115, 158, 0), (0, 159, 230), (255, 255, 255)  # BGR
+
+
+class Snapshot:
+    """Keeps the tick nearest to an instant that has a picture."""
+
+    def __init__(self, time: float) -> None:
+        self.time, self.record = time, None
+
+    def begin(self, info): ...
+
+    def tick(self, record):
+        if record.time <= self.time and record.sample.frames and record.observation:
+            self.record = record
+
+    def event(self, time, name, text): ...
+
+    def close(self, outcome, summary): ...
+
+
+def own_arm() -> None:
+    """The arm of the page from outside, and what its camera sees."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = (DOCS / "guide" / "own-arm.md").read_text()
+        for name, text in re.findall(r":caption: xarm/(\S+)\n(.*?)```", page, re.DOTALL):
+            Path(folder, name).write_text(text)
+        cell = load_cell(folder)
+        snapshot = Snapshot(2.0)
+        run_cell(cell, [snapshot])
+        both = np.hstack([outside(cell, snapshot.record), inside(snapshot.record)])
+    cv2.imwrite(str(DOCS / "images" / "own-arm.jpg"), cv2.resize(both, None, fx=0.7, fy=0.7))
+
+
+def own_object() -> None:
+    """The last picture of the page's footage, with the object drawn in by `vergence track`."""
+    page = (DOCS / "guide" / "own-object.md").read_text()
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in re.findall(r":caption: (wedge/\S+)\n(.*?)```", page, re.DOTALL):
+            file = Path(folder, name)
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text)
+        footage = re.search(r"```python\n(.*?)```", page, re.DOTALL)[1]
+        subprocess.run([sys.executable, "-c", footage], cwd=folder, check=True)
+        track = re.search(r"vergence (track .*)", page)[1].split()
+        subprocess.run([VERGENCE, *track], cwd=folder, check=True)
+        shutil.copy(Path(folder, "tracked", "frame-000014.jpg"), DOCS / "images/own-object.jpg")
+
+
+def outside(cell, record):
+    """Render the cell as it stood."""
+    world = World(cell)
+    frame = record.sample.frames[-1]
+    world.place_arm("xarm", frame.joints["xarm"])
+    world.move_target(frame.truth.T_world_target)
+    world.update()
+    world.model.vis.global_.offwidth, world.model.vis.global_.offheight = 640, 480
+    renderer = mujoco.Renderer(world.model, 480, 640)
+    view = mujoco.MjvCamera()
+    view.lookat, view.distance, view.azimuth, view.elevation = [0.2, 0, 0.27], 1.15, 130, -18
+    renderer.update_scene(world.data, view)
+    picture = renderer.render()[..., ::-1].copy()
+    picture[picture.sum(axis=2) == 0] = (244, 240, 236)
+    return picture
+
+
+def inside(record):
+    """Draw tracked and wanted points into the camera's picture."""
+    picture = cv2.cvtColor(record.sample.frames[-1].image, cv2.COLOR_GRAY2BGR)
+    for points_px, color, kind in (
+        (record.reference.points_px, ORANGE, cv2.MARKER_CROSS),
+        (record.observation.views[-1].points_px, GREEN, cv2.MARKER_SQUARE),
+    ):
+        for u, v in points_px:
+            place = (round(u), round(v))
+            cv2.drawMarker(picture, place, WHITE, kind, 26, 5, cv2.LINE_AA)
+            cv2.drawMarker(picture, place, color, kind, 24, 2, cv2.LINE_AA)
+    return picture
+
+
+def report() -> None:
+    """The head of the report of the tutorial's first run."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        raise SystemExit("the picture of the report needs chromium on the path")
+    with tempfile.TemporaryDirectory() as folder:
+        run = ("run", "puma560", "--set", "duration_s=4", "--out", folder)
+        subprocess.run([VERGENCE, *run], check=True)
+        shot = Path(folder, "shot.png")
+        flags = ("--headless", "--no-sandbox", "--use-angle=swiftshader", "--hide-scrollbars")
+        size = ("--window-size=1100,1010", f"--screenshot={shot}", f"--user-data-dir={folder}/b")
+        page = f"file://{folder}/report.html"
+        subprocess.run([browser, *flags, *size, page], check=True, stderr=subprocess.DEVNULL)
+        picture = cv2.resize(cv2.imread(str(shot)), (825, 758), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(DOCS / "images" / "report.jpg"), picture)
+
+
+if __name__ == "__main__":
+    own_arm()
+    own_object()
+    report()
