@@ -51,6 +51,14 @@ def test_by_pose_it_matters_not_where_the_only_camera_is_believed_to_stand():
     assert result.summary["final_hand_error_deg"] < 0.5
 
 
+def test_by_pose_the_constrained_law_gets_there_too():
+    law = {"kind": "constrained", "filter_hz": 0.4}
+    result = run_cell(load_cell("eye_to_hand_pose").replace(law=law), images=False)
+    assert result.outcome.succeeded
+    assert result.summary["final_hand_error_m"] < 1e-3
+    assert result.summary["final_hand_error_deg"] < 0.3
+
+
 def test_a_camera_that_moves_with_the_target_is_refused():
     with pytest.raises(InputError, match=r"task\.camera.*does not move with it"):
         load_cell("eye_to_hand_pose").replace(cameras={"front": {"arm": "puma"}})

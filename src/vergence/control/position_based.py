@@ -131,7 +131,8 @@ class PositionBasedLaw:
             said = self._keeper.report()
             answer = self._keep(self._keeper, joints, self._reference)[0]
             measures = answer.manipulability, answer.penalty
-            return JointCommand(answer.rates, answer.v_camera, *measures, said)
+            v_camera = self._camera_twist(joints.position, answer.rates)
+            return JointCommand(answer.rates, v_camera, *measures, said)
         rates = self._rates(joints, self._reference)[0]
         return JointCommand(rates, self._camera_twist(joints.position, rates))
 

@@ -61,10 +61,18 @@ class TargetKeeper:
             twist: wanted of the hand, in its own axes, (6,).
             spare: rates wanted of joints that the hand leaves a choice, (n,).
         """
+        return self._answer(position, velocity, spare, TwistObjective(np.eye(6), twist))
+
+    def _answer(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        spare: FloatArray,
+        objective: TwistObjective,
+    ) -> ConstrainedRates:
         features = pose_features(
             self._solver.arm.chain, position, *self._target, self._kept, self._covariance
         )
-        objective = TwistObjective(np.eye(6), twist)
         answer = self._solver.solve(position, velocity, objective, features, spare)
         self._active = np.maximum(self._active, answer.active)
         self._given_up = np.maximum(self._given_up, answer.given_up)

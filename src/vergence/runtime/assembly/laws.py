@@ -23,6 +23,7 @@ from vergence.control import (
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
+from vergence.control.held_target_keeper import HeldTargetKeeper
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
@@ -84,7 +85,12 @@ def _arm(cell: Cell, driver: SimulatedDriver) -> Arm:
     world = driver.world
     if not _is_fixed(cell):
         return world.arm_to_camera(cell.task.camera)
-    return reverse_arm(world.arm_to_body(cell.task.arm), world.camera_pose(cell.task.camera))
+    return reverse_arm(world.arm_to_target(), _believed_pose(cell, driver))
+
+
+def _believed_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:
+    """Return T_world_camera (4, 4) of the task's camera, which is fixed."""
+    return camera_poses(cell, driver)(cell.task.camera, {})
 
 
 def _optimal_tracking(
@@ -142,14 +148,10 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
 def _constrained_pose(
     cell: Cell, driver: SimulatedDriver, table: ConstrainedTable
 ) -> PositionBasedLaw:
-    if _is_fixed(cell):
-        given = f"{cell.task.camera}, which stands, with objective = 'position_based'"
-        raise InputError(str(cell.path), "task.camera", given, "a camera in the hand")
-    period = 1.0 / driver.inner_rate_hz
-    solver = _solver(cell, driver, table, period, (0.9, 1.1))
-    keeper = TargetKeeper(solver, target_shape(cell, driver).corners)
-    trajectory = table.model_dump(include=set(PoseTrajectoryTable.model_fields))
-    return PositionBasedLaw(_arm(cell, driver), period, **trajectory, keeper=keeper)
+    solver = _solver(cell, driver, table, 1.0 / driver.inner_rate_hz, (0.9, 1.1))
+    keeper_of = HeldTargetKeeper if _is_fixed(cell) else TargetKeeper
+    keeper = keeper_of(solver, target_shape(cell, driver).corners)
+    return _position_based(cell, driver, table, keeper)
 
 
 def _solver(
@@ -249,14 +251,16 @@ def _depth(driver: SimulatedDriver, camera: str, given: float | str) -> FloatArr
 
 
 def _position_based(
-    cell: Cell, driver: SimulatedDriver, table: PositionBasedTable
+    cell: Cell,
+    driver: SimulatedDriver,
+    table: PositionBasedTable | ConstrainedTable,
+    keeper: TargetKeeper | None = None,
 ) -> PositionBasedLaw:
-    camera, T_world_camera = cell.task.camera, None
-    if fixed := _is_fixed(cell):
-        T_world_camera = camera_poses(cell, driver)(camera, {})
+    world, fixed = driver.world, _is_fixed(cell)
     return PositionBasedLaw(
-        driver.world.arm_to_target() if fixed else driver.world.arm_to_camera(camera),
+        world.arm_to_target() if fixed else world.arm_to_camera(cell.task.camera),
         1.0 / driver.inner_rate_hz,
-        T_world_camera=T_world_camera,
-        **table.model_dump(exclude={"kind"}),
+        T_world_camera=_believed_pose(cell, driver) if fixed else None,
+        **table.model_dump(include={*PoseTrajectoryTable.model_fields, "singular_below"}),
+        keeper=keeper,
     )
