@@ -1,4 +1,8 @@
-"""One constrained tick: six and seven joints, four and nine points, every constraint in force."""
+"""One constrained tick: six and seven joints, four and nine points, every constraint in force.
+
+The peers do less: ViSP bends its law at joint limits, which it may pass; mink and pink hold joint
+positions and rates while the flange goes to a pose, and know of no picture.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -7,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from harness import calls, loops, row
-from peer_programs import visp
+from peer_programs import mink, pink, visp
 from vergence.arrays import FloatArray
 from vergence.cell import SimulatedDriver, load_cell
 from vergence.control.constrained_rates import constrained_rates
@@ -85,8 +89,9 @@ def run() -> list[dict[str, Any]]:
         tick = tick_of(cell, count)
         packed = arguments(tick)
         name = f"constrained tick: {joints} joints, {count} points"
-        peer = visp("tick_joint_limits") if count == 4 else None
-        rows.append(row(name, calls(from_python(tick)), peer, value_aim=12.0))
+        ours = calls(from_python(tick))
+        peers = [visp("tick_joint_limits"), mink(), pink()] if count == 4 else [None]
+        rows += [row(name, ours, peer, value_aim=12.0) for peer in peers]
         inside = loops(lambda n, packed=packed: repeat(n, *packed))
         rows.append(row(f"{name}, inside a kernel", inside, value_aim=8.0))
     return rows

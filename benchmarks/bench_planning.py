@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from harness import Peer, calls, row
+from peer_programs import visp
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.geometry import se3, se3_inverse, so3_exp, transform_points
@@ -215,5 +216,15 @@ def run() -> list[dict[str, Any]]:
             "two views: homography + decomposition",
             calls(lambda: decompose_homography(linear_homography(m_star, mapped))),
             Peer("OpenCV", calls(by_opencv)), ratio_aim=1.0,
+        ),
+        row(
+            "two views: the same, 4 points",
+            calls(lambda: decompose_homography(linear_homography(m_star[:4], mapped[:4]))),
+            visp("homography_dlt"), ratio_aim=1.0,
+        ),
+        row(
+            "two views: the same, 8 points",
+            calls(lambda: decompose_homography(linear_homography(m_star[:8], mapped[:8]))),
+            visp("homography_hlm"), ratio_aim=1.0,
         ),
     ]  # fmt: skip

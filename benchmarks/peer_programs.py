@@ -71,6 +71,16 @@ def machinevision(case: str) -> Peer | Missing:
     return python_peer("machinevision-toolbox", SOURCES / "machinevision_tick.py", case)
 
 
+def mink() -> Peer | Missing:
+    """The tick of `peers/mink_tick.py`."""
+    return python_peer("mink", SOURCES / "mink_tick.py", "tick")
+
+
+def pink() -> Peer | Missing:
+    """The tick of `peers/pink_tick.py`."""
+    return python_peer("pink", SOURCES / "pink_tick.py", "tick")
+
+
 def python_peer(name: str, script: Path, case: str) -> Peer | Missing:
     """A case of a script that runs in the peers' own virtual environment."""
     python = BUILT / "venv" / "bin" / "python"

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import picture_tick
+from vergence.camera import picture_times
 from vergence.control import OptimalTrackingLaw, pack_setup
 from vergence.control.command import singular_fault
 from vergence.estimation.exact_points import OUT_OF_SIGHT
@@ -126,8 +126,8 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
 
 def _times(run: IdealRun, pictures: int) -> FloatArray:
     """Return when pictures are taken, (pictures,), s."""
-    inner, outer = run.cell.inner_rate_hz, run.cell.rate_hz
-    return np.array([picture_tick(k, inner, outer) for k in range(pictures)]) / inner
+    times: FloatArray = picture_times(pictures, run.cell.inner_rate_hz, run.cell.rate_hz)
+    return times
 
 
 def _law(run: IdealRun) -> OptimalTrackingLaw:

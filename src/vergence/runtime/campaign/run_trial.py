@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vergence.camera import picture_tick
+from vergence.camera import picture_times
 from vergence.cell import Cell
 from vergence.cell.ideal_driver import CAMERA
 from vergence.errors import InputError
@@ -105,11 +105,8 @@ def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
     cell = run.cell
     assert cell.sees is not None
     step = max(1, int(run.patience.target_s * cell.rate_hz))
-    ticks = [
-        picture_tick(k, cell.inner_rate_hz, cell.rate_hz)
-        for k in range(0, len(trace.position), step)
-    ]
-    poses = cell.target(np.array(ticks) / cell.inner_rate_hz)
+    times = picture_times(len(trace.position), cell.inner_rate_hz, cell.rate_hz)
+    poses = cell.target(times[::step])
     return any(
         not cell.sees(q, T).all() for q, T in zip(trace.position[::step], poses, strict=True)
     )

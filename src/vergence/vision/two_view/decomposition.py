@@ -8,7 +8,15 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.vision.two_view.small import apply, cross, dot, times, transposed_times
+from vergence.vision.two_view.small import (
+    apply,
+    cross,
+    dot,
+    symmetric_eigen,
+    times,
+    transposed_times,
+    unit,
+)
 
 
 @njit(cache=True)
@@ -21,20 +29,21 @@ def decompose_homography(H: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
     Returns:
         R (2, 3, 3), t over the distance of the plane (2, 3), unit normal with n_z ≥ 0 (2, 3).
     """
-    values, V = np.linalg.eigh(transposed_times(H, H))
+    values, V = symmetric_eigen(transposed_times(H, H))
     low, high = min(values[0], 1.0), max(values[2], 1.0)
+    gap = high - low
+    share = (1.0 - low) / gap if gap > 0.0 else 1.0
     v1, v2, v3 = V[:, 2].copy(), V[:, 1].copy(), V[:, 0].copy()
     rotations, translations, normals = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3))
-    gap = max(high - low, 1e-300)
     for k in range(2):
         sign = 1.0 - 2.0 * k
-        u = np.sqrt((1.0 - low) / gap) * v1 + sign * np.sqrt((high - 1.0) / gap) * v3
+        u = np.sqrt(share) * v1 + sign * np.sqrt(1.0 - share) * v3
         normal = cross(v2, u)
         U, W = np.empty((3, 3)), np.empty((3, 3))
         U[:, 0], U[:, 1], U[:, 2] = v2, u, normal
-        W[:, 0], W[:, 1] = apply(H, v2), apply(H, u)
+        W[:, 0], W[:, 1] = unit(apply(H, v2)), unit(apply(H, u))  # which are orthogonal
         W[:, 2] = cross(W[:, 0], W[:, 1])
-        R = nearest_rotation(times(W, U.T))
+        R = times(W, U.T)
         if normal[2] < 0.0:
             normal = -normal
         rotations[k], normals[k] = R, normal

@@ -8,6 +8,8 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 
+_SWEEPS = 30  # of Jacobi's method; it takes about five
+
 
 @njit(cache=True)
 def times(A: FloatArray, B: FloatArray) -> FloatArray:
@@ -87,6 +89,44 @@ def unit(x: FloatArray) -> FloatArray:
     """Return x / ‖x‖."""
     length: float = np.sqrt(max(dot(x, x), 1e-300))
     return x / length
+
+
+@njit(cache=True)
+def symmetric_eigen(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the eigenvalues (n,), ascending, and eigenvectors (n, n), columns, of a symmetric A.
+
+    By Jacobi's rotations, which for three rows are done before LAPACK has begun.
+    """
+    n = len(A)
+    D, V = A.copy(), np.eye(n)
+    for _ in range(_SWEEPS):
+        off, size = 0.0, 0.0
+        for i in range(n):
+            size += D[i, i] ** 2
+            for j in range(i):
+                off += D[i, j] ** 2
+        if off <= 1e-34 * size:
+            break
+        for i in range(n):
+            for j in range(i):
+                if D[i, j] != 0.0:
+                    _rotate(D, V, i, j)
+    order = np.argsort(np.diag(D))
+    return np.diag(D)[order], V[:, order]
+
+
+@njit(cache=True)
+def _rotate(D: FloatArray, V: FloatArray, i: int, j: int) -> None:
+    """Turn rows and columns i and j of a symmetric D, in place, so that D[i, j] vanishes."""
+    half = (D[j, j] - D[i, i]) / (2.0 * D[i, j])
+    t = np.copysign(1.0, half) / (abs(half) + np.sqrt(half * half + 1.0))
+    c = 1.0 / np.sqrt(t * t + 1.0)
+    s = t * c
+    for k in range(len(D)):
+        D[k, i], D[k, j] = c * D[k, i] - s * D[k, j], s * D[k, i] + c * D[k, j]
+        V[k, i], V[k, j] = c * V[k, i] - s * V[k, j], s * V[k, i] + c * V[k, j]
+    for k in range(len(D)):
+        D[i, k], D[j, k] = c * D[i, k] - s * D[j, k], s * D[i, k] + c * D[j, k]
 
 
 @njit(cache=True)
