@@ -72,7 +72,8 @@ def _tick(
         np.concatenate([0.1 * rates[:3], 0.2 * rates[3:]]),
         0.4 + 0.1 * np.cos(time),
         0.8 + 0.1 * np.sin(time),
-        ("rate of joint3",) if abs(rates[2]) > 0.4 else (),
+        ("joint rates",) if abs(rates[2]) > 0.4 else (),
+        given_up={"view": 0.3 * time / duration} if 2.0 < time < 2.5 else {},
     )
     return TickRecord(
         time,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vergence.app.report import make_report, write_report
-from vergence.app.table import arm_rows, camera_rows, run_rows
+from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime.recording import Recording
@@ -37,7 +37,7 @@ def test_the_page_tells_the_outcome_and_every_part(page: str) -> None:
     assert "the residual is too large" in page
     assert "data:video/webm" in page
     assert page.count('<img src="data:image/jpeg') == 4
-    assert page.count("data:image/svg+xml") == 7
+    assert page.count("data:image/svg+xml") == 8
 
 
 def test_every_picture_says_what_it_shows(page: str) -> None:
@@ -61,11 +61,25 @@ def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:
     assert "joint3" in measures["fastest joint"].note
 
 
+def test_what_gave_way_is_told_with_when_and_by_how_much(recording: Recording) -> None:
+    rows = {row.name: row for row in constraint_rows(recording.arms["puma"])}
+    arm = recording.arms["puma"]
+    pushed = np.mean(["joint rates" in names for names in arm.active])
+    assert rows["joint rates"].value == f"{100 * pushed:.1f}"
+    assert rows["joint rates"].note == "of the time"
+    assert rows["view"].note == (
+        "of the time; gave way in 14 ticks from 2.03 s on, by up to 0.12 1/s at 2.47 s"
+    )
+
+
 def test_units_are_read_off_names(recording: Recording) -> None:
-    named = replace(recording, summary={"reaction_ms": 12.345, "far_m": 2.0, "law": "optimal"})
+    named = replace(
+        recording, summary={"reaction_ms": 12.345, "far_m": 2.0, "near_m": 2e-3, "law": "optimal"}
+    )
     rows = {row.name: (row.value, row.unit) for row in run_rows(named)}
     assert rows["reaction"] == ("12.3", "ms")
     assert rows["far"] == ("2", "m")
+    assert rows["near"] == ("2", "mm")
     assert rows["law"] == ("optimal", "")
 
 

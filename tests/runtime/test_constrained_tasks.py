@@ -21,7 +21,7 @@ class Kept:
 
     def tick(self, record):
         for command in record.commands.values():
-            self.named |= {name.split(" given")[0] for name in command.active}
+            self.named |= {*command.active, *command.given_up}
         for frame in record.sample.frames:
             if frame.camera == self.camera:
                 points = frame.truth.points_px

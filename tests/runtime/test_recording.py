@@ -44,7 +44,9 @@ def record_at(time: float, rng: np.random.Generator) -> TickRecord:
         SearchWindows(np.array([[1.0, 2.0], [np.nan] * 2]), np.array([[8.0, 9.0], [np.nan] * 2])),
     )
     target = TargetState(time, pose, rng.normal(size=6), rng.normal(size=(12, 12)), True)
-    command = JointCommand(rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",))
+    command = JointCommand(
+        rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",), given_up={"view": 0.5}
+    )
     return TickRecord(
         time,
         Sample(time, {"left": JointState(time, *rng.normal(size=(2, 2)))}, (frame,)),
@@ -91,6 +93,7 @@ def test_numbers_of_an_arm_read_back_exactly(tmp_path: Path, records: list[TickR
     assert set(arm.manipulability) == {0.4}
     assert set(arm.penalty) == {0.9}
     assert set(arm.active) == {("rate of turn",)}
+    assert all(bent == {"view": 0.5} for bent in arm.given_up)
 
 
 def test_points_of_a_camera_read_back_exactly(tmp_path: Path, records: list[TickRecord]) -> None:

@@ -7,6 +7,7 @@ from vergence.app import markup
 from vergence.app.figures import (
     Panels,
     camera_figure,
+    constraints_figure,
     error_figure,
     estimate_figure,
     joints_figure,
@@ -19,7 +20,7 @@ from vergence.app.figures import (
 )
 from vergence.app.marks_legend import marks_legend
 from vergence.app.pictures import film, key_frames
-from vergence.app.table import arm_rows, camera_rows, run_rows
+from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.places import RECORDING
 from vergence.runtime.recording import CameraTrace, Recording
 
@@ -78,6 +79,7 @@ def _summary(recording: Recording) -> str:
         tables.append(markup.table(f"Camera {name}", camera_rows(camera)))
     for name, arm in recording.arms.items():
         tables.append(markup.table(f"Arm {name}", arm_rows(recording.info.arms[name], arm)))
+        tables.append(markup.table(f"What shaped the motion of {name}", constraint_rows(arm)))
     return markup.section("Summary", markup.cards(tables))
 
 
@@ -149,6 +151,11 @@ def _arm(recording: Recording, name: str) -> str:
             recording,
             twist_figure(trace),
             f"Twist of {camera} that the law asked for; z is the optical axis.",
+        ),
+        _figure(
+            recording,
+            constraints_figure(trace),
+            "What shaped the commands, and what gave way so that more important things were kept.",
         ),
         _figure(
             recording,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.app.figures.arm import normalized
+from vergence.app.figures.constraints import constraint_names
 from vergence.arrays import FloatArray
 from vergence.runtime.recording import ArmInfo, ArmTrace, CameraTrace, Recording
 
@@ -78,11 +79,31 @@ def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
             yield Row(name, f"{100 * shares[row, joint]:.0f}", "%", where)
 
 
+def constraint_rows(trace: ArmTrace) -> list[Row]:
+    """Return how often each constraint shaped the commands, and how far it gave way."""
+    return [_constraint_row(trace, name) for name in constraint_names(trace)]
+
+
+def _constraint_row(trace: ArmTrace, name: str) -> Row:
+    bent = np.array([given_up.get(name, 0.0) for given_up in trace.given_up])
+    shaped = np.array([name in active for active in trace.active]) | (bent > 0.0)
+    note = "of the time"
+    if bent.any():
+        worst, first = int(np.argmax(bent)), int(np.argmax(bent > 0.0))
+        note += (
+            f"; gave way in {np.count_nonzero(bent)} ticks from {trace.time[first]:.2f} s on, by "
+            f"up to {bent[worst]:.2g} {_RATES.get(name, '1/s')} at {trace.time[worst]:.2f} s"
+        )
+    return Row(name, f"{100 * shaped.mean():.1f}", "%", note)
+
+
 def _worst(distances: FloatArray) -> FloatArray:
     """Return the largest distance in each picture that has one."""
     known = np.isfinite(distances).any(axis=1)
     return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
 
+
+_RATES = {"joint margin": "rad/s or m/s"}  # of constraints that bend; the others have no length
 
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
     "duration_s",

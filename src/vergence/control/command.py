@@ -1,5 +1,6 @@
 """What a law asks of an arm."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from vergence.arrays import FloatArray
@@ -18,6 +19,7 @@ class JointCommand:
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command
     fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
+    given_up: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much
 
 
 def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, str] | None:

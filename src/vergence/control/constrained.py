@@ -2,7 +2,7 @@
 
 from vergence.arrays import FloatArray, frozen
 from vergence.control.command import JointCommand
-from vergence.control.constrained_solver import ConstrainedSolver, describe
+from vergence.control.constrained_solver import ConstrainedSolver, command_of
 from vergence.control.constraints import pack_features
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import Objective, seen_only
@@ -49,7 +49,4 @@ class ConstrainedLaw:
             objective,
             pack_features(features.points, features.flow, depth),
         )
-        said = describe(answer.active, answer.given_up, answer.solved)
-        return JointCommand(
-            answer.rates, answer.v_camera, answer.manipulability, answer.penalty, said
-        )
+        return command_of(answer)

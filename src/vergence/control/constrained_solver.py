@@ -1,11 +1,13 @@
 """The constrained servo: any objective, served as well as what is to be kept allows."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera import Camera
+from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import Avoidance, ConstrainedRates, constrained_rates
 from vergence.control.constraints import KIND_NAMES, SOFT, ConstraintSettings
 from vergence.control.objective import TwistObjective
@@ -102,17 +104,35 @@ class ConstrainedSolver:
         return answer
 
 
-def describe(active: FloatArray, given_up: FloatArray, solved: bool) -> tuple[str, ...]:
+class Pressure(NamedTuple):
+    """Which constraints shaped a command, as `JointCommand` has it."""
+
+    active: tuple[str, ...]  # those that pushed
+    given_up: dict[str, float]  # those that bent: by how much, in the unit of their rows
+
+
+def describe(active: FloatArray, given_up: FloatArray, solved: bool) -> Pressure:
     """Name what pushed and what was given up, by kind of constraint as in `ConstrainedRates`."""
     if not solved:
-        return ("no solution: braking",)
-    said = [name for name, count in zip(KIND_NAMES, active, strict=True) if count]
-    said += [
-        f"{name} given up by {amount:.3g}"
-        for name, amount in zip(KIND_NAMES, given_up, strict=True)
-        if amount > 0
-    ]
-    return tuple(said)
+        return Pressure(("no solution: braking",), {})
+    pushed = tuple(name for name, count in zip(KIND_NAMES, active, strict=True) if count)
+    bent = {
+        name: float(amount) for name, amount in zip(KIND_NAMES, given_up, strict=True) if amount > 0
+    }
+    return Pressure(pushed, bent)
+
+
+def command_of(answer: ConstrainedRates) -> JointCommand:
+    """Return an answer as a law gives it."""
+    said = describe(answer.active, answer.given_up, answer.solved)
+    return JointCommand(
+        answer.rates,
+        answer.v_camera,
+        answer.manipulability,
+        answer.penalty,
+        said.active,
+        given_up=said.given_up,
+    )
 
 
 def _ranks(order: Sequence[str]) -> IntArray:

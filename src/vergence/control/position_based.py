@@ -132,7 +132,9 @@ class PositionBasedLaw:
             answer = self._keep(self._keeper, joints, self._reference)[0]
             measures = answer.manipulability, answer.penalty
             v_camera = self._camera_twist(joints.position, answer.rates)
-            return JointCommand(answer.rates, v_camera, *measures, said)
+            return JointCommand(
+                answer.rates, v_camera, *measures, said.active, given_up=said.given_up
+            )
         rates = self._rates(joints, self._reference)[0]
         return JointCommand(rates, self._camera_twist(joints.position, rates))
 

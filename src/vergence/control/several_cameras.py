@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray, frozen
 from vergence.control.camera_share import CameraShare
 from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import joint_objective
-from vergence.control.constrained_solver import ConstrainedSolver, describe
+from vergence.control.constrained_solver import ConstrainedSolver, command_of
 from vergence.control.constraints import pack_features
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import TwistObjective, seen_only
@@ -97,10 +97,8 @@ class SeveralCamerasLaw:
         self, objective: TwistObjective, features: FloatArray, joints: JointState
     ) -> JointCommand:
         if self._solver is not None:
-            answer = self._solver.solve(joints.position, joints.velocity, objective, features)
-            said = describe(answer.active, answer.given_up, answer.solved)
-            return JointCommand(
-                answer.rates, answer.v_camera, answer.manipulability, answer.penalty, said
+            return command_of(
+                self._solver.solve(joints.position, joints.velocity, objective, features)
             )
         J = self._arm.jacobian(joints.position)
         H, g = joint_objective(objective.H, objective.g, J, self._damping)

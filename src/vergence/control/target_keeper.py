@@ -5,7 +5,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray, frozen
 from vergence.control.constrained_rates import ConstrainedRates
-from vergence.control.constrained_solver import ConstrainedSolver, describe
+from vergence.control.constrained_solver import ConstrainedSolver, Pressure, describe
 from vergence.control.constraints import KIND_NAMES
 from vergence.control.interpolator import MovingPose, moved
 from vergence.control.objective import TwistObjective
@@ -83,7 +83,7 @@ class TargetKeeper:
         """Carry the target on by an inner period."""
         self._target = MovingPose(moved(self._target, self._solver.period), self._target.twist)
 
-    def report(self) -> tuple[str, ...]:
+    def report(self) -> Pressure:
         """Name what pushed and what was given up since the last call."""
         said = describe(self._active, self._given_up, self._solved)
         self._active, self._given_up, self._solved = 0 * self._active, 0 * self._given_up, True

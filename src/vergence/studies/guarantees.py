@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -157,12 +157,12 @@ def _speed(arm: Arm) -> Check:
 
 
 class _Watch:
-    """Keeps what a check asks about: joints, errors and what was active, tick by tick."""
+    """Keeps what a check asks about: joints, errors and what was given up, tick by tick."""
 
     def __init__(self) -> None:
         self.q: list[FloatArray] = []
         self.error_px: list[float] = []
-        self.active: list[tuple[str, ...]] = []
+        self.given_up: list[Mapping[str, float]] = []
 
     def tick(self, record: TickRecord) -> None:
         if record.observation is None or record.reference is None:
@@ -171,7 +171,7 @@ class _Watch:
         assert wanted is not None
         self.q.append(record.sample.joints["arm"].position)
         self.error_px.append(float(np.abs(view.points_px - wanted).max()))
-        self.active += [command.active for command in record.commands.values()]
+        self.given_up += [command.given_up for command in record.commands.values()]
 
     def begin(self, info: object) -> None: ...
 
@@ -240,9 +240,7 @@ def _conflict(arm: Arm) -> Check:
     cell = replace(cell, features=_SQUARE, start=start)
     watch = _Watch()
     excess, outcome = run_ideal(cell, "constrained image-based", 1.0, listeners=(watch,))
-    named = {
-        name.split(" given up")[0] for tick in watch.active for name in tick if "given" in name
-    }
+    named = {name for tick in watch.given_up for name in tick}
     kept = excess.rate <= 1e-12 and excess.position <= 0.0
     lost = outcome.kind in (OutcomeKind.TARGET_LOST, OutcomeKind.COMPLETED)
     return Check(

@@ -1,6 +1,7 @@
 """The figures of a report, each made from the arrays of a recording."""
 
 from vergence.app.figures.arm import joints_figure, measures_figure, twist_figure
+from vergence.app.figures.constraints import constraints_figure
 from vergence.app.figures.image import error_figure, paths_figure
 from vergence.app.figures.layout import Panels, mark_events, panels, svg
 from vergence.app.figures.motion import (
@@ -13,6 +14,7 @@ from vergence.app.figures.motion import (
 __all__ = [
     "Panels",
     "camera_figure",
+    "constraints_figure",
     "error_figure",
     "estimate_figure",
     "joints_figure",

@@ -1,6 +1,6 @@
 """What a recording says over time, as arrays: a row a tick, NaN where nothing is known."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ class ArmTrace:
     manipulability: FloatArray  # (K,) w' of [Nelson1995] eq. (26)
     penalty: FloatArray  # (K,) P of [Nelson1995] eq. (27)
     active: tuple[tuple[str, ...], ...]  # (K,) constraints that shaped the command
+    given_up: tuple[Mapping[str, float], ...]  # (K,) those that bent, and by how much
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,10 @@ def arm_trace(rows: Sequence[Row], joints: int) -> ArmTrace:
         manipulability=_column(rows, "manipulability"),
         penalty=_column(rows, "penalty"),
         active=tuple(tuple(row.get("active", ())) for row in rows),
+        given_up=tuple(
+            dict(zip(row.get("given_up", ()), row.get("given_up_by", ()), strict=True))
+            for row in rows
+        ),
     )
 
 
