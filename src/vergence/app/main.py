@@ -221,13 +221,13 @@ def track(
     raise typer.Exit(command(request, out, as_json))
 
 
-@app.command(epilog="Example: vergence watch puma560 --set law.S=0.01")
+@app.command(epilog="Example: vergence watch puma560    or vergence watch runs/NAME-TIME")
 def watch(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="CELL",
-            help="Name of a built-in cell, a cell file or folder.",
+            metavar="CELL|RUN",
+            help="Name of a built-in cell, a cell file or folder; or the folder of a run.",
             autocompletion=names.cells,
         ),
     ],
@@ -254,7 +254,7 @@ def watch(
     ] = True,
     as_json: Json = False,
 ) -> None:
-    """Watch a cell run in the browser: turn its knobs, drag its target."""
+    """Watch a cell run, or a recording, in the browser: turn its knobs, drag its target."""
     from vergence.app.watch import Request
     from vergence.app.watch import watch as command
 

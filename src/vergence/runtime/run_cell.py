@@ -63,7 +63,8 @@ def run_driver(
     parts = assemble_parts(cell, driver, images)
     summary = Summary(cell.task.camera)
     everyone = (summary, *listeners)
-    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera)
+    path = str(cell.path)
+    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path)
     for listener in everyone:
         listener.begin(info)
     if isinstance(parts, Outcome):

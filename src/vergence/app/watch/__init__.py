@@ -1,4 +1,4 @@
-"""`vergence watch`: a page in the browser that shows a cell while it runs."""
+"""`vergence watch`: a page in the browser that shows a cell while it runs, or a recording."""
 
 from vergence.app.watch.command import Request, watch
 

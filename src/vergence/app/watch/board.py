@@ -70,10 +70,12 @@ class Board:
             self._version += 1
 
     def show(self, shots: Sequence[Shot]) -> None:
-        """Put up pictures."""
+        """Put up pictures, those that are not up already."""
         with self._lock:
-            self._shots.update({shot.camera: shot for shot in shots})
-            self._version += 1
+            fresh = {s.camera: s for s in shots if self._shots.get(s.camera) is not s}
+            if fresh:
+                self._shots.update(fresh)
+                self._version += 1
 
     def event(self, time: float, name: str, text: str) -> None:
         """Add a line to the log."""

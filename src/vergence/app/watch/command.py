@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from vergence.app.output import SUCCESS, emit, new_folder, say, warn
+from vergence.errors import InputError
+from vergence.places import RECORDING, find_recording
 
 if TYPE_CHECKING:
     from vergence.app.watch.server import Server
@@ -29,20 +31,61 @@ class Request(NamedTuple):
 
 def watch(request: Request) -> int:
     """Serve the page until Ctrl-C; return the exit code."""
-    emitted = _watch_cell(request)
+    recording = _recording_in(Path(request.source))
+    answer = _watch_cell(request) if recording is None else _watch_recording(request, recording)
     if request.as_json:
-        emit({"command": "watch", **emitted})
+        emit({"command": "watch", **answer})
     return SUCCESS
 
 
-def _watch_cell(request: Request) -> Mapping[str, object]:
+def _recording_in(path: Path) -> Path | None:
+    """Return the recording that a path means, if it means one: a run folder has a cell, too."""
+    if path.suffix == Path(RECORDING).suffix:
+        return find_recording(path)
+    return path / RECORDING if (path / RECORDING).is_file() else None
+
+
+def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
+    for option, given in (
+        ("--set", request.settings),
+        ("--out", request.out),
+        ("--seed", request.seed),
+    ):
+        if given not in (None, ()):
+            raise InputError("watch", option, given, "nothing: a recording is only shown")
     from vergence.app.progress import working
+    from vergence.app.watch.replay import Replay
+    from vergence.app.watch.server import Server
+    from vergence.runtime import Recording
+
+    with working("reading the recording"):
+        replay = Replay(Recording.open(path))
+    try:
+        port = replay.scene.port if replay.scene is not None else None
+        server = Server(request.host, request.port, replay.board, replay.ask, port)
+        if replay.scene is not None:
+            replay.scene.start()
+        server.start()
+        _invite(server, request)
+        replay.run()
+        server.close()
+    finally:
+        replay.close()
+    return {"run": path.parent, "address": server.address}
+
+
+def _watch_cell(request: Request) -> Mapping[str, object]:
     from vergence.app.run import overrides
+    from vergence.cell import load_cell
+
+    settings = overrides(request.settings)
+    load_cell(request.source, settings, request.seed)  # a mistake is told before all is loaded
+    from vergence.app.progress import working
     from vergence.app.watch.law_desk import LawDesk
     from vergence.app.watch.live import Live
     from vergence.app.watch.server import Server
 
-    desk = LawDesk(request.source, overrides(request.settings), request.seed)
+    desk = LawDesk(request.source, settings, request.seed)
     out = request.out or new_folder(desk.cell.name)
     with working("setting up the cell"):
         live = Live(desk, request.images, out, request.image_every)
@@ -59,7 +102,7 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
         server.close()
     finally:
         live.close()
-    _say(f"stopped; see `vergence report {live.folder}` for what was recorded", request)
+    _say(f"recorded: `vergence watch {live.folder}` shows it again", request)
     return {"cell": desk.cell.name, "address": server.address, "run": live.folder, "outcome": end}
 
 

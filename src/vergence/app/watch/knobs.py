@@ -13,11 +13,12 @@ from vergence.cell.schema import (
     PositionBasedTable,
     Table,
 )
+from vergence.errors import InputError
 
 LAWS: dict[str, tuple[type[Table], ...]] = {  # by the kind of the task
     "track": (OptimalTrackingTable, ConstrainedTable, PlainTable),
-    "follow": (PositionBasedTable,),
-    "reach": (PathTrackingTable,),
+    "follow": (PositionBasedTable, ConstrainedTable),
+    "reach": (PathTrackingTable, ConstrainedTable),
 }
 
 
@@ -64,7 +65,7 @@ def law_choices(cell: Cell) -> dict[str, str]:
             choices[name] = _toml(table)
     for kind in fitting:
         name = get_args(kind.model_fields["kind"].annotation)[0]
-        if name != own and name not in choices:
+        if name != own and name not in choices and _suits(cell, name):
             choices[name] = f'{{ kind = "{name}" }}'
     return choices
 
@@ -92,6 +93,15 @@ def knobs(law: Table) -> list[dict[str, Any]]:
 def turned(key: str, value: Any) -> dict[str, str]:
     """Return the setting of a cell file, key and TOML, that a turned knob stands for."""
     return {f"law.{key}": json.dumps(value)}
+
+
+def _suits(cell: Cell, kind: str) -> bool:
+    """Whether a cell takes a law with the numbers it has by itself."""
+    try:
+        cell.replace(law={"kind": kind})
+    except InputError:
+        return False
+    return True
 
 
 def _toml(table: Table) -> str:

@@ -6,18 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vergence.app.watch.board import Board
 from vergence.app.watch.hand import Hand
 from vergence.app.watch.law_desk import LawDesk
 from vergence.app.watch.outline import outline_from, target_corners
 from vergence.app.watch.pace import Pace
 from vergence.app.watch.publisher import Publisher
-from vergence.app.watch.scene import Scene, world_state
+from vergence.app.watch.scene import Scene, in_view, world_state
 from vergence.app.watch.watched_driver import WatchedDriver
-from vergence.arrays import FloatArray
-from vergence.cell.world import World
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime import Loop, Recorder, RunResult, run_driver
@@ -56,7 +52,7 @@ class Live:
         self._runs, self._again = 0, True
         self.board = Board()
         self._hand = Hand(self._driver, self.board)
-        self.scene = Scene(self._driver.world.model, self.board, _in_view(self._driver.world))
+        self.scene = Scene(self._driver.world.model, self.board, in_view(self._driver.world))
 
     @property
     def folder(self) -> Path:
@@ -214,11 +210,3 @@ class Live:
         self.board.event(time, name, text)
         if self._recorder.running:
             self._recorder.event(time, name, text)
-
-
-def _in_view(world: World) -> FloatArray:
-    """Return what the first view should show, (K, 3): arms, cameras, and at last the target."""
-    model, data = world.model, world.data
-    bodies = [data.xpos[body] for body in range(1, model.nbody)]
-    cameras = [data.cam_xpos[camera] for camera in range(model.ncam)]
-    return np.array([*bodies, *cameras, world.target_pose()[:3, 3]])

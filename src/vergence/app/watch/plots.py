@@ -1,16 +1,17 @@
-"""The curves of the page: which there are for a task, and their values at a tick."""
+"""The curves of the page: which there are, and their values at an instant."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.cell import Cell
 from vergence.runtime.recording import ArmInfo
 from vergence.runtime.recording.numbers import numbers
 
-Measure = Callable[[FloatArray], float]  # of joint positions (n,)
+_DIGITS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,40 +31,52 @@ class Plot:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-def plots_of(task: str, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
-    """Return the panels for a task.
+HAND_MM = Plot("hand_mm", "hand from where it should be", "mm", ("distance",))
+HAND_DEG = Plot("hand_deg", "hand from how it should be turned", "°", ("angle",))
+TARGET_MM = Plot("target_mm", "estimated from true target", "mm", ("distance",))
+MANIPULABILITY = Plot("manipulability", "manipulability √det(J Jᵀ)", "SI units", ("of the arm",))
+MEASURE = Plot("manipulability", "manipulability w′", "SI units", ("of the arm",))
+
+
+def error_plot(points: int, camera: str = "") -> Plot:
+    """Return the panel of the errors of so many image points; of a further camera by its name."""
+    names = tuple(f"point {number}" for number in range(points))
+    title = "image points from where they should be"
+    return Plot(error_key(camera), f"{title} in {camera}" if camera else title, "px", names)
+
+
+def error_key(camera: str = "") -> str:
+    """Return the key of that panel."""
+    return f"error_px {camera}".rstrip()
+
+
+def joints_plot(arm: ArmInfo) -> Plot:
+    """Return the panel of an arm's joints."""
+    title, names = "joints between their limits", tuple(arm.names)
+    return Plot("joints", title, "±1 = limit", names, -1.1, 1.1, (-1.0, 1.0))
+
+
+def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
+    """Return the panels of a running cell.
 
     Args:
-        task: its kind.
-        points: how many image points it speaks of.
+        cell: that runs.
+        points: how many image points of the target its task speaks of.
         arm: the one that is moved.
     """
-    errors: tuple[Plot, ...]
-    if task == "follow":
-        errors = (
-            Plot("hand_mm", "hand from where it should be", "mm", ("distance",)),
-            Plot("hand_deg", "hand from how it should be turned", "°", ("angle",)),
-            Plot("target_mm", "estimated from true target", "mm", ("distance",)),
-        )
-    else:
-        names = tuple(f"point {number}" for number in range(points))
-        errors = (Plot("error_px", "image points from where they should be", "px", names),)
-    joints = tuple(arm.names)
-    return (
-        *errors,
-        Plot("joints", "joints between their limits", "±1 = limit", joints, -1.1, 1.1, (-1, 1)),
-        Plot("manipulability", "manipulability √det(J Jᵀ)", "SI units", ("of the arm",)),
-    )
+    common = (joints_plot(arm), MANIPULABILITY)
+    if cell.task.kind == "follow":
+        return (HAND_MM, HAND_DEG, TARGET_MM, *common)
+    tool = cell.tool
+    held = () if tool is None else (error_plot(len(tool.features), tool.camera),)
+    return (error_plot(points), *held, *common)
 
 
 def row(time: float, plots: Sequence[Plot], values: dict[str, FloatArray]) -> list[Any]:
-    """Return a row of the page's table: the time, then a list of values for each panel."""
+    """Return a row of the page's table: the time, then the values of each panel, if there are."""
     nothing = np.empty(0)
-    return [
-        round(time, 4),
-        *(_short(values.get(plot.key, nothing)) for plot in plots),
-    ]
+    return [round(time, 4), *(_short(values.get(plot.key, nothing)) for plot in plots)]
 
 
 def _short(values: FloatArray) -> list[Any]:
-    return numbers(np.array([float(f"{value:.5g}") for value in values.tolist()]))
+    return numbers(np.array([float(f"{value:.{_DIGITS}g}") for value in values.tolist()]))

@@ -7,7 +7,7 @@ import numpy as np
 from vergence.app.figures.arm import normalized
 from vergence.app.watch.board import Board
 from vergence.app.watch.outline import outline, target_corners
-from vergence.app.watch.plots import Plot, plots_of, row
+from vergence.app.watch.plots import Plot, error_key, live_plots, row
 from vergence.app.watch.shot import Shot
 from vergence.arrays import FloatArray
 from vergence.camera import Frame, FrameTruth
@@ -16,7 +16,7 @@ from vergence.features import ImagePoints
 from vergence.geometry import se3_inverse, transform_points
 from vergence.outcome import Outcome
 from vergence.planning import Reference
-from vergence.robot import yoshikawa_measure
+from vergence.robot import manipulability_measure
 from vergence.runtime.pose_errors import pose_errors
 from vergence.runtime.recording import RunInfo, TickRecord
 
@@ -46,7 +46,7 @@ class Publisher:
         """Tell the page what is about to run."""
         self._info = info
         arm = info.arms[self._cell.task.arm]
-        self._plots = plots_of(self._cell.task.kind, len(self._driver.features), arm)
+        self._plots = live_plots(self._cell, len(self._driver.features), arm)
         self._board.begin(
             {
                 "cell": info.cell,
@@ -83,7 +83,7 @@ class Publisher:
         view, truth = next(mine, None), frame.truth
         camera = self._driver.cameras[frame.camera]
         around = None
-        if truth is not None:
+        if truth is not None and not self._looks_at_tool(frame.camera):
             T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
             around = outline(self._corners, T_camera_target, camera)
         return Shot(
@@ -91,21 +91,27 @@ class Publisher:
             frame.time,
             frame.image,
             view,
-            self._desired(frame, record.reference),
+            self._desired(frame, record.reference, view),
             _true(truth, view),
             truth.T_world_camera if truth else None,
             truth.T_world_target if truth else None,
             around,
         )
 
-    def _desired(self, frame: Frame, reference: Reference | None) -> FloatArray | None:
-        """Return where the points of a picture should be, if the reference speaks of them."""
+    def _desired(
+        self, frame: Frame, reference: Reference | None, view: ImagePoints | None
+    ) -> FloatArray | None:
+        """Return where the points of a picture should be, if the reference speaks of them.
+
+        Of a wanted pose, where it would show the points that were looked for.
+        """
         if reference is None or frame.camera != self._cell.task.camera:
-            return None
+            return reference.elsewhere_px.get(frame.camera) if reference else None
         if reference.points_px is not None or reference.T_camera_target is None:
             return reference.points_px
         points = transform_points(reference.T_camera_target, self._driver.features)
-        return self._driver.cameras[frame.camera].project(points)
+        places = self._driver.cameras[frame.camera].project(points)
+        return places if view is None else np.where(view.asked[:, None], places, np.nan)
 
     def _values(self, record: TickRecord) -> dict[str, FloatArray]:
         assert self._info is not None, "a run begins before it ticks"
@@ -113,7 +119,9 @@ class Publisher:
         q = record.sample.joints[name].position
         return {
             "joints": normalized(self._info.arms[name], q),
-            "manipulability": np.array([yoshikawa_measure(self._driver.arms[name].jacobian(q))]),
+            "manipulability": np.array(
+                [manipulability_measure(self._driver.arms[name].jacobian(q))]
+            ),
             **self._errors(record),
         }
 
@@ -127,13 +135,22 @@ class Publisher:
                 "hand_deg": np.array([np.rad2deg(errors.hand_rad)]),
                 "target_mm": np.array([_MM * np.linalg.norm(errors.target_m)]),
             }
-        views = record.observation.views if record.observation else ()
-        wanted = record.reference.points_px if record.reference else None
-        mine = [view for view in views if view.camera == self._cell.task.camera]
-        if not mine or wanted is None:
+        if record.observation is None or record.reference is None:
             return {}
-        distance = np.linalg.norm(mine[-1].points_px - wanted, axis=1)
-        return {"error_px": np.where(mine[-1].found, distance, np.nan)}
+        task = self._cell.task.camera
+        distances: dict[str, FloatArray] = {}
+        for view in record.observation.views:
+            mine = view.camera == task
+            elsewhere = record.reference.elsewhere_px.get(view.camera)
+            wanted = record.reference.points_px if mine else elsewhere
+            if wanted is not None:
+                distance = np.linalg.norm(view.points_px - wanted, axis=1)
+                key = error_key("" if mine else view.camera)
+                distances[key] = np.where(view.found, distance, np.nan)
+        return distances
+
+    def _looks_at_tool(self, camera: str) -> bool:
+        return self._cell.tool is not None and self._cell.tool.camera == camera
 
 
 def _true(truth: FrameTruth | None, view: ImagePoints | None) -> FloatArray | None:

@@ -15,6 +15,7 @@ import numpy as np
 from vergence.app.watch.board import Board
 from vergence.app.watch.eye import Eye
 from vergence.arrays import FloatArray
+from vergence.cell.world import World
 
 _PERIOD_S = 1 / 30  # between two states, while no browser sets the pace
 _FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its viewers begin
@@ -38,6 +39,7 @@ class Scene:
         from mujoco.studio.web import client_camera, headless_ui, state_payload, web_server
 
         logging.getLogger("WebServer").setLevel(logging.WARNING)  # it writes to stdout
+        logging.getLogger("asyncio").addFilter(_is_no_hang_up)
         self._model, self._board = model, board
         self._payload, self._mode = state_payload, ux.TUMBLE_CAMERA_IDX
         bundle = state_payload.serialize_model_bundle(model)
@@ -115,6 +117,13 @@ class Scene:
         self._server.update_state(payload)
 
 
+def _is_no_hang_up(record: logging.LogRecord) -> bool:
+    """Whether a complaint is about anything but a browser that went away, which browsers do."""
+    from websockets.exceptions import ConnectionClosed
+
+    return record.exc_info is None or not isinstance(record.exc_info[1], ConnectionClosed)
+
+
 def world_state(model: Any, data: Any) -> FloatArray:
     """Return the state of a world as the view wants it."""
     import mujoco
@@ -123,3 +132,11 @@ def world_state(model: Any, data: Any) -> FloatArray:
     state = np.empty(mujoco.mj_stateSize(model, kind))
     mujoco.mj_getState(model, data, state, kind)
     return state
+
+
+def in_view(world: World) -> FloatArray:
+    """Return what the first view should show, (K, 3): arms, cameras, and at last the target."""
+    model, data = world.model, world.data
+    bodies = [data.xpos[body] for body in range(1, model.nbody)]
+    cameras = [data.cam_xpos[camera] for camera in range(model.ncam)]
+    return np.array([*bodies, *cameras, world.target_pose()[:3, 3]])

@@ -27,12 +27,13 @@ class Shot:
     T_world_camera: FloatArray | None = None  # (4, 4) at exposure, where the truth is known
     T_world_target: FloatArray | None = None  # (4, 4) likewise
     outline_px: FloatArray | None = None  # (K, 2) around the target, where it is known
+    kept: bytes = b""  # the picture as JPEG, in place of the image
 
     @cached_property
     def jpeg(self) -> bytes:
         """The picture as JPEG; empty without one."""
         if self.image is None:
-            return b""
+            return self.kept
         import cv2
 
         quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]

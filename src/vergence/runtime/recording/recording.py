@@ -113,11 +113,15 @@ class Recording:
         """
         import cv2
 
-        for number, parts in enumerate(self._pictures(camera)):
+        for number, (time, jpeg) in enumerate(self.jpegs(camera)):
             if only is None or number in only:
-                jpeg = np.frombuffer(wire.bytes_of(parts, 2), np.uint8)
-                image = cv2.imdecode(jpeg, cv2.IMREAD_GRAYSCALE)
-                yield wire.time_of(parts, 1), np.asarray(image, dtype=np.uint8)
+                image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+                yield time, np.asarray(image, dtype=np.uint8)
+
+    def jpegs(self, camera: str) -> Iterator[tuple[float, bytes]]:
+        """Yield the kept pictures of a camera with their time of exposure, in order, as JPEG."""
+        for parts in self._pictures(camera):
+            yield wire.time_of(parts, 1), wire.bytes_of(parts, 2)
 
     def _pictures(self, camera: str) -> Iterator[wire.Fields]:
         topic = f"/camera/{camera}{_PICTURES}"

@@ -57,6 +57,7 @@ class RunInfo:
     arms: Mapping[str, ArmInfo] = field(default_factory=dict)
     cameras: Mapping[str, Camera] = field(default_factory=dict)
     task_camera: str = ""  # the one whose points the reference speaks of; the first if empty
+    path: str = ""  # where the cell file was, with the models beside it
 
     def __post_init__(self) -> None:
         if not self.task_camera:
@@ -64,11 +65,17 @@ class RunInfo:
 
     @classmethod
     def of(
-        cls, driver: Driver, cell: str, text: str, seed: int | None, task_camera: str = ""
+        cls,
+        driver: Driver,
+        cell: str,
+        text: str,
+        seed: int | None,
+        task_camera: str = "",
+        path: str = "",
     ) -> Self:
         """Keep what a driver and a cell file say."""
         arms = {name: ArmInfo.of(arm) for name, arm in driver.arms.items()}
-        return cls(cell, text, seed, arms, dict(driver.cameras), task_camera)
+        return cls(cell, text, seed, arms, dict(driver.cameras), task_camera, path)
 
     def as_json(self) -> dict[str, Any]:
         """Return JSON values of all but the text."""
@@ -76,6 +83,7 @@ class RunInfo:
             "cell": self.cell,
             "seed": self.seed,
             "task_camera": self.task_camera,
+            "path": self.path,
             "arms": {name: arm.as_json() for name, arm in self.arms.items()},
             "cameras": {name: _camera_json(camera) for name, camera in self.cameras.items()},
         }
@@ -90,6 +98,7 @@ class RunInfo:
             {name: ArmInfo.from_json(arm) for name, arm in data["arms"].items()},
             {name: Camera(**camera) for name, camera in data["cameras"].items()},
             data["task_camera"],
+            data.get("path", ""),
         )
 
 

@@ -37,7 +37,7 @@ export class Law {
 
   knob(knob) {
     const row = document.createElement("label");
-    row.className = "knob";
+    row.className = `knob ${knob.kind}`;
     row.dataset.key = knob.key;
     const name = document.createElement("span");
     name.textContent = knob.label;
@@ -63,10 +63,10 @@ export class Law {
     slider.ariaLabel = knob.label;
     const middle = knob.value;
     slider.disabled = middle <= 0;
-    slider.addEventListener("input", () => { field.value = (middle * 10 ** slider.value).toPrecision(3); });
+    slider.addEventListener("input", () => { field.value = short(Number((middle * 10 ** slider.value).toPrecision(3))); });
     slider.addEventListener("change", () => turn(Number((middle * 10 ** slider.value).toPrecision(3))));
     this.fields.set(knob.key, (value) => {
-      if (document.activeElement !== field) field.value = value;
+      if (document.activeElement !== field) field.value = short(value);
       if (middle > 0 && document.activeElement !== slider) slider.value = Math.log10(Math.max(value, 1e-300) / middle);
     });
     return middle > 0 ? [field, unit, slider] : [field, unit];
@@ -96,4 +96,9 @@ function command(settings) {
   const code = document.createElement("code");
   code.textContent = settings.map((setting) => `--set '${setting}'`).join(" ");
   return ["The same from the command line: ", code];
+}
+
+// A number as briefly as it can be written.
+function short(value) {
+  return value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential() : String(value);
 }

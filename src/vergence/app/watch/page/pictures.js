@@ -105,8 +105,8 @@ class View {
 
   words({ found, asked, time, reasons }) {
     const at = `${time.toFixed(2)} s`;
-    if (!found) return `looked at by nobody · ${at}`;
-    const wanted = asked.filter(Boolean).length;
+    const wanted = asked?.filter(Boolean).length;
+    if (!wanted) return `nothing looked for · ${at}`;
     const seen = found.filter(Boolean).length;
     const why = reasons.find((reason, j) => asked[j] && reason);
     return `${seen} of ${wanted} found${why ? ` (${why})` : ""} · ${at}`;

@@ -10,6 +10,8 @@ export class Transport {
     this.reset.addEventListener("click", () => ask({ do: "reset" }));
     this.speed.addEventListener("change", () => ask({ do: "speed", value: Number(this.speed.value) }));
     this.seek.addEventListener("input", () => ask({ do: "seek", value: Number(this.seek.value) }));
+    this.seek.addEventListener("pointerdown", () => { this.sliding = true; });
+    this.seek.addEventListener("pointerup", () => { this.sliding = false; });
     document.addEventListener("keydown", (event) => {
       if (event.key !== " " || event.target.matches("input, select, button")) return;
       event.preventDefault();
@@ -38,8 +40,7 @@ export class Transport {
     this.pause.textContent = paused ? "Resume" : "Pause";
     if (document.activeElement !== this.speed) this.speed.value = String(speed);
     this.measured.textContent = paused || measured === undefined ? "" : `${measured.toFixed(2)} × real time`;
-    if (this.recording && document.activeElement !== this.seek) this.seek.value = time ?? 0;
-    if (this.recording && paused) this.seek.value = time ?? 0;
+    if (this.recording && !this.sliding) this.seek.value = time ?? 0;
     const over = outcome && !this.recording;
     this.pause.disabled = this.step.disabled = Boolean(over);
     if (over) this.measured.textContent = "";

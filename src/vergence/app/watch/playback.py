@@ -1,0 +1,201 @@
+"""What a recording has to show at any of its instants."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vergence.app.figures.arm import normalized
+from vergence.app.watch.board import Row
+from vergence.app.watch.plots import (
+    HAND_DEG,
+    HAND_MM,
+    MANIPULABILITY,
+    MEASURE,
+    TARGET_MM,
+    Plot,
+    error_key,
+    error_plot,
+    joints_plot,
+    row,
+)
+from vergence.app.watch.recorded_world import RecordedWorld
+from vergence.app.watch.shot import Shot
+from vergence.arrays import FloatArray
+from vergence.features import ImagePoints, SearchWindows
+from vergence.geometry import se3_inverse
+from vergence.robot import manipulability_measure
+from vergence.runtime.pose_errors import angle_between
+from vergence.runtime.recording import CameraTrace, Recording
+
+_MM = 1e3
+_AT_ONCE_S = 1e-9
+
+
+class Playback:
+    """Holds a recording with its pictures, still as JPEG.
+
+    Args:
+        recording: of the run.
+        world: the cell it was recorded in, if it is known.
+
+    Attributes:
+        cameras: those that took pictures.
+        plots: the panels that the recording fills.
+    """
+
+    def __init__(self, recording: Recording, world: RecordedWorld | None) -> None:
+        self._recording, self._world = recording, world
+        self._arm = _moved_arm(recording)
+        traces = recording.cameras
+        self.cameras = tuple(name for name in traces if len(traces[name].time))
+        self._jpegs = {name: tuple(recording.jpegs(name)) for name in self.cameras}
+        self._shots: dict[str, Shot] = {}
+        self._truth = _true_poses(recording)
+        self.plots = tuple(self._choose_plots())
+
+    def rows(self) -> list[Row]:
+        """Return all values of all panels, in order of time."""
+        found = [
+            *self._arm_rows(),
+            *self._error_rows(),
+            *self._hand_rows(),
+            *self._target_rows(),
+        ]
+        return sorted(found, key=lambda entry: entry[0])
+
+    def times(self) -> FloatArray:
+        """Return when pictures came, in order, s."""
+        traces = (self._recording.cameras[name].received for name in self.cameras)
+        return np.unique(np.concatenate([np.zeros(1), *traces]))
+
+    def shots(self, time: float) -> list[Shot]:
+        """Return the pictures that had come by a time, the same objects while they are the same."""
+        for name in self.cameras:
+            shown = self._shots.get(name)
+            fresh = self._shot(name, time)
+            if shown is None or shown.time != fresh.time:
+                self._shots[name] = fresh
+        return list(self._shots.values())
+
+    def state(self, time: float) -> FloatArray | None:
+        """Return MuJoCo's state of the world at a time; None where the world is not known."""
+        if self._world is None:
+            return None
+        joints = {
+            name: trace.position[_newest(trace.time, time)]
+            for name, trace in self._recording.arms.items()
+            if len(trace.time)
+        }
+        times, poses = self._truth
+        T = poses[_newest(times, time)] if len(times) else np.eye(4)
+        return self._world.place(joints, T)
+
+    def _choose_plots(self) -> Iterator[Plot]:
+        for name, trace in self._recording.cameras.items():
+            if np.isfinite(trace.error_px).any():
+                yield error_plot(trace.error_px.shape[1], self._further(name))
+            if np.isfinite(trace.T_camera_target_wanted).any():
+                yield from (HAND_MM, HAND_DEG)
+        if self._recording.target is not None and len(self._truth[0]):
+            yield TARGET_MM
+        yield joints_plot(self._recording.info.arms[self._arm])
+        if self._world is not None:
+            yield MANIPULABILITY
+        elif np.isfinite(self._recording.arms[self._arm].manipulability).any():
+            yield MEASURE
+
+    def _arm_rows(self) -> Iterator[Row]:
+        info, trace = self._recording.info.arms[self._arm], self._recording.arms[self._arm]
+        measures = trace.manipulability
+        if self._world is not None:
+            arm = self._world.world.arms[self._arm]
+            measures = np.array([manipulability_measure(arm.jacobian(q)) for q in trace.position])
+        shares = normalized(info, trace.position)
+        for time, share, measure in zip(trace.time.tolist(), shares, measures, strict=True):
+            values = {"joints": share, "manipulability": np.array([measure])}
+            yield row(time, self.plots, values)
+
+    def _error_rows(self) -> Iterator[Row]:
+        for name, trace in self._recording.cameras.items():
+            key = error_key(self._further(name))
+            for time, error in zip(trace.received.tolist(), trace.error_px, strict=True):
+                yield row(time, self.plots, {key: error})
+
+    def _hand_rows(self) -> Iterator[Row]:
+        for trace in self._recording.cameras.values():
+            for index in np.flatnonzero(np.isfinite(trace.T_camera_target_wanted[:, 0, 0])):
+                wanted = trace.T_camera_target_wanted[index]
+                T = se3_inverse(trace.T_world_camera[index]) @ trace.T_world_target[index]
+                values = {
+                    "hand_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - wanted[:3, 3])]),
+                    "hand_deg": np.array([np.rad2deg(angle_between(T, wanted))]),
+                }
+                yield row(float(trace.received[index]), self.plots, values)
+
+    def _further(self, camera: str) -> str:
+        """Return the name of a camera that is not the task's own; empty for that."""
+        return "" if camera == self._recording.info.task_camera else camera
+
+    def _target_rows(self) -> Iterator[Row]:
+        target, (times, poses) = self._recording.target, self._truth
+        if target is None or not len(times):
+            return
+        for time, T in zip(target.time.tolist(), target.T_world_target, strict=True):
+            away = T[:3, 3] - poses[_newest(times, time)][:3, 3]
+            yield row(time, self.plots, {"target_mm": np.array([_MM * np.linalg.norm(away)])})
+
+    def _shot(self, name: str, time: float) -> Shot:
+        trace, jpegs = self._recording.cameras[name], self._jpegs[name]
+        index, kept = _newest(trace.received, time), b""
+        if jpegs:
+            number = _newest(np.array([taken for taken, _ in jpegs]), float(trace.time[index]))
+            taken, kept = jpegs[number]
+            index = int(np.argmin(np.abs(trace.time - taken)))
+        return Shot(
+            name,
+            float(trace.time[index]),
+            None,
+            _points(name, trace, index),
+            trace.desired_px[index],
+            trace.true_px[index],
+            kept=kept,
+        )
+
+
+def _newest(times: FloatArray, time: float) -> int:
+    """Return the place of the last of increasing times that is not later; the first at least."""
+    return max(int(np.searchsorted(times, time + _AT_ONCE_S, side="right")) - 1, 0)
+
+
+def _moved_arm(recording: Recording) -> str:
+    """Return the arm that was commanded; the first if none was."""
+    commanded = (n for n, trace in recording.arms.items() if np.isfinite(trace.command).any())
+    return next(commanded, next(iter(recording.arms)))
+
+
+def _true_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
+    """Return when the target's pose is known, (K,) s, and T_world_target (K, 4, 4)."""
+    trace = recording.cameras.get(recording.info.task_camera)  # another may look at a tool
+    if trace is None:
+        return np.empty(0), np.empty((0, 4, 4))
+    times, poses = trace.time, trace.T_world_target
+    known = np.isfinite(poses).all(axis=(1, 2))
+    order = np.argsort(times[known], kind="stable")
+    return times[known][order], poses[known][order]
+
+
+def _points(name: str, trace: CameraTrace, index: int) -> ImagePoints | None:
+    if not np.isfinite(trace.points_px[index]).any():
+        return None
+    count, reasons = len(trace.found[index]), trace.reasons[index]
+    windows = SearchWindows(trace.window_center_px[index], trace.window_half_px[index])
+    without = trace.asked[index].all() and not np.isfinite(windows.half_px).any()
+    return ImagePoints(
+        name,
+        float(trace.time[index]),
+        trace.points_px[index],
+        trace.covariance_px[index],
+        trace.found[index],
+        (*reasons, *[""] * (count - len(reasons))),
+        None if without else windows,
+    )

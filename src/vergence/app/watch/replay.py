@@ -1,0 +1,121 @@
+"""A recording that somebody watches: it plays, pauses and goes where the slider is."""
+
+import queue
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from vergence.app.watch.board import Board
+from vergence.app.watch.playback import Playback
+from vergence.app.watch.recorded_world import RecordedWorld
+from vergence.app.watch.scene import Scene, in_view
+from vergence.runtime.recording import Recording
+
+_PERIOD_S = 1 / 30
+
+
+class Replay:
+    """Shows a recording; runs in the thread that calls `run`, `ask` may be called from any.
+
+    Args:
+        recording: of the run.
+
+    Attributes:
+        board: what there is to show.
+        scene: the view in three dimensions, where the cell is known.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        world = RecordedWorld.of(recording.info)
+        known = world if isinstance(world, RecordedWorld) else None
+        self._recording = recording
+        self._playback = Playback(recording, known)
+        self._inbox: queue.Queue[Mapping[str, Any]] = queue.Queue()
+        self._time, self._speed, self._paused = 0.0, 1.0, True
+        self.board = Board()
+        self.scene: Scene | None = None
+        if known is not None:
+            self.scene = Scene(known.world.model, self.board, in_view(known.world))
+        self._begin("" if known is not None else str(world))
+
+    def ask(self, command: Mapping[str, Any]) -> None:
+        """Ask for something; it is done before the next instant is shown."""
+        self._inbox.put(command)
+
+    def run(self) -> None:
+        """Play until Ctrl-C."""
+        before = perf_counter()
+        while True:
+            try:
+                self._obey(self._inbox.get(timeout=_PERIOD_S))
+            except queue.Empty:
+                pass
+            except KeyboardInterrupt:
+                return
+            now = perf_counter()
+            if not self._paused:
+                self._go_to(self._time + self._speed * (now - before))
+            before = now
+            self._show()
+
+    def close(self) -> None:
+        """Let go of everything."""
+        if self.scene is not None:
+            self.scene.close()
+
+    def _begin(self, why_no_scene: str) -> None:
+        info, outcome = self._recording.info, self._recording.outcome
+        about = {
+            "mode": "recording",
+            "cell": info.cell,
+            "duration": self._recording.duration,
+            "cameras": [
+                {"name": n, "width": info.cameras[n].width, "height": info.cameras[n].height}
+                for n in self._playback.cameras
+            ],
+            "plots": [plot.as_json() for plot in self._playback.plots],
+            "scene": self.scene is not None,
+            "no_scene": f"No view in space: {why_no_scene}",
+            "draggable": False,
+        }
+        self.board.begin(about, self._playback.rows())
+        for event in self._recording.events:
+            self.board.event(event.time, event.name, event.text)
+        if outcome is not None:
+            end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
+            self.board.status(outcome={**end, "succeeded": outcome.succeeded})
+        self._show()
+
+    def _show(self) -> None:
+        state = self._playback.state(self._time)
+        if state is not None:
+            self.board.state = state
+        self.board.show(self._playback.shots(self._time))
+        self.board.status(time=self._time, paused=self._paused, speed=self._speed)
+
+    def _go_to(self, time: float) -> None:
+        self._time = min(max(time, 0.0), self._recording.duration)
+        if self._time == self._recording.duration:
+            self._paused = True
+
+    def _obey(self, command: Mapping[str, Any]) -> None:
+        match command:
+            case {"do": "pause"}:
+                self._paused = True
+            case {"do": "resume"}:
+                self._paused = False
+                if self._time == self._recording.duration:
+                    self._time = 0.0
+            case {"do": "step"}:
+                self._paused = True
+                times = self._playback.times()
+                later = times[times > self._time + 1e-9]
+                self._go_to(float(later[0]) if len(later) else np.inf)
+            case {"do": "speed", "value": float(speed) | int(speed)} if speed > 0:
+                self._speed = float(speed)
+            case {"do": "seek", "value": float(time) | int(time)}:
+                self._go_to(float(time))
+            case {"do": "reset"}:
+                self._go_to(0.0)
