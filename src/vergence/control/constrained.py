@@ -19,6 +19,7 @@ class ConstrainedLaw:
         objective: what the camera should do.
         depth_m: believed depth of the features, (M,), used where the reference knows none.
         flow_smoothing_s: of the target's motion in the image; infinite for a motionless target.
+        carries_depth: whether the depth is carried on by the camera's motion, see `ImageMotion`.
     """
 
     def __init__(
@@ -28,10 +29,13 @@ class ConstrainedLaw:
         depth_m: FloatArray,
         *,
         flow_smoothing_s: float = 0.1,
+        carries_depth: bool = False,
     ) -> None:
         self.solver, self.objective = solver, objective
         self.depth_m = frozen(depth_m, (None,), "depth_m")
-        self._motion = ImageMotion(solver.arm, solver.camera, flow_smoothing_s)
+        self._motion = ImageMotion(
+            solver.arm, solver.camera, flow_smoothing_s, carries_depth=carries_depth
+        )
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -40,6 +44,7 @@ class ConstrainedLaw:
         view = observation.views[-1]
         depth = self.depth_m if reference.depth_m is None else reference.depth_m
         features = self._motion.update(view, depth, joints)
+        depth = features.depth
         reference = reference.at(joints.time)
         seen = seen_only(features, view.found, depth, reference)
         objective, (features, _, depth, _) = self.objective.twist_objective(*seen), seen

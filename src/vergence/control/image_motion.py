@@ -12,12 +12,15 @@ from vergence.features import ImagePoints
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import Arm, JointState, forward_kinematics
 
+_LEAST_DEPTH = 0.1  # of the depth believed at first
+
 
 class FeatureState(NamedTuple):
     """The features as they should look at this instant."""
 
     points: FloatArray  # (M, 2) normalized coordinates, now
     flow: FloatArray  # (M, 2) their motion by the target's own, 1/s
+    depth: FloatArray  # (M,) m, as believed
 
 
 class ImageMotion:
@@ -34,16 +37,26 @@ class ImageMotion:
         smoothing_s: time constant of the flow; 0 takes every difference at face value, and
             infinity believes in a motionless target.
         memory_s: how far back the joints are remembered; more than the latency.
+        carries_depth: whether the depth of the start is carried on by the camera's motion, which is
+            right for a target that stands; else it stays as it is given.
     """
 
     def __init__(
-        self, arm: Arm, camera: Camera, smoothing_s: float = 0.1, memory_s: float = 2.0
+        self,
+        arm: Arm,
+        camera: Camera,
+        smoothing_s: float = 0.1,
+        memory_s: float = 2.0,
+        *,
+        carries_depth: bool = False,
     ) -> None:
         self._arm, self._camera = arm, camera
         self._smoothing_s, self._memory_s = smoothing_s, memory_s
         self._history: deque[tuple[float, FloatArray]] = deque()
         self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, q, points
         self._flow: FloatArray | None = None
+        self._carries_depth = carries_depth
+        self._depth: FloatArray | None = None  # at the last exposure
 
     @classmethod
     def of(cls, arm: Arm, camera: Camera, smoothing_s: float | None) -> Self | None:
@@ -55,31 +68,38 @@ class ImageMotion:
 
         Args:
             view: the newest measurement.
-            depth: of the features, (M,), m.
+            depth: of the features, (M,), m; if it is carried on, as it was at the first view.
             joints: now.
         """
         self._remember(joints)
         q_exposed = self._joints_at(view.time)
         points = self._camera.normalize(view.points_px)
-        flow = self._update_flow(view, points, depth, q_exposed)
-        moved = _seen_from(self._arm, points, depth, q_exposed, joints.position)
-        return FeatureState(moved + flow * (joints.time - view.time), flow)
+        flow, exposed_depth = self._update(view, points, depth, q_exposed)
+        now = _seen_from(self._arm, points, exposed_depth, q_exposed, joints.position)
+        ahead = now[:, :2] + flow * (joints.time - view.time)
+        return FeatureState(ahead, flow, _least(now[:, 2], depth) if self._carries_depth else depth)
 
-    def _update_flow(
+    def _update(
         self, view: ImagePoints, points: FloatArray, depth: FloatArray, q: FloatArray
-    ) -> FloatArray:
+    ) -> tuple[FloatArray, FloatArray]:
+        """Take in a view; return the flow (M, 2) and the depth (M,) at its exposure."""
+        if self._depth is None or not self._carries_depth:
+            self._depth = depth
         if self._flow is None:
             self._flow = np.zeros_like(points)
         if self._last is not None and view.time > self._last[0]:
             time, q_last, points_last = self._last
             elapsed = view.time - time
-            still = _seen_from(self._arm, points_last, depth, q_last, q)
+            still = _seen_from(self._arm, points_last, self._depth, q_last, q)
             share = elapsed / (elapsed + self._smoothing_s)
-            change = share * ((points - still) / elapsed - self._flow)
+            change = share * ((points - still[:, :2]) / elapsed - self._flow)
             known = view.found & np.isfinite(change).all(axis=1)
             self._flow = self._flow + np.where(known[:, None], change, 0.0)
+            if self._carries_depth:
+                carried = np.where(np.isfinite(still[:, 2]), still[:, 2], self._depth)
+                self._depth = _least(carried, depth)
         self._last = (view.time, q, points)
-        return self._flow
+        return self._flow, self._depth
 
     def _remember(self, joints: JointState) -> None:
         self._history.append((joints.time, joints.position))
@@ -108,16 +128,21 @@ def _seen_from(
     return seen
 
 
+def _least(carried: FloatArray, believed: FloatArray) -> FloatArray:
+    """Keep a carried depth (M,) in front of the camera, though it was believed too small."""
+    return np.maximum(carried, _LEAST_DEPTH * believed)
+
+
 @njit(cache=True, error_model="numpy")
 def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return motionless points as another camera pose sees them, (M, 2).
+    """Return motionless points as another camera pose sees them: x, y and their depth, (M, 3).
 
     Args:
         T_to_from: pose of the first camera in the second, (4, 4).
         points: normalized coordinates in the first, (M, 2).
         depth: in the first, (M,), m.
     """
-    seen = np.empty_like(points)
+    seen = np.empty((len(points), 3))
     for j in range(len(points)):
         x, y, z = points[j, 0] * depth[j], points[j, 1] * depth[j], depth[j]
         behind = T_to_from[2, 0] * x + T_to_from[2, 1] * y + T_to_from[2, 2] * z + T_to_from[2, 3]
@@ -125,4 +150,5 @@ def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> F
             seen[j, a] = (
                 T_to_from[a, 0] * x + T_to_from[a, 1] * y + T_to_from[a, 2] * z + T_to_from[a, 3]
             ) / max(behind, 1e-9)
+        seen[j, 2] = behind
     return seen

@@ -54,7 +54,7 @@ def seen_only(
         velocity_px=seen(reference.velocity_px),
         depth_m=seen(reference.depth_m),
     )
-    state = FeatureState(features.points[found], features.flow[found])
+    state = FeatureState(features.points[found], features.flow[found], depth[found])
     return state, found[found], depth[found], kept
 
 

@@ -115,7 +115,7 @@ class OptimalTrackingLaw:
         if self._motion is None:
             seen, flow = self.camera.normalize(view.points_px), np.empty((len(depth), 0))
         else:
-            seen, flow = self._motion.update(view, depth, joints)
+            seen, flow, depth = self._motion.update(view, depth, joints)
         wanted = self.camera.normalize(reference.points_px)
         features = np.column_stack((seen, wanted, depth, flow))[view.found]
         result = np.empty(self.arm.joint_count + 10)

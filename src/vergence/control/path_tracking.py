@@ -86,7 +86,7 @@ class PathTrackingLaw:
             reason = f"{len(found)} of {len(view.found)} points found; {FEWEST} are needed"
             fault = (OutcomeKind.TARGET_LOST, reason)
             return JointCommand(np.zeros(self.arm.joint_count), np.zeros(6), fault=fault)
-        (seen, flow), reference = self._now(view, reference, joints)
+        (seen, flow, _), reference = self._now(view, reference, joints)
         assert reference.points_px is not None
         assert reference.depth_m is not None
         seen, wanted = seen[found], self.camera.normalize(reference.points_px[found])
@@ -106,10 +106,10 @@ class PathTrackingLaw:
         self, view: ImagePoints, reference: Reference, joints: JointState
     ) -> tuple[FeatureState, Reference]:
         """Return features and reference at one and the same time: now, or the exposure."""
+        assert reference.depth_m is not None
         if self._motion is None:
             points = self.camera.normalize(view.points_px)
-            return FeatureState(points, np.zeros_like(points)), reference
-        assert reference.depth_m is not None
+            return FeatureState(points, np.zeros_like(points), reference.depth_m), reference
         features = self._motion.update(view, reference.depth_m, joints)
         return features, reference.at(joints.time)
 

@@ -26,6 +26,7 @@ class PlainLaw:
         objective: what the camera should do.
         depth_m: believed depth of the features, (M,), used where the reference knows none.
         flow_smoothing_s: of the target's motion in the image; infinite for a motionless target.
+        carries_depth: whether the depth is carried on by the camera's motion, see `ImageMotion`.
         singular_below: smallest singular value of the Jacobian at which the law gives up.
     """
 
@@ -37,6 +38,7 @@ class PlainLaw:
         depth_m: FloatArray,
         *,
         flow_smoothing_s: float = np.inf,
+        carries_depth: bool = False,
         singular_below: float = 0.02,
     ) -> None:
         self.arm, self.objective = arm, objective
@@ -44,7 +46,7 @@ class PlainLaw:
         if not (self.depth_m > 0).all():
             raise InputError("law", "depth_m", depth_m, "depths above zero")
         self.singular_below = singular_below
-        self._motion = ImageMotion(arm, camera, flow_smoothing_s)
+        self._motion = ImageMotion(arm, camera, flow_smoothing_s, carries_depth=carries_depth)
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -53,6 +55,7 @@ class PlainLaw:
         view = observation.views[-1]
         depth = self.depth_m if reference.depth_m is None else reference.depth_m
         features = self._motion.update(view, depth, joints)
+        depth = features.depth
         reference = reference.at(joints.time)
         H, g = self.objective.twist_objective(*seen_only(features, view.found, depth, reference))
         twist = np.linalg.solve(H, g).astype(np.float64)

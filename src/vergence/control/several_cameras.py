@@ -36,6 +36,7 @@ class SeveralCamerasLaw:
         shares: by the camera's name; the reference's own points are for the first of them.
         solver: what is kept, for the arm and the first camera; None for nothing.
         flow_smoothing_s: of the motion of what they look at; infinite if it stands.
+        carries_depth: whether the depth is carried on by the camera's motion, see `ImageMotion`.
         damping: μ without a solver, so that directions that no camera sees do not move.
     """
 
@@ -46,13 +47,19 @@ class SeveralCamerasLaw:
         *,
         solver: ConstrainedSolver | None = None,
         flow_smoothing_s: float = np.inf,
+        carries_depth: bool = False,
         damping: float = 1e-6,
     ) -> None:
         self._arm, self._shares, self._solver = arm, dict(shares), solver
         self._damping = damping
         self._first = next(iter(self._shares))
         self._motions = {
-            name: ImageMotion(self._carrier(share), share.camera, flow_smoothing_s)
+            name: ImageMotion(
+                self._carrier(share),
+                share.camera,
+                flow_smoothing_s,
+                carries_depth=carries_depth,
+            )
             for name, share in self._shares.items()
         }
         self._views: dict[str, ImagePoints] = {}
@@ -89,9 +96,8 @@ class SeveralCamerasLaw:
         if share.T_world_camera is not None:
             joints = replace(joints, position=frozen(joints.position[::-1]))
         now = self._motions[name].update(view, share.depth_m, joints)
-        seen = seen_only(now, view.found, share.depth_m, reference.at(joints.time))
-        (points, flow), depth = seen[0], seen[2]
-        return share.objective.twist_objective(*seen), pack_features(points, flow, depth)
+        seen = seen_only(now, view.found, now.depth, reference.at(joints.time))
+        return share.objective.twist_objective(*seen), pack_features(*seen[0])
 
     def _resolve(
         self, objective: TwistObjective, features: FloatArray, joints: JointState

@@ -53,7 +53,8 @@ class ImageObjectiveTable(Table):
     axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
     Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
-    depth_m: Positive | Literal["initial"] = "initial"  # believed, held constant
+    depth_m: Positive | Literal["initial"] = "initial"  # believed of the features at the start
+    carries_depth: bool = False  # on by the camera's motion, if the target stands; else held
 
 
 class ConstrainedTable(ImageObjectiveTable, PoseTrajectoryTable):

@@ -141,7 +141,13 @@ def _constrained(cell: Cell, driver: SimulatedDriver, table: ConstrainedTable) -
     if cell.tool is not None:
         return _several_cameras(cell, driver, table, cell.tool.camera, solver)
     wanted = _objective(cell, driver, table, objective, cell.task.camera)
-    law = ConstrainedLaw(solver, wanted, depth, flow_smoothing_s=table.flow_smoothing_s)
+    law = ConstrainedLaw(
+        solver,
+        wanted,
+        depth,
+        flow_smoothing_s=table.flow_smoothing_s,
+        carries_depth=table.carries_depth,
+    )
     return _to_hand(cell, law)
 
 
@@ -189,6 +195,7 @@ def _plain(cell: Cell, driver: SimulatedDriver, table: PlainTable) -> PlainLaw:
         _objective(cell, driver, table, table.objective, name),
         _depth(driver, name, table.depth_m),
         flow_smoothing_s=np.inf if smoothing is None else smoothing,
+        carries_depth=table.carries_depth,
         singular_below=table.singular_below,
     )
 
@@ -217,6 +224,7 @@ def _several_cameras(
         shares,
         solver=solver,
         flow_smoothing_s=np.inf if smoothing is None else smoothing,
+        carries_depth=table.carries_depth,
     )
 
 
