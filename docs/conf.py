@@ -12,7 +12,7 @@ os.environ["NUMBA_DISABLE_JIT"] = "1"  # a kernel is documented as the function 
 project = "vergence"
 author = "the vergence authors"
 release = version = version_of("vergence")
-project_copyright = "Apache-2.0"
+project_copyright = "the vergence authors, under the Apache License 2.0"
 
 extensions = [
     "myst_parser",

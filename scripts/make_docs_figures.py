@@ -21,8 +21,8 @@ VERGENCE = Path(sys.executable).with_name("vergence")
 
 PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees")
 LAWS = "image_based,image_based_desired,image_based_mean,optimal_tracking,constrained"
-STARTS = 40
-COMPARED = ("ur5", "panda")
+STARTS = 100
+COMPARED = (("ur5", 0.2), ("panda", 0.2), ("ur5", 0.5), ("panda", 0.5))  # share of joints' ranges
 
 
 def answer(name: str, *command: str) -> dict[str, Any]:
@@ -69,13 +69,14 @@ def slim(svg: str) -> str:
 
 
 def compare() -> None:
-    """Write the table of the laws."""
+    """Write the tables of the laws."""
     lines = []
-    for cell in COMPARED:
-        options = ("--laws", LAWS, "--starts", str(STARTS))
+    for cell, spread in COMPARED:
+        options = ("--laws", LAWS, "--starts", str(STARTS), "--spread", str(spread))
         still = ("--set", 'target.motion={kind="still"}', "--set", "duration_s=8")
-        found = answer(f"laws-{cell}", "compare", cell, *options, *still)
-        lines += [f"**{cell}**", "", *_table(found["laws"]), ""]
+        found = answer(f"laws-{cell}-{spread}", "compare", cell, *options, *still)
+        lines += [f"**{cell}**, starts over {spread:.0%} of the joints' ranges", ""]
+        lines += [*_table(found["laws"]), ""]
     (DOCS / "guide" / "_laws.md").write_text("\n".join(lines))
 
 

@@ -10,6 +10,7 @@ import io
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -68,9 +69,12 @@ def run_python(block: Block, names: dict[str, object], page: Path) -> str:
 
 def run_shell(block: Block) -> str:
     """Run a block: a command of ours in this process, which spares its start, else by a shell."""
+    if block.caption == "runs until Ctrl-C":
+        return run_until_it_runs(block.text)
     ending = re.fullmatch(r"ends with exit code (\d)", block.caption)
-    plain = block.text.startswith("vergence ") and not re.search(r"[$|&;<>]|\n.", block.text)
-    code, said = run_command(shlex.split(block.text)) if plain else run_in_shell(block.text)
+    text = block.text.replace("\\\n", " ")
+    plain = text.startswith("vergence ") and not re.search(r"[$|&;<>]|\n.", text)
+    code, said = run_command(shlex.split(text)) if plain else run_in_shell(text)
     assert code == (int(ending[1]) if ending else 0), f"line {block.line}:\n{said}"
     return said
 
@@ -91,15 +95,33 @@ def run_command(words: list[str]) -> tuple[int, str]:
 
 
 def run_in_shell(text: str) -> tuple[int, str]:
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    command = ["bash", "-e", "-o", "pipefail", "-c", text]
     run = subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", text],
-        env=os.environ | {"PATH": path, "PYTHONPATH": str(DOCS.parent / "src")},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
+        command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     return run.returncode, run.stdout
+
+
+def run_until_it_runs(text: str) -> str:
+    """Start a command that serves until it is stopped; stop it once it says how."""
+    command = ["bash", "-c", f"exec {text}"]
+    with subprocess.Popen(
+        command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as run:
+        assert run.stdout
+        said = ""
+        for line in run.stdout:
+            said += line
+            if "Ctrl-C" in line:
+                run.send_signal(signal.SIGINT)
+    assert run.returncode == 0, said
+    return said
+
+
+def environment() -> dict[str, str]:
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    ours = {"PATH": path, "PYTHONPATH": str(DOCS.parent / "src"), "PYTHONUNBUFFERED": "1"}
+    return os.environ | ours | {"BROWSER": "true"}  # opens nothing
 
 
 def assert_prints(shown: str, said: str, where: str) -> None:
