@@ -9,6 +9,7 @@ from vergence.control import (
     OptimalTrackingLaw,
     TrackingGains,
     image_model,
+    image_square,
     optimal_tracking_tick,
     pack_setup,
     tracking_displacement,
@@ -56,7 +57,7 @@ def test_it_is_the_minimum_of_the_objective(count: int, axes) -> None:
         return gains.Q * left @ left + u @ (gains.R[chosen] * u)
 
     found = minimize(objective, np.zeros(len(chosen)), method="BFGS", options={"gtol": 1e-9})
-    u = tracking_displacement(error, B, gains, 1.0, np.zeros(6))
+    u = tracking_displacement(B.T @ B, B.T @ error, gains, 1.0, np.zeros(6))
     np.testing.assert_allclose(u[chosen], found.x, atol=1e-6)
     rest = [i for i in range(6) if i not in chosen]
     np.testing.assert_array_equal(u[rest], 0.0)
@@ -76,7 +77,7 @@ def test_with_avoidance_it_is_the_minimum_with_the_measure_linearised() -> None:
         return gains.Q * left @ left + u @ (gains.R[chosen] * u) + gains.S * measure
 
     found = minimize(objective, np.zeros(4), method="BFGS", options={"gtol": 1e-9})
-    u = tracking_displacement(error, B, gains, w, gradient)
+    u = tracking_displacement(B.T @ B, B.T @ error, gains, w, gradient)
     np.testing.assert_allclose(u[chosen], found.x, atol=1e-5)
 
 
@@ -84,9 +85,9 @@ def test_with_avoidance_it_is_the_minimum_with_the_measure_linearised() -> None:
 def test_avoidance_stays_bounded_as_the_measure_vanishes(w: float) -> None:
     rng = np.random.default_rng(28)
     error, B = image_model(drawn_features(rng, 1), CAMERA.focal_px)
-    plain = tracking_displacement(error, B, gains_of(FOUR), w, np.ones(6))
+    plain = tracking_displacement(B.T @ B, B.T @ error, gains_of(FOUR), w, np.ones(6))
     gains = gains_of(FOUR, ("x", "y"), S=1.0, avoidance_max=0.01)
-    with_avoidance = tracking_displacement(error, B, gains, w, np.ones(6))
+    with_avoidance = tracking_displacement(B.T @ B, B.T @ error, gains, w, np.ones(6))
     assert np.isfinite(with_avoidance).all()
     assert np.linalg.norm(with_avoidance - plain) <= 0.01 * (1 + 1e-9)
 
@@ -100,17 +101,30 @@ def test_the_model_is_the_interaction_matrix_in_pixels() -> None:
     np.testing.assert_allclose(error, expected.ravel(), atol=1e-9)
 
 
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_the_model_squared_is_summed_without_writing_it_down(count: int) -> None:
+    rng = np.random.default_rng([31, count])
+    flow = rng.uniform(-1.0, 1.0, (count, 2))
+    features = np.column_stack((drawn_features(rng, count), flow))
+    error, B = image_model(features, CAMERA.focal_px)
+    BtB, Bt_error, Bt_drift = image_square(features, CAMERA.focal_px, PERIOD)
+    np.testing.assert_allclose(BtB, np.tril(B.T @ B), rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(Bt_error, B.T @ error, rtol=1e-12, atol=1e-9)
+    drift = (PERIOD * flow * CAMERA.focal_px).ravel()
+    np.testing.assert_allclose(Bt_drift, B.T @ drift, rtol=1e-12, atol=1e-9)
+
+
 def test_two_axes_are_four_with_turning_made_dear() -> None:
     error, B = image_model(drawn_features(np.random.default_rng(30), 1), CAMERA.focal_px)
-    two = tracking_displacement(error, B, gains_of(("x", "y")), 1.0, np.zeros(6))
+    two = tracking_displacement(B.T @ B, B.T @ error, gains_of(("x", "y")), 1.0, np.zeros(6))
     dear = gains_of(FOUR)._replace(R=np.array([10.0, 10.0, 10.0, 1e9, 1e9, 10.0]))
-    four = tracking_displacement(error, B, dear, 1.0, np.zeros(6))
+    four = tracking_displacement(B.T @ B, B.T @ error, dear, 1.0, np.zeros(6))
     np.testing.assert_allclose(four, two, atol=1e-6 * np.linalg.norm(two))
 
 
 def test_no_features_ask_for_no_motion() -> None:
     error, B = image_model(np.empty((0, 5)), CAMERA.focal_px)
-    u = tracking_displacement(error, B, gains_of(), 1.0, np.zeros(6))
+    u = tracking_displacement(B.T @ B, B.T @ error, gains_of(), 1.0, np.zeros(6))
     np.testing.assert_array_equal(u, 0.0)
 
 
@@ -134,7 +148,7 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     tick = unpack_tick(result)
     m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, k, per_joint, law.singular_below)
     error, B = image_model(features, CAMERA.focal_px)
-    u = tracking_displacement(error, B, law.setup.gains, m.value, m.gradient_camera)
+    u = tracking_displacement(B.T @ B, B.T @ error, law.setup.gains, m.value, m.gradient_camera)
     np.testing.assert_allclose(tick.v_camera, u / PERIOD, rtol=1e-9, atol=1e-12)
     wanted = m.J_inverse @ tick.v_camera
     np.testing.assert_allclose(tick.rates, tick.scale * wanted, rtol=1e-9, atol=1e-12)

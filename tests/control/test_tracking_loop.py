@@ -60,11 +60,13 @@ def test_with_the_printed_sign_of_the_first_entry_two_axes_lose_the_feature() ->
     misprinted[0, 0] *= -1
     none = np.zeros(6)
     for _ in range(15):  # half a second
-        x += B @ tracking_kernels.tracking_displacement(x, misprinted, gains, 1.0, none)
+        x += B @ tracking_kernels.tracking_displacement(
+            misprinted.T @ misprinted, misprinted.T @ x, gains, 1.0, none
+        )
     assert abs(x[0]) > CAMERA.width / 2
     x = error.copy()
     for _ in range(15):
-        x += B @ tracking_kernels.tracking_displacement(x, B, gains, 1.0, none)
+        x += B @ tracking_kernels.tracking_displacement(B.T @ B, B.T @ x, gains, 1.0, none)
     assert abs(x[0]) < 0.01 * abs(error[0])
 
 

@@ -5,6 +5,8 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 
+Row = tuple[float, float, float, float, float, float]
+
 
 @njit(cache=True, error_model="numpy")
 def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArray:
@@ -21,11 +23,19 @@ def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArr
     """
     L = np.empty((2 * len(points), 6))
     for j in range(len(points)):
-        x, y, inverse_depth = points[j, 0], points[j, 1], 1.0 / depth[j]
+        across, down = point_rows(points[j, 0], points[j, 1], depth[j])
         r = 2 * j
-        L[r, 0], L[r, 1], L[r, 2] = -inverse_depth, 0.0, x * inverse_depth
-        L[r, 3], L[r, 4], L[r, 5] = x * y, -(1.0 + x * x), y
+        L[r, 0], L[r, 1], L[r, 2], L[r, 3], L[r, 4], L[r, 5] = across
         r += 1
-        L[r, 0], L[r, 1], L[r, 2] = 0.0, -inverse_depth, y * inverse_depth
-        L[r, 3], L[r, 4], L[r, 5] = 1.0 + y * y, -x * y, -x
+        L[r, 0], L[r, 1], L[r, 2], L[r, 3], L[r, 4], L[r, 5] = down
     return L
+
+
+@njit(cache=True, error_model="numpy")
+def point_rows(x: float, y: float, depth: float) -> tuple[Row, Row]:
+    """Return the two rows of L of a point; as tuples they stay in registers."""
+    near = 1.0 / depth
+    return (
+        (-near, 0.0, x * near, x * y, -(1.0 + x * x), y),
+        (0.0, -near, y * near, 1.0 + y * y, -x * y, -x),
+    )
