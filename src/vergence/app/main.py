@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from vergence.app import campaign_commands, names
+from vergence.app import calibrate_command, campaign_commands, names
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
@@ -265,6 +265,7 @@ def watch(
 
 
 campaign_commands.register(app)
+calibrate_command.register(app)
 
 
 @app.command(epilog="Example: vergence bench control")

@@ -1,0 +1,319 @@
+"""`vergence calibrate`: lens and mounting of a camera from pictures of a board."""
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.errors import InputError
+
+if TYPE_CHECKING:
+    from vergence.app.calibration.dataset import Dataset
+    from vergence.app.calibration.estimates import Estimate
+    from vergence.app.calibration.synthetic import Truth
+    from vergence.arrays import FloatArray
+    from vergence.camera import Camera
+    from vergence.camera.calibration import (
+        BadPicture,
+        CalibrationFailure,
+        LensFit,
+        MountingFit,
+    )
+
+
+class Request(NamedTuple):
+    """What the command line asks for."""
+
+    images: Path | None
+    board: str | None  # inner corners, COLUMNSxROWS
+    square_mm: float | None
+    marker_mm: float | None
+    dictionary: str | None
+    poses: Path | None
+    fixed: bool
+    camera: Path | None  # known already
+    lens: str  # which distortion coefficients
+    base: str | None  # x, y, z, roll, pitch, yaw of the arm's base in the world
+    synthetic: str | None  # a cell
+    watch: str | None  # which of its cameras
+    chessboard: bool
+    pictures: int
+    projected: bool
+    noise_px: float
+
+
+class Calibration(NamedTuple):
+    """What came of it."""
+
+    data: "Dataset"
+    truth: "Truth | None"
+    lens: "LensFit"
+    mounting: "MountingFit | None"
+    known: bool  # whether the lens was given
+
+    @property
+    def camera(self) -> "Camera":
+        """The camera as far as all data tell."""
+        return self.lens.camera if self.mounting is None else self.mounting.camera
+
+    @property
+    def bad(self) -> "tuple[BadPicture, ...]":
+        """All pictures that were left out."""
+        more = () if self.mounting is None else self.mounting.bad
+        return self.data.blank + self.lens.bad + more
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before trusting it."""
+        from vergence.app.calibration.words import lens_warnings, mounting_warnings
+
+        more = [] if self.mounting is None else mounting_warnings(self.mounting)
+        return lens_warnings(self.lens, self.known) + more
+
+    @property
+    def estimates(self) -> "list[Estimate]":
+        """The numbers of the result."""
+        from vergence.app.calibration.estimates import lens_estimates, mounting_estimates
+
+        if self.mounting is None:
+            return lens_estimates(self.lens, self.truth)
+        return [
+            *lens_estimates(self.mounting, self.truth),
+            *mounting_estimates(self.mounting, self.truth),
+        ]
+
+
+def calibrate(request: Request, out: Path | None, seed: int, as_json: bool) -> int:
+    """Calibrate, write what a cell file reads, and say how well it is known.
+
+    Raises:
+        InputError: if what was asked or given cannot be used.
+    """
+    from vergence.app.calibration.files import CAMERA, TABLE, write_results
+    from vergence.app.calibration.page import write_calibration_page
+    from vergence.app.progress import working
+
+    _require_one_source(request)
+    T_world_base = _base(request)
+    name = request.synthetic or str(request.images)
+    folder = out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
+    folder.mkdir(parents=True, exist_ok=True)
+    data, truth = _data(request, folder, seed)
+    if truth is not None:
+        T_world_base = truth.T_world_base
+    with working("calibrating"):
+        found = _calibrated(request, data, truth, seed)
+    if not isinstance(found, Calibration):
+        return _failed(found, data, as_json)
+    camera = request.watch or "camera"
+    write_results(folder, found.camera, found.mounting, T_world_base, camera)
+    with working("drawing"):
+        report = write_calibration_page(folder, name, found)
+    files = {"camera": folder / CAMERA, "table": folder / TABLE, "report": report}
+    emit(_answer(found, files)) if as_json else _tell(found, files)
+    return SUCCESS
+
+
+def _require_one_source(request: Request) -> None:
+    if (request.images is None) == (request.synthetic is None):
+        given = "both" if request.images else "nothing"
+        allowed = "either a folder of pictures, or --synthetic CELL"
+        raise InputError("vergence calibrate", "", given, allowed)
+    if request.synthetic is None:
+        for key, value in (("--watch", request.watch), ("--projected", request.projected)):
+            if value:
+                raise InputError("vergence calibrate", key, value, "with --synthetic CELL")
+
+
+def _base(request: Request) -> "FloatArray":
+    import numpy as np
+
+    from vergence.geometry import rpy_to_matrix, se3
+    from vergence.tables import numbers
+
+    if request.base is None:
+        return np.eye(4)
+    values = numbers(
+        {"--base": request.base.replace(",", " ").split()}, "--base", (6,), "vergence calibrate"
+    )
+    T: FloatArray = se3(rpy_to_matrix(np.deg2rad(values[:2:-1].copy())), values[:3].copy())
+    return T
+
+
+def _data(request: Request, folder: Path, seed: int) -> "tuple[Dataset, Truth | None]":
+    from vergence.app.calibration.dataset import board_of_options, read_dataset
+
+    if request.synthetic is None:
+        assert request.images is not None
+        board = board_of_options(
+            request.board, request.square_mm, request.marker_mm, request.dictionary
+        )
+        return read_dataset(request.images, board, request.poses), None
+    from vergence.app.calibration.synthetic import Studio, make_data
+
+    with tempfile.TemporaryDirectory() as models:
+        charuco = not request.chessboard
+        studio = Studio(request.synthetic, request.watch, charuco, Path(models), seed)
+        if request.projected:
+            return make_data(studio, request.pictures, None, request.noise_px)
+        pictures = folder / "images"
+        pictures.mkdir(exist_ok=True)
+        _, truth = make_data(studio, request.pictures, pictures, request.noise_px)
+        return read_dataset(pictures, None, None), truth
+
+
+def _calibrated(
+    request: Request, data: "Dataset", truth: "Truth | None", seed: int
+) -> "Calibration | CalibrationFailure":
+    import numpy as np
+
+    from vergence.camera import read_camera
+    from vergence.camera.calibration import (
+        CalibrationFailure,
+        fit_lens,
+        fit_mounting,
+        free_parameters,
+    )
+
+    file = request.camera
+    known = None if file is None else read_camera(file, data.width, data.height)
+    lens = fit_lens(data.sightings, data.width, data.height, request.lens, known)
+    if isinstance(lens, CalibrationFailure) or data.T_base_flange is None:
+        return (
+            lens
+            if isinstance(lens, CalibrationFailure)
+            else Calibration(data, truth, lens, None, known is not None)
+        )
+    arm = {s.name: T for s, T in zip(data.sightings, data.T_base_flange, strict=True)}
+    mounting = fit_mounting(
+        [data.board.orientations(seen) for seen in lens.sightings],
+        np.array([arm[seen.name] for seen in lens.sightings]),
+        lens.camera,
+        lens.noise_px,
+        fixed=request.fixed if truth is None else truth.fixed,
+        free=None if known else free_parameters(request.lens),
+        rng=np.random.default_rng(seed),
+    )
+    if isinstance(mounting, CalibrationFailure):
+        return mounting
+    return Calibration(data, truth, lens, mounting, known is not None)
+
+
+def _failed(failure: "CalibrationFailure", data: "Dataset", as_json: bool) -> int:
+    if as_json:
+        emit(
+            {
+                "command": "calibrate",
+                "outcome": {"kind": "failed", "reason": failure.reason},
+                "left_out": _left_out(data.blank),
+            }
+        )
+        return FAILURE
+    say(f"no calibration: {failure}")
+    _tell_left_out(data.blank)
+    return FAILURE
+
+
+def _left_out(bad: "Sequence[BadPicture]") -> list[dict[str, Any]]:
+    return [{"picture": b.name, "residual_px": b.residual_px, "reason": b.reason} for b in bad]
+
+
+def _answer(found: Calibration, files: dict[str, Path]) -> dict[str, Any]:
+    from vergence.app.calibration.estimates import rotation_error_deg
+
+    c, mounting = found.camera, found.mounting
+    answer: dict[str, Any] = {
+        "command": "calibrate",
+        "outcome": {"kind": "completed", "reason": ""},
+        "pictures": len(found.data.sightings) + len(found.data.blank),
+        "used": len(found.lens.sightings if mounting is None else mounting.sightings),
+        "left_out": _left_out(found.bad),
+        "warnings": found.warnings,
+        "rms_px": found.lens.rms_px,
+        "noise_px": found.lens.noise_px,
+        "left_out_rms_px": float(found.lens.left_out_px.mean()),
+        "intrinsics": {
+            "width": c.width,
+            "height": c.height,
+            "matrix": c.matrix.tolist(),
+            "distortion": c.distortion.tolist(),
+        },
+        "estimates": [{**e._asdict(), "error": e.error} for e in found.estimates],
+    }
+    if mounting is not None:
+        answer["mounting"] = {
+            "fixed": mounting.fixed,
+            "T_mount_camera": mounting.T_mount_camera.tolist(),
+            "T_mount_board": mounting.T_mount_board.tolist(),
+            "rms_px": mounting.rms_px,
+            "arm_noise_m": mounting.noise.arm_m,
+            "arm_noise_rad": mounting.noise.arm_rad,
+            "left_out_rms_px": float(mounting.left_out_px.mean()),
+            "left_out_m": float(mounting.left_out_m.mean()),
+            "left_out_rad": float(mounting.left_out_rad.mean()),
+        }
+        if found.truth is not None:
+            answer["mounting"]["rotation_error_deg"] = rotation_error_deg(mounting, found.truth)
+    return {**answer, **files}
+
+
+def _tell(found: Calibration, files: dict[str, Path]) -> None:
+    lens, mounting = found.lens, found.mounting
+    say(
+        f"{len(lens.sightings)} pictures of the board · residual {lens.rms_px:.3f} px · "
+        f"a picture left out {lens.left_out_px.mean():.3f} px"
+    )
+    if mounting is not None:
+        import numpy as np
+
+        where = "fixed camera" if mounting.fixed else "camera in the hand"
+        say(
+            f"{where}, {len(mounting.sightings)} poses · residual {mounting.rms_px:.3f} px · a "
+            f"pose left out {mounting.left_out_px.mean():.3f} px, "
+            f"{1e3 * mounting.left_out_m.mean():.2f} mm, "
+            f"{np.rad2deg(mounting.left_out_rad.mean()):.3f}° · arm poses good to "
+            f"{1e3 * mounting.noise.arm_m:.2f} mm, {np.rad2deg(mounting.noise.arm_rad):.3f}°"
+        )
+    say()
+    for line in _table(found):
+        say(line)
+    say()
+    _tell_left_out(found.bad)
+    for words in found.warnings:
+        say(f"  beware: {words}")
+    say(f"  camera  {files['camera']}  (calibration = … in a cell file, or --camera of track)")
+    say(f"  table   {files['table']}  (to paste into a cell file)")
+    say(f"  report  {files['report']}")
+
+
+def _table(found: Calibration) -> list[str]:
+    truth = found.truth is not None
+    heads = ("", "estimate", "deviation", "leaving out", *(("truth", "error") if truth else ()), "")
+    rows = [heads]
+    for e in found.estimates:
+        values = (e.value, e.deviation, e.jackknife, *((e.truth, e.error) if truth else ()))
+        rows.append((e.name, *(_number(value) for value in values), e.unit))
+    widths = [max(len(row[n]) for row in rows) for n in range(len(heads))]
+    return [
+        "  "
+        + "  ".join(
+            cell.rjust(w) if n else cell.ljust(w)
+            for n, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _number(value: float) -> str:
+    if value != value:
+        return "–"
+    return f"{value:.4f}" if abs(value) < 10.0 else f"{value:.3f}"
+
+
+def _tell_left_out(bad: "Sequence[BadPicture]") -> None:
+    for picture in bad:
+        size = (
+            "" if picture.residual_px != picture.residual_px else f" ({picture.residual_px:.2f} px)"
+        )
+        say(f"  left out: {picture.name}{size}: {picture.reason}")

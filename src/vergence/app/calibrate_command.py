@@ -1,0 +1,100 @@
+"""The options of `vergence calibrate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app import names
+
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+_Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of runs/NAME-TIME.")]
+_EXAMPLE = "vergence calibrate photos/ --board 11x8 --square-mm 20 --marker-mm 15"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command(epilog=f"Example: {_EXAMPLE}")(calibrate)
+
+
+def calibrate(
+    images: Annotated[
+        Path | None,
+        typer.Argument(help="A folder of pictures; board.toml and poses.csv may lie in it."),
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option(metavar="CxR", help="Inner corners in a row x rows, as 11x8.")
+    ] = None,
+    square_mm: Annotated[float | None, typer.Option(help="Side of a square.")] = None,
+    marker_mm: Annotated[
+        float | None, typer.Option(help="Side of a marker; without it, a chessboard.")
+    ] = None,
+    dictionary: Annotated[
+        str | None, typer.Option(help="Of the markers; aruco_5x5_250 if absent.")
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help="Poses of the flange in the arm's base: CSV with image, x_m, y_m, z_m, qw, qx, "
+            "qy, qz; or tables named poses in TOML or JSON."
+        ),
+    ] = None,
+    fixed: Annotated[
+        bool, typer.Option("--fixed", help="The camera is fixed and the arm carries the board.")
+    ] = False,
+    camera: Annotated[
+        Path | None, typer.Option(help="The lens, if it is known: only the mounting is sought.")
+    ] = None,
+    lens: Annotated[
+        str, typer.Option(help="Distortion to estimate: none, k1, k1k2, k1k2p1p2 or full.")
+    ] = "full",
+    base: Annotated[
+        str | None,
+        typer.Option(help="The arm's base in the world: x,y,z,roll,pitch,yaw in m and degrees."),
+    ] = None,
+    synthetic: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CELL", help="Make the pictures in a cell.", autocompletion=names.cells
+        ),
+    ] = None,
+    watch: Annotated[str | None, typer.Option(help="Which camera of the cell.")] = None,
+    chessboard: Annotated[
+        bool, typer.Option("--chessboard", help="Make a chessboard instead of ChArUco.")
+    ] = False,
+    pictures: Annotated[int, typer.Option(min=1, help="How many to make.")] = 30,
+    projected: Annotated[
+        bool, typer.Option("--projected", help="Project corners instead of rendering pictures.")
+    ] = False,
+    noise_px: Annotated[float, typer.Option(min=0, help="Of projected corners.")] = 0.1,
+    out: _Out = None,
+    seed: Annotated[int, typer.Option(help="Of all chance.")] = 0,
+    as_json: _Json = False,
+) -> None:
+    """Find a camera's lens, and where it is mounted, from pictures of a board.
+
+    Pictures alone give the lens. With the arm's pose at each picture, lens and mounting are
+    refined together.
+    """
+    from vergence.app.calibrate import Request
+    from vergence.app.calibrate import calibrate as command
+
+    request = Request(
+        images,
+        board,
+        square_mm,
+        marker_mm,
+        dictionary,
+        poses,
+        fixed,
+        camera,
+        lens,
+        base,
+        synthetic,
+        watch,
+        chessboard,
+        pictures,
+        projected,
+        noise_px,
+    )
+    raise typer.Exit(command(request, out, seed, as_json))

@@ -1,0 +1,1 @@
+"""What `vergence calibrate` reads, makes, draws and writes."""

@@ -1,0 +1,137 @@
+"""The page of a calibration: numbers with their uncertainty, residuals, coverage, pictures."""
+
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vergence.app import markup
+from vergence.app.calibration.estimates import Estimate, rotation_error_deg
+from vergence.app.calibration.words import coverage
+from vergence.app.figures.calibration import residual_bars_figure, residual_field_figure
+from vergence.app.report import REPORT
+from vergence.app.table import Row
+
+if TYPE_CHECKING:
+    from vergence.app.calibrate import Calibration
+
+_ASSUMES = (
+    "Deviations follow from the normal equations. They assume that errors of corners are "
+    "independent and as large as the residuals, that the board is flat and as large as said, and "
+    "that the lens follows the model; where arm poses are used, also that their errors are "
+    "independent from picture to picture. “Leaving out” is the deviation seen when each picture in "
+    "turn is left out; where it is much larger, an assumption does not hold."
+)
+
+
+def write_calibration_page(folder: Path, name: str, found: "Calibration") -> Path:
+    """Write a page that needs nothing but itself into a folder; return where it is."""
+    parts = [
+        _header(name, found),
+        markup.section("Result", _result(found), f"<p>{escape(_ASSUMES)}</p>"),
+        markup.section("How well it fits", markup.cards(_numbers(found))),
+        markup.section("Left out", _left_out(found)),
+        markup.section("Residuals", *_figures(found)),
+    ]
+    path = folder / REPORT
+    text = markup.page(f"{name} · vergence calibrate", "\n".join(parts))
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _header(name: str, found: "Calibration") -> str:
+    warnings = found.warnings
+    words = "nothing to beware of" if not warnings else f"{len(warnings)} to beware of"
+    remarks = "".join(f"<li>{escape(text)}</li>" for text in warnings)
+    return (
+        '<header><span class="kicker">vergence calibrate</span>'
+        f"<h1>{escape(name)}</h1><p>{markup.badge(words, not warnings)}</p>"
+        + (f"<ul>{remarks}</ul>" if remarks else "")
+        + "</header>"
+    )
+
+
+def _result(found: "Calibration") -> str:
+    heads = ["", "estimate", "deviation", "leaving out", "truth", "error", "unit"]
+    if found.truth is None:
+        heads = [head for head in heads if head not in ("truth", "error")]
+    head = "".join(f'<th scope="col" class="number">{text}</th>' for text in heads[:-1])
+    head += f'<th scope="col">{heads[-1]}</th>'
+    rows = "\n".join(_row(e, found.truth is not None) for e in found.estimates)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>"
+
+
+def _row(e: Estimate, truth: bool) -> str:
+    values = [e.value, e.deviation, e.jackknife, *((e.truth, e.error) if truth else ())]
+    cells = "".join(
+        f'<td class="number">{"–" if np.isnan(value) else f"{value:.4f}"}</td>' for value in values
+    )
+    return f'<tr><th scope="row">{e.name}</th>{cells}<td class="unit">{e.unit}</td></tr>'
+
+
+def _numbers(found: "Calibration") -> list[str]:
+    lens, mounting = found.lens, found.mounting
+    covered = coverage(lens.sightings, found.data.width, found.data.height)
+    rows = [
+        Row("pictures", str(len(lens.sightings)), "", "with the board, kept"),
+        Row("residual", f"{lens.rms_px:.3f}", "px", "root mean square, each picture's pose free"),
+        Row("left out", f"{lens.left_out_px.mean():.3f}", "px", "a picture under the others' lens"),
+        Row("coverage", f"{100 * covered:.0f}", "%", "of 8 × 6 fields with a corner"),
+    ]
+    cards = [markup.table("Lens", rows)]
+    if mounting is None:
+        return cards
+    turned = " · ".join(f"{angle:.0f}" for angle in mounting.turning_deg)
+    left_m, left_rad = mounting.left_out_m.mean(), mounting.left_out_rad.mean()
+    rows = [
+        Row("poses", str(len(mounting.sightings)), "", "kept"),
+        Row("residual", f"{mounting.rms_px:.3f}", "px", "through the arm's poses"),
+        Row("left out", f"{mounting.left_out_px.mean():.3f}", "px", "predicted by all others"),
+        Row("left out, place", f"{1e3 * left_m:.3f}", "mm", "of the board's middle"),
+        Row("left out, angle", f"{np.rad2deg(left_rad):.4f}", "°"),
+        Row(
+            "arm, position",
+            f"{1e3 * mounting.noise.arm_m:.3f}",
+            "mm",
+            "error of its poses, estimated",
+        ),
+        Row("arm, rotation", f"{np.rad2deg(mounting.noise.arm_rad):.4f}", "°"),
+        Row("arm turned", turned, "°", "about three axes, root mean square between pictures"),
+    ]
+    if found.truth is not None:
+        error = rotation_error_deg(mounting, found.truth)
+        rows.append(Row("rotation error", f"{error:.4f}", "°", "against the truth"))
+    return [*cards, markup.table("Mounting", rows)]
+
+
+def _left_out(found: "Calibration") -> str:
+    rows = [
+        Row(b.name, "–" if np.isnan(b.residual_px) else f"{b.residual_px:.2f}", "px", b.reason)
+        for b in found.bad
+    ]
+    return markup.table("Pictures that were not used", rows)
+
+
+def _figures(found: "Calibration") -> list[str]:
+    lens, mounting = found.lens, found.mounting
+    figures = [
+        markup.figure(
+            residual_field_figure(lens.camera, lens.sightings, lens.residuals),
+            "Where corners were found, and by what they miss the fit of the lens. Arrows that "
+            "agree with their neighbours show a lens that the model does not describe, or a bent "
+            "board.",
+        ),
+        markup.figure(
+            residual_bars_figure(lens.sightings, lens.residuals, lens.left_out_px),
+            "Residuals of the lens, picture by picture; each picture's pose is its own.",
+        ),
+    ]
+    if mounting is not None:
+        figures.append(
+            markup.figure(
+                residual_bars_figure(mounting.sightings, mounting.residuals, mounting.left_out_px),
+                "Residuals through the arm's poses, picture by picture.",
+            )
+        )
+    return figures

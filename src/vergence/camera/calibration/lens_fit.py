@@ -1,0 +1,243 @@
+"""The lens of a camera, from pictures of a board."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera.calibration.failure import CalibrationFailure
+from vergence.camera.calibration.normal_equations import (
+    Share,
+    covariance,
+    jackknife,
+    steps_without,
+)
+from vergence.camera.calibration.reprojection import (
+    LENS,
+    camera_with,
+    lens_of,
+    reproject,
+    residuals,
+    rms,
+)
+from vergence.camera.calibration.sighting import BadPicture, Sighting
+from vergence.camera.pinhole import Camera
+from vergence.errors import InputError
+from vergence.geometry import se3, se3_exp, so3_exp
+
+FEWEST_PICTURES = 4
+FEWEST_CORNERS = 6
+MODELS = {  # which distortion coefficients are estimated
+    "none": (),
+    "k1": ("k1",),
+    "k1k2": ("k1", "k2"),
+    "k1k2p1p2": ("k1", "k2", "p1", "p2"),
+    "full": ("k1", "k2", "p1", "p2", "k3"),
+}
+_FLATTEST_DEG = 8.0  # the board must be seen turned by more than this
+_SUSPICIOUS = 3.0  # times the median residual of all pictures
+_SMALLEST_PX = 0.3  # residuals below are never held against a picture
+
+
+@dataclass(frozen=True, slots=True)
+class LensFit:
+    """A camera as pictures of a board have it; poses of the board are free.
+
+    The deviations assume errors of the corners that are independent, alike in all pictures, and of
+    the size of the residuals; that the board is as flat and as large as said; and that the lens
+    follows the model.
+    """
+
+    camera: Camera
+    covariance: FloatArray  # (9, 9) in the order of `LENS`, 0 where not estimated
+    jackknife: FloatArray  # (9,) standard deviations from leaving out each picture in turn
+    noise_px: float  # standard deviation of a corner's coordinate
+    sightings: tuple[Sighting, ...]  # those kept
+    T_camera_board: FloatArray  # (N, 4, 4)
+    residuals: tuple[FloatArray, ...]  # (2n,) each, px
+    left_out_px: FloatArray  # (N,) rms of each picture under the lens that the others give
+    bad: tuple[BadPicture, ...]
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations (9,), 0 for what was not estimated."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square distance of all corners."""
+        return rms(np.concatenate(self.residuals))
+
+
+def fit_lens(
+    sightings: Sequence[Sighting],
+    width: int,
+    height: int,
+    model: str = "full",
+    known: Camera | None = None,
+) -> LensFit | CalibrationFailure:
+    """Estimate a lens, leaving out pictures that the others contradict.
+
+    OpenCV minimises the squared distances of all corners over lens and poses, after Zhang's closed
+    form. Then the picture with the largest residual goes while it is far beyond the usual.
+
+    Args:
+        sightings: of one board, in pictures by one camera.
+        width: of the pictures, px.
+        height: of the pictures.
+        model: a key of `MODELS`.
+        known: the camera, if it is known already: then only pictures and poses are judged.
+
+    Returns:
+        the fit, or in words why these pictures cannot tell.
+    """
+    if model not in MODELS:
+        raise InputError("fit_lens", "model", model, ", ".join(MODELS))
+    kept, bad = list(sightings), list[BadPicture]()
+    while True:
+        reason = _too_few(kept, bad)
+        if reason:
+            return CalibrationFailure(reason)
+        if known is None:
+            camera, poses = _opencv(kept, width, height, model)
+        else:
+            camera, poses = known, np.array([board_pose(known, seen) for seen in kept])
+        lens = lens_of(camera)
+        sizes = np.array(
+            [rms(residuals(lens, T, seen)) for T, seen in zip(poses, kept, strict=True)]
+        )
+        worst = int(sizes.argmax())
+        usual = float(np.median(sizes))
+        if sizes[worst] <= max(_SUSPICIOUS * usual, _SMALLEST_PX):
+            break
+        reason = (
+            f"its corners lie {sizes[worst]:.2g} px from where a flat board can show them; in the "
+            f"other pictures {usual:.2g} px is usual: blurred, bent, or not this board"
+        )
+        bad.append(BadPicture(kept[worst].name, float(sizes[worst]), reason))
+        del kept[worst]
+    turned = _spread_deg(poses)
+    if turned < _FLATTEST_DEG and known is None:
+        return CalibrationFailure(
+            f"the board is parallel to itself in all pictures, within {turned:.1f}°, which leaves "
+            "the focal length open: add pictures with the board tilted by 20 to 45° about "
+            "different axes"
+        )
+    free = np.zeros(9) if known is not None else free_parameters(model)
+    return _finished(camera, poses, kept, bad, free)
+
+
+def free_parameters(model: str) -> FloatArray:
+    """Return which parameters of a lens a model estimates, (9,), 0 or 1."""
+    return np.array([1.0] * 4 + [float(name in MODELS[model]) for name in LENS[4:]])
+
+
+def board_pose(camera: Camera, seen: Sighting) -> FloatArray:
+    """Return T_camera_board (4, 4) that fits one picture best."""
+    import cv2
+
+    rays = np.ascontiguousarray(camera.normalize(seen.points_px))
+    _, w, t = cv2.solvePnP(seen.points, rays, np.eye(3), np.zeros(5), flags=cv2.SOLVEPNP_IPPE)
+    T = _pose(w, t)
+    lens = lens_of(camera)
+    for _ in range(10):
+        pixels, _, J = reproject(lens, T, seen.points)
+        step = np.asarray(np.linalg.lstsq(J, (seen.points_px - pixels).ravel(), rcond=None)[0])
+        T = se3_exp(step.astype(np.float64)) @ T
+        if np.abs(step).max() < 1e-10:
+            break
+    return T
+
+
+def _too_few(kept: Sequence[Sighting], bad: Sequence[BadPicture]) -> str:
+    if len(kept) < FEWEST_PICTURES:
+        gone = f" after {len(bad)} bad ones were left out" if bad else ""
+        return (
+            f"the board was found in {len(kept)} pictures{gone}; at least {FEWEST_PICTURES} are "
+            "needed, 15 to 30 are good"
+        )
+    if len(bad) > len(kept):
+        return (
+            f"{len(bad)} of {len(bad) + len(kept)} pictures contradict the others: is the board "
+            "the one that was said, flat, and all pictures by one camera with fixed focus?"
+        )
+    return ""
+
+
+def _opencv(
+    kept: Sequence[Sighting], width: int, height: int, model: str
+) -> tuple[Camera, FloatArray]:
+    import cv2
+
+    flags = 0
+    for names, flag in (
+        (("k1",), cv2.CALIB_FIX_K1),
+        (("k2",), cv2.CALIB_FIX_K2),
+        (("p1", "p2"), cv2.CALIB_ZERO_TANGENT_DIST),
+        (("k3",), cv2.CALIB_FIX_K3),
+    ):
+        if not set(names) & set(MODELS[model]):
+            flags |= flag
+    _, A, k, rotations, positions = cv2.calibrateCamera(
+        [seen.points.astype(np.float32) for seen in kept],
+        [seen.points_px.astype(np.float32) for seen in kept],
+        (width, height),
+        np.eye(3),
+        np.zeros(5),
+        flags=flags,
+        criteria=(cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-12),
+    )
+    distortion = np.ravel(k)[:5].astype(np.float64)
+    fx, fy, cx, cy = (float(A[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    camera = Camera(width, height, fx, fy, cx, cy, distortion)
+    poses = [_pose(w, t) for w, t in zip(rotations, positions, strict=True)]
+    return camera, np.array(poses)
+
+
+def _pose(w: object, t: object) -> FloatArray:
+    rotation, position = (np.ravel(np.asarray(v, dtype=np.float64)) for v in (w, t))
+    T: FloatArray = se3(so3_exp(rotation), position)
+    return T
+
+
+def _spread_deg(poses: FloatArray) -> float:
+    """Return the largest angle between the board's planes in two pictures, degrees."""
+    normals = poses[:, :3, 2]
+    cosines = np.abs(normals @ normals.T)
+    return float(np.rad2deg(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
+
+
+def _finished(
+    camera: Camera,
+    poses: FloatArray,
+    kept: Sequence[Sighting],
+    bad: Sequence[BadPicture],
+    free: FloatArray,
+) -> LensFit:
+    lens = lens_of(camera)
+    shares, left = [], []
+    for T, seen in zip(poses, kept, strict=True):
+        _, by_lens, by_pose = reproject(lens, T, seen.points)
+        left.append(residuals(lens, T, seen))
+        shares.append(Share.of(by_lens, left[-1], by_pose))
+    every = np.concatenate(left)
+    variance = float(every @ every) / (len(every) - free.sum() - 6 * len(kept))
+    steps = steps_without(shares, free)
+    return LensFit(
+        camera,
+        covariance(shares, free, variance),
+        jackknife(steps),
+        float(np.sqrt(variance)),
+        tuple(kept),
+        poses,
+        tuple(left),
+        np.array([_alone(lens + d, camera, s) for d, s in zip(steps, kept, strict=True)]),
+        tuple(bad),
+    )
+
+
+def _alone(lens: FloatArray, like: Camera, seen: Sighting) -> float:
+    """Return the rms of a picture whose pose alone is fitted, under a lens, px."""
+    camera = camera_with(lens, like)
+    return rms(residuals(lens, board_pose(camera, seen), seen))

@@ -1,0 +1,26 @@
+"""A board as one picture shows it."""
+
+from typing import NamedTuple
+
+from vergence.arrays import FloatArray
+
+
+class Sighting(NamedTuple):
+    """The corners of a board found in one picture."""
+
+    name: str  # of the picture
+    points: FloatArray  # (n, 3) the corners in the board's frame, m
+    points_px: FloatArray  # (n, 2) where they were found
+
+    @property
+    def size(self) -> int:
+        """How many corners there are."""
+        return len(self.points)
+
+
+class BadPicture(NamedTuple):
+    """A picture that the others contradict, or that shows no board."""
+
+    name: str
+    residual_px: float  # root mean square; NaN where no board was found
+    reason: str

@@ -1,0 +1,269 @@
+"""Calibration: its slopes, its deviations against many repetitions, and what it refuses."""
+
+import numpy as np
+import pytest
+from calibration_scene import BOARD, CAMERA, Scene, scene, views
+
+from vergence.camera.calibration import (
+    CalibrationFailure,
+    LensFit,
+    MountingFit,
+    fit_lens,
+    fit_mounting,
+    free_parameters,
+)
+from vergence.camera.calibration.hand_eye import closed_form
+from vergence.camera.calibration.joint_fit import JointProblem, State
+from vergence.camera.calibration.lens_fit import board_pose
+from vergence.camera.calibration.normal_equations import steps_without
+from vergence.camera.calibration.reprojection import lens_of, reproject, residuals, rms
+from vergence.geometry import se3_exp, se3_inverse, so3_log, transform_points
+
+FREE = free_parameters("full")
+HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+HALF_TURN[:3, 3] = 2 * BOARD.mean(axis=0)
+
+
+def lens(seen, **options) -> LensFit:
+    fit = fit_lens(seen, 640, 480, **options)
+    assert isinstance(fit, LensFit), fit
+    return fit
+
+
+def mounted(
+    given: Scene, fixed=False, sightings=None, rng=None
+) -> MountingFit | CalibrationFailure:
+    fit = lens(given.sightings)
+    assert len(fit.sightings) == len(given.sightings)
+    return fit_mounting(
+        sightings or [(seen,) for seen in given.sightings],
+        given.T_base_flange,
+        fit.camera,
+        fit.noise_px,
+        fixed=fixed,
+        free=FREE,
+        rng=rng or np.random.default_rng(0),
+    )
+
+
+def errors(fit: MountingFit, given: Scene) -> np.ndarray:
+    """Lens, position and rotation of the camera, less the truth, (15,)."""
+    turn = so3_log(fit.T_mount_camera[:3, :3] @ given.X[:3, :3].T)
+    place = fit.T_mount_camera[:3, 3] - given.X[:3, 3]
+    return np.concatenate((lens_of(fit.camera) - lens_of(CAMERA), place, turn))
+
+
+def test_slopes_of_the_reprojection_are_those_of_finite_differences() -> None:
+    rng, h = np.random.default_rng(0), 1e-6
+    (seen, *_), (T, *_) = views(rng, 1)
+    parameters = lens_of(CAMERA)
+    _, by_lens, by_pose = reproject(parameters, T, seen.points)
+
+    def pixels(lens, T):
+        return reproject(lens, np.ascontiguousarray(T), seen.points)[0].ravel()
+
+    for n in range(9):
+        d = h * np.eye(9)[n] * (100.0 if n < 4 else 1.0)
+        slope = (pixels(parameters + d, T) - pixels(parameters - d, T)) / (2 * d[n])
+        np.testing.assert_allclose(by_lens[:, n], slope, rtol=1e-5, atol=1e-6)
+    for n in range(6):
+        d = h * np.eye(6)[n]
+        slope = pixels(parameters, se3_exp(d) @ T) - pixels(parameters, se3_exp(-d) @ T)
+        np.testing.assert_allclose(by_pose[:, n], slope / (2 * h), rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_slopes_of_the_joint_problem_are_those_of_finite_differences(fixed: bool) -> None:
+    rng, h = np.random.default_rng(1), 1e-6
+    given = scene(rng, 3, fixed)
+    A = given.T_base_flange if fixed else np.array([se3_inverse(T) for T in given.T_base_flange])
+    problem = JointProblem(tuple(given.sightings), A, CAMERA, FREE, fixed)
+    from vergence.camera.calibration.hand_eye import Mounting
+
+    state = State(lens_of(CAMERA), Mounting(given.X, given.Y))
+    for step in (np.zeros(21), np.concatenate((np.zeros(9), rng.normal(0, 0.03, 12)))):
+        slopes = problem._slopes(state, step, 1)
+        for n in range(21):
+            d = h * np.eye(21)[n]
+            ahead, behind = (problem.residuals(state.moved(step + s * d))[1] for s in (1, -1))
+            slope = (ahead - behind) / (2 * h)
+            np.testing.assert_allclose(
+                slopes[:, n], slope, rtol=2e-4, atol=2e-3 + 1e-6 * abs(slope).max()
+            )
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_the_closed_form_is_exact_without_noise(fixed: bool) -> None:
+    given = scene(np.random.default_rng(2), 6, fixed, noise_px=0.0)
+    A = given.T_base_flange if fixed else np.array([se3_inverse(T) for T in given.T_base_flange])
+    T = np.array([board_pose(CAMERA, seen) for seen in given.sightings])
+    found = closed_form(A, T)
+    np.testing.assert_allclose(found.X, given.X, atol=1e-7)
+    np.testing.assert_allclose(found.Y, given.Y, atol=1e-7)
+
+
+def test_a_lens_is_found_and_its_deviations_are_those_of_repetitions() -> None:
+    ratios = []
+    for seed in range(30):
+        fit = lens(views(np.random.default_rng(seed), 20)[0])
+        assert fit.noise_px == pytest.approx(0.1, rel=0.08)
+        ratios.append((lens_of(fit.camera) - lens_of(CAMERA)) / fit.deviations)
+        assert (fit.deviations[:2] < 1e-3 * CAMERA.fx).all()
+    spread = np.sqrt(np.mean(np.square(ratios), axis=0))
+    assert (spread > 0.7).all()
+    assert (spread < 1.35).all()
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["in hand", "to hand"])
+def test_the_mounting_is_found_within_the_aim_at_a_tenth_of_a_pixel(fixed: bool) -> None:
+    ratios = []
+    for seed in range(12):
+        given = scene(np.random.default_rng(seed), 25, fixed)
+        fit = mounted(given, fixed)
+        assert isinstance(fit, MountingFit)
+        assert fit.bad == ()
+        off = errors(fit, given)
+        assert abs(off[0]) / CAMERA.fx < 1e-3
+        assert np.linalg.norm(off[9:12]) < 0.5e-3
+        assert np.rad2deg(np.linalg.norm(off[12:])) < 0.05
+        ratios.append(off / fit.deviations[:15])
+    spread = np.sqrt(np.mean(np.square(ratios)))
+    assert 0.75 < spread < 1.25
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["in hand", "to hand"])
+def test_errors_of_the_arm_are_estimated_and_counted_in(fixed: bool) -> None:
+    ratios, arm = [], []
+    for seed in range(10):
+        given = scene(np.random.default_rng(seed), 25, fixed, arm_m=4e-4, arm_rad=6e-4)
+        fit = mounted(given, fixed)
+        assert isinstance(fit, MountingFit)
+        ratios.append(errors(fit, given) / fit.deviations[:15])
+        arm.append(fit.noise[1:])
+    np.testing.assert_allclose(np.mean(arm, axis=0), (4e-4, 6e-4), rtol=0.15)
+    assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.35
+
+
+def test_a_picture_left_out_is_predicted_as_by_a_fit_without_it() -> None:
+    given = scene(np.random.default_rng(3), 12)
+    whole = mounted(given)
+    assert isinstance(whole, MountingFit)
+    for number in (0, 5):
+        others = [n for n in range(12) if n != number]
+        part = Scene([given.sightings[n] for n in others], given.T_base_flange[others], *given[2:])
+        fit = mounted(part)
+        assert isinstance(fit, MountingFit)
+        X, Y = fit.T_mount_camera, fit.T_mount_board
+        T = se3_inverse(X) @ se3_inverse(given.T_base_flange[number]) @ Y
+        missed = rms(residuals(lens_of(fit.camera), T, given.sightings[number]))
+        assert whole.left_out_px[number] == pytest.approx(missed, rel=0.05)
+
+
+def test_leaving_out_is_one_step_of_gauss_and_newton() -> None:
+    rng = np.random.default_rng(4)
+    from vergence.camera.calibration.normal_equations import Share
+
+    J, target = rng.normal(size=(6, 8, 3)), rng.normal(size=(6, 8))
+    best = np.linalg.lstsq(J.reshape(-1, 3), target.ravel())[0]
+    shares = [Share.of(Ji, Ji @ best - ti) for Ji, ti in zip(J, target, strict=True)]
+    steps = steps_without(shares, np.ones(3))
+    for n in range(6):
+        rest = [k for k in range(6) if k != n]
+        alone = np.linalg.lstsq(J[rest].reshape(-1, 3), target[rest].ravel())[0]
+        np.testing.assert_allclose(best + steps[n], alone, atol=1e-10)
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["in hand", "to hand"])
+def test_swapped_poses_and_moved_boards_are_named_and_do_no_harm(fixed: bool) -> None:
+    given = scene(np.random.default_rng(5), 22, fixed)
+    arm = given.T_base_flange.copy()
+    arm[[2, 5, 11]] = arm[[5, 11, 2]]
+    arm[17] = arm[17] @ se3_exp(np.array([0.004, 0.0, 0.0, 0.0, 0.01, 0.0]))
+    fit = mounted(given._replace(T_base_flange=arm), fixed)
+    assert isinstance(fit, MountingFit)
+    assert [bad.name for bad in fit.bad] == ["002.png", "005.png", "011.png", "017.png"]
+    assert all(bad.residual_px > 3.0 for bad in fit.bad)
+    off = errors(fit, given)
+    assert np.linalg.norm(off[9:12]) < 0.5e-3
+    assert np.rad2deg(np.linalg.norm(off[12:])) < 0.05
+
+
+def test_boards_that_look_the_same_upside_down_are_turned_the_right_way() -> None:
+    rng = np.random.default_rng(6)
+    given = scene(rng, 15)
+    sightings = []
+    for seen in given.sightings:
+        turned = seen._replace(points=transform_points(HALF_TURN, seen.points))
+        sightings.append((seen, turned) if rng.random() < 0.5 else (turned, seen))
+    fit = mounted(given, sightings=sightings)
+    assert isinstance(fit, MountingFit)
+    assert fit.bad == ()
+    assert np.linalg.norm(errors(fit, given)[9:12]) < 0.5e-3
+
+
+def test_blurred_pictures_and_other_boards_are_named_and_do_no_harm() -> None:
+    rng = np.random.default_rng(7)
+    seen, _ = views(rng, 20)
+    seen[3] = seen[3]._replace(points_px=seen[3].points_px + rng.normal(0, 3.0, (88, 2)))
+    seen[9] = seen[9]._replace(points_px=np.roll(seen[9].points_px, 1, axis=0))
+    fit = lens(seen)
+    assert sorted(bad.name for bad in fit.bad) == ["003.png", "009.png"]
+    assert abs(fit.camera.fx / CAMERA.fx - 1) < 1e-3
+    assert fit.noise_px == pytest.approx(0.1, rel=0.08)
+
+
+def test_a_board_that_is_never_tilted_cannot_tell_the_focal_length() -> None:
+    fit = fit_lens(views(np.random.default_rng(8), 12, tilt=0.02)[0], 640, 480)
+    assert not fit
+    assert "add pictures with the board tilted" in str(fit)
+
+
+def test_too_few_pictures_are_refused_in_words() -> None:
+    fit = fit_lens(views(np.random.default_rng(9), 3)[0], 640, 480)
+    assert not fit
+    assert "found in 3 pictures; at least 4" in str(fit)
+    given = scene(np.random.default_rng(9), 4)
+    assert "there are 4 pictures" in str(mounted(given))
+
+
+def test_an_arm_that_turned_about_one_axis_only_is_refused_in_words() -> None:
+    rng = np.random.default_rng(10)
+    given = scene(rng, 15)
+    turned = [se3_exp(np.array([0.0, 0, 0, 0, 0, a])) for a in rng.uniform(-1, 1, 15)]
+    alike = np.array([given.T_base_flange[0] @ T for T in turned])
+    assert "turned about one axis only" in str(mounted(given._replace(T_base_flange=alike)))
+    still = np.repeat(given.T_base_flange[:1], 15, axis=0)
+    assert "hardly turned" in str(mounted(given._replace(T_base_flange=still)))
+
+
+def test_poses_that_have_nothing_to_do_with_the_pictures_are_refused() -> None:
+    given = scene(np.random.default_rng(11), 15)
+    other = scene(np.random.default_rng(12), 15)
+    fit = mounted(given._replace(T_base_flange=other.T_base_flange))
+    assert not fit
+    assert "contradict each other" in str(fit)
+
+
+def test_a_lens_that_is_known_stays_as_it_is() -> None:
+    given = scene(np.random.default_rng(13), 15)
+    fit = fit_lens(given.sightings, 640, 480, known=CAMERA)
+    assert isinstance(fit, LensFit)
+    assert fit.camera is CAMERA
+    assert (fit.deviations == 0).all()
+    mounting = fit_mounting(
+        [(seen,) for seen in given.sightings],
+        given.T_base_flange,
+        CAMERA,
+        fit.noise_px,
+        rng=np.random.default_rng(0),
+    )
+    assert isinstance(mounting, MountingFit)
+    np.testing.assert_array_equal(lens_of(mounting.camera), lens_of(CAMERA))
+    assert np.linalg.norm(errors(mounting, given)[9:12]) < 0.3e-3
+
+
+@pytest.mark.parametrize("model", ["none", "k1", "k1k2", "k1k2p1p2"])
+def test_only_the_wanted_coefficients_are_estimated(model: str) -> None:
+    fit = lens(views(np.random.default_rng(14), 12)[0], model=model)
+    np.testing.assert_array_equal(fit.deviations > 0, free_parameters(model) > 0)
+    assert (fit.camera.distortion[free_parameters(model)[4:] == 0] == 0).all()
