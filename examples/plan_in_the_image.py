@@ -8,17 +8,18 @@ from vergence.vision import estimate_two_view
 def main() -> None:
     driver = SimulatedDriver(load_cell("gantry"), images=False)
     camera, arm = driver.cameras["eye"], driver.world.arm_to_camera("eye")
+    q = driver.read().joints["gantry"].position
     now = driver.first_frame("eye").truth
-    wanted = driver.frame_at(
-        "eye", "gantry", [-0.26443, 0.305428, 0.159083, 0.0751, 0.1157, -0.1297]
-    )
+    there = [-0.26443, 0.305428, 0.159083, 0.0751, 0.1157, -0.1297]  # m, rad: driven to once
+    wanted = driver.frame_at("eye", "gantry", there)
     assert now is not None
     assert wanted.truth is not None
     view = estimate_two_view(now.points_px, wanted.truth.points_px, camera)
     if not view:
         raise SystemExit(str(view))
-    q = driver.read().joints["gantry"].position
-    plan = OptimisedPlanner().plan(PlanningProblem.from_two_view(view, 0.615, arm, camera, q))
+    distance_m = 0.615  # roughly, from the camera to the object: two pictures have no scale
+    problem = PlanningProblem.from_two_view(view, distance_m, arm, camera, q)
+    plan = OptimisedPlanner().plan(problem)
     if not plan:
         raise SystemExit(str(plan))
     trajectory = Trajectory.of(plan, camera_speed=0.25)

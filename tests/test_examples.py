@@ -19,3 +19,10 @@ def test_every_example_runs_and_says_what_it_did(tmp_path: Path) -> None:
         )
         assert run.returncode == 0, f"{example.name}:\n{run.stderr}"
         assert run.stdout, example.name
+
+
+def test_an_example_is_short_enough_to_be_read() -> None:
+    scripts = sorted(EXAMPLES.rglob("*.py"))
+    assert len(scripts) >= 8
+    for script in scripts:
+        assert len(script.read_text(encoding="utf-8").splitlines()) <= 100, script.name

@@ -1,0 +1,71 @@
+"""Ask a UR5 for a picture that it must not reach: without constraints, and with them.
+
+The four points are wanted beyond the border of the picture. A plain law goes there and loses them;
+the constrained law stops at the border, and its recording says what held it back.
+Needs the arm's model: pip install 'vergence[arms]'
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.control import ConstrainedLaw, ConstrainedSolver, ImageBased, Law, PlainLaw
+from vergence.estimation import ExactPoints
+from vergence.planning import FixedReference, Reference
+from vergence.robot import manipulability_measure
+from vergence.runtime import Loop, Recorder, Recording
+from vergence.runtime.recording import RunInfo
+
+MARGIN_PX = 20.0
+BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are wanted
+
+
+def servo(driver: SimulatedDriver, law: Law, wanted_px: np.ndarray, folder: Path) -> Recording:
+    """Run a law for five seconds and return what was recorded."""
+    recorder = Recorder(folder)
+    recorder.begin(RunInfo.of(driver, "ur5", driver.cell.text, driver.cell.seed, "wrist"))
+    goal = FixedReference(Reference(0.0, wanted_px))
+    loop = Loop(
+        driver, "ur5", ExactPoints("wrist"), goal, law, outer_rate_hz=30, listeners=[recorder]
+    )
+    recorder.close(loop.run(duration_s=5.0), {})
+    driver.close()
+    return Recording.open(folder)
+
+
+def main() -> None:
+    for name in ("plain", "constrained"):
+        driver = SimulatedDriver(
+            load_cell("ur5", {"target.motion": '{ kind = "still" }'}), images=False
+        )
+        arm, camera = driver.world.arm_to_camera("wrist"), driver.cameras["wrist"]
+        start = driver.read().joints["ur5"].position
+        truth = driver.first_frame("wrist").truth
+        assert truth is not None
+        objective = ImageBased(camera, gain=2.0)
+        law: Law = PlainLaw(arm, camera, objective, truth.depth_m)
+        if name == "constrained":
+            solver = ConstrainedSolver(
+                arm,
+                camera,
+                order=("view", "singularity", "joint margin"),  # what bends last stands first
+                view_margin_px=MARGIN_PX,
+                manipulability_min=0.5 * manipulability_measure(arm.jacobian(start)),
+                depth_range=(0.7, 1.4),  # the depth may be wrong by so much
+            )
+            law = ConstrainedLaw(solver, objective, truth.depth_m)
+        run = servo(driver, law, truth.points_px + BEYOND_PX, Path("runs") / f"ur5-{name}")
+        seen = run.cameras["wrist"].points_px
+        lost = np.count_nonzero(np.isnan(seen[:, :, 0]).any(axis=0))
+        room = np.minimum(seen, np.array([camera.width, camera.height]) - 1 - seen)
+        shaped = {what for tick in run.arms["ur5"].active for what in tick}
+        print(f"{name}: {run.outcome}")
+        print(f"  {lost} of {len(truth.points_px)} points were lost; ", end="")
+        print(f"the rest stayed {np.nanmin(room):.0f} px or more from the border")
+        print(f"  shaped by: {', '.join(sorted(shaped)) or 'nothing'}")
+        print(f"  vergence report {run.folder}")
+
+
+if __name__ == "__main__":
+    main()
