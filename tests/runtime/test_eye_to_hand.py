@@ -1,10 +1,11 @@
 """A camera on a stand brings what the hand holds to where it is wanted in its picture."""
 
+import numpy as np
 import pytest
 
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.runtime import run_cell
+from vergence.runtime import Recorder, Recording, run_cell
 
 
 @pytest.mark.parametrize(
@@ -57,6 +58,16 @@ def test_by_pose_the_constrained_law_gets_there_too():
     assert result.outcome.succeeded
     assert result.summary["final_hand_error_m"] < 1e-3
     assert result.summary["final_hand_error_deg"] < 0.3
+
+
+def test_the_recording_says_where_the_corners_are_wanted_and_that_they_got_there(tmp_path):
+    recorder = Recorder(tmp_path)
+    run_cell(load_cell("eye_to_hand_pose").replace(duration_s=4.0), [recorder], images=False)
+    trace = Recording.open(tmp_path).cameras["front"]
+    off = np.linalg.norm(trace.desired_px - trace.true_px, axis=-1)
+    assert np.nanmax(off[0]) > 50.0
+    assert np.nanmax(off[-1]) < 2.0
+    assert np.isfinite(trace.T_camera_target_wanted).all()
 
 
 def test_a_camera_that_moves_with_the_target_is_refused():

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.camera import Frame
+from vergence.camera import Camera, Frame
 from vergence.features import ImagePoints
+from vergence.geometry import se3_inverse, transform_points
 from vergence.outcome import Outcome
 from vergence.places import CELL, RECORDING
 from vergence.runtime.recording import messages, streams
@@ -97,6 +98,8 @@ class Tape:
     ) -> None:
         camera, time = _source(frame, view)
         desired, wanted = self._wanted(record, camera)
+        if desired is None and wanted is not None:
+            desired = _shown(wanted, frame, view, self._info.cameras[camera])
         row = streams.features_message(record.time, frame, view, desired, wanted)
         self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, row)
         truth = frame.truth if frame is not None else None
@@ -134,6 +137,23 @@ class Tape:
         self._file.numbers("/target", self.now, streams.TARGET_SCHEMA, row)
         poses = {"target estimate": target.T_world_target}
         self._file.typed("/tf", self.now, messages.transforms(target.time, poses))
+
+
+def _shown(
+    T_camera_target: FloatArray, frame: Frame | None, view: ImagePoints | None, camera: Camera
+) -> FloatArray | None:
+    """Return where the points that were looked for would be at a wanted pose, (M, 2) px.
+
+    Where they are on the target is only known of a simulated picture.
+    """
+    truth = frame.truth if frame is not None else None
+    if truth is None or view is None:
+        return None
+    rays = np.column_stack((camera.normalize(truth.points_px), np.ones(len(truth.depth_m))))
+    T_target_camera = se3_inverse(truth.T_world_target) @ truth.T_world_camera
+    T = np.ascontiguousarray(T_camera_target @ T_target_camera)
+    places: FloatArray = camera.project(transform_points(T, rays * truth.depth_m[:, None]))
+    return np.where(view.asked[:, None], places, np.nan)
 
 
 def _paired(record: TickRecord) -> list[tuple[Frame | None, ImagePoints | None]]:
