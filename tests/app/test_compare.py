@@ -105,7 +105,7 @@ def test_workers_that_die_end_in_a_message(
     monkeypatch.setattr(Crew, "run", lose)
     assert command(*COMPARE, "--out", "c") == 1
     said = capsys.readouterr().err
-    assert "4 workers, waiting for run own/3" in said
+    assert "run own/3: something killed 4 workers; the same command" in said
     assert "--out c goes on from here" in said
 
 

@@ -17,7 +17,7 @@ from vergence.runtime.campaign.trial import Trial, TrialResult
 
 _CONNECT_S = 10
 _CHUNK = 256  # quick trials handed out at once: about a second of one core
-_SCHEDULER = "a Dask scheduler, such as tcp://10.0.0.1:8786"
+_SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
 
 
 class WorkersLostError(VergenceError):
@@ -26,7 +26,7 @@ class WorkersLostError(VergenceError):
     def __init__(self, trials: Sequence[Trial], what: str) -> None:
         first, more = trials[0].key, len(trials) - 1
         runs = f"run {first} and {more} more" if more else f"run {first}"
-        super().__init__(f"{what}, waiting for {runs}")
+        super().__init__(f"{runs}: {what}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Crew:
                     yield from future.result()
                 except distributed.scheduler.KilledWorker as error:
                     count = error.allowed_failures + 1
-                    what = f"something killed {count} workers in turn (out of memory?)"
+                    what = f"every worker that took it was killed, {count} in all; out of memory?"
                     raise WorkersLostError(given[future], what) from None
                 except distributed.client.FutureCancelledError:
                     raise WorkersLostError(given[future], "the scheduler is gone") from None
@@ -96,10 +96,8 @@ class Crew:
             try:
                 client = distributed.Client(self.scheduler, timeout=_CONNECT_S)
             except (OSError, TimeoutError, ValueError) as error:
-                allowed = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
-                raise InputError(
-                    "--scheduler", "", f"{self.scheduler} ({error})", allowed
-                ) from None
+                given = f"{self.scheduler} ({error})"
+                raise InputError("--scheduler", "", given, _SCHEDULER) from None
             with client:
                 yield client
             return
