@@ -23,15 +23,15 @@ from vergence.studies.mezouar2001_methods import (
     servo,
     too_close,
 )
-from vergence.studies.mezouar2001_scene import END_MARGIN_PX, Scene
 from vergence.studies.mezouar2001_trials import (
     End,
     Trial,
     is_infeasible,
-    processes,
     try_start,
     wrong_beliefs,
 )
+from vergence.studies.processes import processes
+from vergence.studies.reach_scene import END_MARGIN_PX, Scene
 
 CHECKS = {
     "straight.leaves_view",
@@ -81,7 +81,9 @@ def test_random_starts_are_far_and_see_everything_at_both_ends(
     scene: Scene, roll_deg: tuple[float, float] | None
 ) -> None:
     for seed in range(5):
-        start = scene.elsewhere(np.random.default_rng(seed), roll_deg)
+        start = Scene.drawn(
+            scene.arm, scene.camera, scene.marks, np.random.default_rng(seed), roll_deg
+        )
         T_start = start.arm.forward_kinematics(start.q_start)
         for T in (T_start, start.T_world_goal):
             assert start.camera.contains(start.seen_px(T), END_MARGIN_PX).all()
@@ -89,7 +91,9 @@ def test_random_starts_are_far_and_see_everything_at_both_ends(
         turn = np.linalg.norm(so3_log(np.ascontiguousarray(motion[:3, :3])))
         assert np.linalg.norm(motion[:3, 3]) > 0.3 or turn > np.radians(60)
         assert not start.arm.outside(start.q_start).any()
-        again = scene.elsewhere(np.random.default_rng(seed), roll_deg)
+        again = Scene.drawn(
+            scene.arm, scene.camera, scene.marks, np.random.default_rng(seed), roll_deg
+        )
         np.testing.assert_array_equal(again.q_start, start.q_start)
 
 

@@ -22,6 +22,8 @@ class ImageBased:
         gain: λ, 1/s.
         model: where L is taken: at the features as they are, as they should be, or the mean.
         damping: on the twist, so that few features leave no direction open.
+        goal_depth_m: depth of the features where they should be, (M,), for L there; as deep as they
+            are now if None.
     """
 
     def __init__(
@@ -30,9 +32,11 @@ class ImageBased:
         gain: float = 1.0,
         model: InteractionModel = "current",
         damping: float = 1e-6,
+        goal_depth_m: FloatArray | None = None,
     ) -> None:
         self._camera, self._gain, self._model = camera, gain, model
         self._R = np.full(6, damping)
+        self._goal_depth_m = goal_depth_m
 
     def twist_objective(
         self, features: FeatureState, found: BoolArray, depth: FloatArray, reference: Reference
@@ -52,12 +56,13 @@ class ImageBased:
     def _interaction(
         self, points: FloatArray, desired: FloatArray, depth: FloatArray
     ) -> FloatArray:
+        there = depth if self._goal_depth_m is None else self._goal_depth_m
         if self._model == "current":
             L: FloatArray = interaction_matrix_points(points, depth)
         elif self._model == "desired":
-            L = interaction_matrix_points(desired, depth)
+            L = interaction_matrix_points(desired, there)
         else:
             L = 0.5 * (
-                interaction_matrix_points(points, depth) + interaction_matrix_points(desired, depth)
+                interaction_matrix_points(points, depth) + interaction_matrix_points(desired, there)
             )
         return L

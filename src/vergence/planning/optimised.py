@@ -1,6 +1,6 @@
 """The planner to use: an optimised continuous path, and a tree search behind it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,9 @@ from vergence.planning.tree import connect_trees, pull_into_view, shorten
 from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
 
-PROOF_CELLS = 32  # of the grid that shows some problems to have no path
+PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
+WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint
+MARGINS = (0.2, 0.0)  # shares of the margins that do where no path keeps them whole
 SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
 
 
@@ -37,8 +39,8 @@ class OptimisedPlanner:
 
     The cost is ∫ |q'/q̇_max|² + smoothing ∫ |q''/q̇_max|² over the path. Guesses: straight in joint
     space to every inverse-kinematics branch, the same pulled into view, and the camera's straight
-    line turned in both senses; behind them a bidirectional tree and, for arms that slide first, a
-    search over the wrist cell by cell. The same problem always has the same answer.
+    line turned in both senses; behind them, for arms that slide first, a search over the wrist cell
+    by cell, and a bidirectional tree. The same problem always has the same answer.
     """
 
     controls: int = 12  # of the spline; twice as many for what the tree finds
@@ -51,17 +53,23 @@ class OptimisedPlanner:
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return the smoothest path found that keeps every constraint, or what stood in the way.
 
-        Where none keeps the margins, a fifth of them will do before there is no plan.
+        Where none keeps the margins, a part of them will do before there is no plan.
         """
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
         plan = self._with_margins(problem)
-        px, joint = 0.2 * problem.margin_px, 0.2 * problem.margin_joint
-        if isinstance(plan, Path) or plan.proved or px == joint == 0.0:
+        if isinstance(plan, Path) or plan.proved:
             return plan
-        second = self._with_margins(replace(problem, margin_px=px, margin_joint=joint))
-        return second if second else plan
+        if proves_no_path(problem, PROOF_CELLS[1]):
+            return _proved(plan)
+        if problem.margin_px > 0.0 or problem.margin_joint > 0.0:
+            for share in MARGINS:
+                px, joint = share * problem.margin_px, share * problem.margin_joint
+                closer = self._with_margins(replace(problem, margin_px=px, margin_joint=joint))
+                if closer:
+                    return closer
+        return plan
 
     def _with_margins(self, problem: PlanningProblem) -> Path | PlanFailure:
         goals = goal_configurations(
@@ -72,11 +80,10 @@ class OptimisedPlanner:
         view = problem.view(_margin_kept(problem))
         best = self._from_guesses(problem, view, goals)
         if best is None:
-            everywhere = goal_configurations(problem.arm, problem.T_world_goal, problem.q_start, 64)
-            if proves_no_path(problem, everywhere, PROOF_CELLS):
-                failure = self._obstacle(problem, view, goals)
-                return replace(failure, reason=failure.reason + "; no path exists", proved=True)
-            if self.tree_samples > 0:
+            if proves_no_path(problem, PROOF_CELLS[0]):
+                return _proved(self._obstacle(problem, view, goals))
+            best = self._from_wrist(problem, view, goals)
+            if best is None and self.tree_samples > 0:
                 best = self._from_tree(problem, view, goals)
         if best is None:
             return self._obstacle(problem, view, goals)
@@ -146,14 +153,30 @@ class OptimisedPlanner:
             problem.q_start.copy(), goals, samples, 0.15,
         )  # fmt: skip
         if not len(path):
-            guess = wrist_path(problem, view, goals)
-            basis = spline_basis(2 * self.controls, 2 * self.samples, self.smoothing)
-            return self._smooth(problem, view, basis, guess) if len(guess) else None
+            return None
+        draws = (random.random((200, 2)), np.empty((0, 2)))
+        return self._smoothest(
+            problem, view, [shorten(arm.chain, view, scale, path, some) for some in draws]
+        )
+
+    def _from_wrist(
+        self, problem: PlanningProblem, view: View, goals: FloatArray
+    ) -> _Candidate | None:
+        for cells in WRIST_CELLS:
+            guess = wrist_path(problem, view, goals, cells)
+            found = self._smoothest(problem, view, [guess]) if len(guess) else None
+            if found is not None:
+                return found
+        return None
+
+    def _smoothest(
+        self, problem: PlanningProblem, view: View, guesses: Sequence[FloatArray]
+    ) -> _Candidate | None:
+        """Return what comes of the first guess that can be smoothed, by as few controls as do."""
         for controls in (2 * self.controls, 4 * self.controls):
             basis = spline_basis(controls, 4 * controls, self.smoothing)
-            for draws in (random.random((200, 2)), np.empty((0, 2))):
-                waypoints = shorten(arm.chain, view, scale, path, draws)
-                found = self._smooth(problem, view, basis, waypoints)
+            for guess in guesses:
+                found = self._smooth(problem, view, basis, guess)
                 if found is not None:
                     return found
         return None
@@ -172,6 +195,10 @@ class OptimisedPlanner:
         return PlanFailure(
             Obstacle.VISIBILITY, "no path was found on which all points stay in the image"
         )
+
+
+def _proved(failure: PlanFailure) -> PlanFailure:
+    return replace(failure, reason=failure.reason + "; no path exists", proved=True)
 
 
 def _pulled(problem: PlanningProblem, view: View, waypoints: FloatArray) -> FloatArray:

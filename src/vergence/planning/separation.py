@@ -4,12 +4,16 @@ On such an arm (a gantry with a wrist) the turning joints alone decide the camer
 for a given orientation the places of the camera that see all points form a convex cone, which the
 sliding joints reach or do not. The orientations that see at all are therefore known cell by cell of
 a grid over the turning joints. A path in joint space is a path through neighbouring cells; if start
-and goal lie in different islands of cells, there is no path, whatever a planner tries.
+and goal lie in different islands of cells, there is no path, whatever a planner tries. The goal is
+every cell that may turn the camera as the goal does, so no branch of the inverse kinematics is
+forgotten.
 
 The test of a cell is on the safe side: it asks for a place that sees the points from the cell's
 middle with every side of the view, and every sliding limit, eased by as much as the cell's half
 width can matter. Cells it rejects hold no valid configuration.
 """
+
+from functools import partial
 
 import numpy as np
 from numba import njit, prange
@@ -18,17 +22,14 @@ from numpy.typing import NDArray
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.visibility import View
-from vergence.robot import Arm, Chain, chain_state
+from vergence.robot import Arm, Chain, chain_state, world_jacobian
 
 
-def proves_no_path(
-    problem: PlanningProblem, goals: FloatArray, cells_max: int = 128, margin_px: float = 0.0
-) -> bool:
-    """Return whether start and every goal configuration are proved to be separated.
+def proves_no_path(problem: PlanningProblem, cells_max: int = 128, margin_px: float = 0.0) -> bool:
+    """Return whether the start and everything that brings the camera to the goal are separated.
 
     Args:
         problem: of an arm whose first three joints slide and whose others, three at most, turn.
-        goals: every goal configuration inside the limits, (G, n).
         cells_max: of the finest grid along each turning joint; finer proves more.
         margin_px: to the border of the image.
 
@@ -41,21 +42,24 @@ def proves_no_path(
     low, high = arm.q_min[3:].copy(), arm.q_max[3:].copy()
     view = problem.view(margin_px)
     view = view._replace(offsets=np.zeros(5))  # in front of the camera is all that is asked
+    R_goal = problem.T_world_goal[:3, :3].copy()
+    q_min, q_max = arm.q_min.copy(), arm.q_max.copy()
     cells, seen = 16, np.ones((16,) * len(low), dtype=np.bool_)
+    sure = np.zeros_like(seen)
     while True:
         shape, width = np.array(seen.shape), (high - low) / cells
-        q_min, q_max = arm.q_min.copy(), arm.q_max.copy()
-        flat = visible_cells(arm.chain, view, q_min, q_max, low, width, shape, seen.ravel(), 1.0)
-        islands = label_islands(flat, shape)
-        homes = [_cell_of(q[3:], low, high, cells) for q in (problem.q_start, *goals)]
-        if all(islands[homes[0]] != islands[home] for home in homes[1:]):
+        see = partial(visible_cells, arm.chain, view, q_min, q_max, low, width, shape)
+        seen = see((seen & ~sure).ravel(), 1.0).reshape(seen.shape) | sure
+        islands = label_islands(seen.ravel(), shape)
+        start = islands[_cell_of(problem.q_start[3:], low, high, cells)]
+        if not cells_turned_to(arm.chain, R_goal, low, width, shape, islands == start).any():
             return True
         cells *= 2
         if cells > cells_max:
             return False
-        seen = flat.reshape(seen.shape)
-        for axis in range(seen.ndim):  # a cell rejected is rejected in all its parts
-            seen = np.repeat(seen, 2, axis=axis)
+        sure |= see((seen & ~sure).ravel(), -1.0).reshape(seen.shape)
+        for axis in range(seen.ndim):  # what is known of a cell is known of all its parts
+            seen, sure = np.repeat(seen, 2, axis=axis), np.repeat(sure, 2, axis=axis)
 
 
 def slides_then_turns(arm: Arm) -> bool:
@@ -87,19 +91,52 @@ def visible_cells(
 ) -> BoolArray:
     """Return which of the cells asked for see all points.
 
-    With ease 1 those that may hold a configuration that does, with 0 those whose middle does.
+    With ease 1 those that may hold a configuration that does, with 0 those whose middle does; with
+    -1 all of the cell does, to first order.
     """
     result = np.zeros(len(asked), np.bool_)
     for cell in prange(len(result)):
         if not asked[cell]:
             continue
         q = 0.5 * (q_min + q_max)
-        rest = cell
-        for i in range(len(shape) - 1, -1, -1):
-            q[3 + i] = low[i] + (rest % shape[i] + 0.5) * width[i]
-            rest //= shape[i]
-        result[cell] = cell_sees(chain, view, q, q_min, q_max, ease * 0.5 * width.sum())
+        set_wrist(q, cell, low, width, shape)
+        result[cell] = cell_sees(chain, view, q, q_min, q_max, ease * 0.5 * width)
     return result
+
+
+@njit(cache=True, parallel=True)
+def cells_turned_to(
+    chain: Chain,
+    R: FloatArray,
+    low: FloatArray,
+    width: FloatArray,
+    shape: IntArray,
+    asked: BoolArray,
+) -> BoolArray:
+    """Return which of the cells asked for may turn the camera to an orientation R (3, 3).
+
+    Somewhere in a cell the camera is turned from where it is in the middle by half the cell's
+    widths together, at most.
+    """
+    result = np.zeros(len(asked), np.bool_)
+    most = np.cos(min(0.5 * width.sum(), np.pi))
+    for cell in prange(len(result)):
+        if asked[cell]:
+            q = np.zeros(3 + len(shape))
+            set_wrist(q, cell, low, width, shape)
+            trace = np.sum(chain_state(chain, q).R * R)
+            result[cell] = 0.5 * (trace - 1.0) >= most - 1e-9
+    return result
+
+
+@njit(cache=True)
+def set_wrist(
+    q: FloatArray, cell: int, low: FloatArray, width: FloatArray, shape: IntArray
+) -> None:
+    """Put the turning joints of q, in place, in the middle of a cell."""
+    for i in range(len(shape) - 1, -1, -1):
+        q[3 + i] = low[i] + (cell % shape[i] + 0.5) * width[i]
+        cell //= shape[i]
 
 
 @njit(cache=True)
@@ -109,24 +146,39 @@ def cell_sees(
     q: FloatArray,
     q_min: FloatArray,
     q_max: FloatArray,
-    turn: float,
+    half: FloatArray,
 ) -> bool:
-    """Return whether some place of the camera may see all points with the wrist near q[3:].
+    """Return whether the camera may see all points from somewhere, the wrist within q[3:] ± half.
 
-    Turning the wrist by at most `turn` moves the camera by at most turn · lever, and turns a side's
-    normal a away by at most `turn`: what was a·X ≥ 0 is at worst a·X ≥ -sin(turn) ‖X‖. A point in
-    the cone of view, itself turned, has ‖X‖ ≤ z·X / cos(φ + turn), φ half the diagonal angle of
-    view. So (a + sin(turn)/cos(φ + turn) z)·X ≥ -turn · lever · ‖…‖ holds for all of the cell.
+    Y is a point seen from the turned camera, a the normal of a side of the view, z the optical
+    axis, both as they are at q. Turning joint i by δ_i changes a·Y by δ_i (ω_i × a)·Y and moves the
+    camera by δ_i J_i; what is left is of second order, at most τ²/2 ‖Y‖ and τ²/2 · lever with
+    τ = Σ half_i. Y lies in the cone of view, turned by at most τ, where
+    |(ω_i × a)·Y| ≤ c_i z·Y. So whatever is seen from the cell obeys, at q itself, with
+    side = a + (Σ half_i c_i + τ²/2 ‖y‖) z,
+
+        side·X ≥ -Σ half_i |side·J_i| - τ²/2 · lever ‖side‖.
+
     These sides and the box of the sliding joints are half-spaces g·x ≥ h of the sliding joints'
     positions x; whether they meet is decided by `halfspaces_meet`.
     """
     state = chain_state(chain, q)
+    J = world_jacobian(chain, state)
     G, h, side = np.zeros((11, 3)), np.empty(11), np.empty(3)
-    shift = turn * _lever(chain)
-    widen = np.sin(turn) / np.cos(_half_diagonal(view) + turn)
+    turn = half.sum()
+    corner = _turned_corner(view, turn)
+    if np.isinf(corner[0]):  # the cell is too wide to say anything
+        return True
+    second = 0.5 * turn * turn
+    axes = np.empty((len(half), 3))  # of the wrist, in the camera's frame
+    for j in range(len(half)):
+        for i in range(3):
+            axes[j, i] = np.sum(state.R[:, i] * state.axis[3 + j])
     for k in range(5):
         a = view.normals[k].copy()
-        a[2] += widen
+        a[2] += second * np.sqrt(corner[0] ** 2 + corner[1] ** 2 + 1.0)
+        for j in range(len(half)):
+            a[2] += half[j] * _most_turned(axes[j], view.normals[k], corner)
         for i in range(3):
             side[i] = state.R[i, 0] * a[0] + state.R[i, 1] * a[1] + state.R[i, 2] * a[2]
         least = np.inf
@@ -135,8 +187,11 @@ def cell_sees(
             for i in range(3):
                 inside += side[i] * (view.points_world[j, i] - state.p[i])
             least = min(least, inside)
-        # side·(P - p(x)) ≥ -shift ‖side‖ for every P, with p(x) = p + Σ axis_i (x_i - q_i).
-        h[k] = view.offsets[k] - least - shift * np.sqrt(np.sum(side**2))
+        moved = second * _lever(chain) * np.sqrt(np.sum(side**2))
+        for j in range(len(half)):
+            moved += half[j] * abs(np.sum(side * J[:3, 3 + j]))
+        # side·(P - p(x)) ≥ -moved for every P, with p(x) = p + Σ axis_i (x_i - q_i).
+        h[k] = view.offsets[k] - least - moved
         for i in range(3):
             for r in range(3):
                 G[k, i] -= state.axis[i, r] * side[r]
@@ -148,14 +203,31 @@ def cell_sees(
 
 
 @njit(cache=True)
-def _half_diagonal(view: View) -> float:
-    """Return the largest angle between the optical axis and a corner of the view."""
-    left = abs(view.normals[0, 2] / view.normals[0, 0])
-    right = abs(view.normals[1, 2] / view.normals[1, 0])
-    top = abs(view.normals[2, 2] / view.normals[2, 1])
-    bottom = abs(view.normals[3, 2] / view.normals[3, 1])
-    angle: float = np.arctan(np.hypot(max(left, right), max(top, bottom)))
-    return angle
+def _turned_corner(view: View, turn: float) -> FloatArray:
+    """Return the largest |x/z| and |y/z| of what is in view of a camera turned by at most `turn`.
+
+    Turning y = (x/z, y/z, 1) moves it by at most turn ‖y‖.
+    """
+    x = max(
+        abs(view.normals[0, 2] / view.normals[0, 0]), abs(view.normals[1, 2] / view.normals[1, 0])
+    )
+    y = max(
+        abs(view.normals[2, 2] / view.normals[2, 1]), abs(view.normals[3, 2] / view.normals[3, 1])
+    )
+    moved = turn * np.sqrt(x * x + y * y + 1.0)
+    if moved >= 1.0:
+        return np.full(2, np.inf)
+    return np.array([(x + moved) / (1.0 - moved), (y + moved) / (1.0 - moved)])
+
+
+@njit(cache=True)
+def _most_turned(axis: FloatArray, a: FloatArray, corner: FloatArray) -> float:
+    """Return the largest |(axis × a)·y| over the y = (±x, ±y, 1) up to a corner."""
+    u = abs(axis[1] * a[2] - axis[2] * a[1])
+    v = abs(axis[2] * a[0] - axis[0] * a[2])
+    w = abs(axis[0] * a[1] - axis[1] * a[0])
+    largest: float = u * corner[0] + v * corner[1] + w
+    return largest
 
 
 @njit(cache=True)

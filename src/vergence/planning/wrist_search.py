@@ -14,40 +14,41 @@ from vergence.planning.separation import slides_then_turns, visible_cells
 from vergence.planning.tree import pull_into_view
 from vergence.planning.visibility import View
 
-CELLS = 64  # along each turning joint
 
-
-def wrist_path(problem: PlanningProblem, view: View, goals: FloatArray) -> FloatArray:
+def wrist_path(
+    problem: PlanningProblem, view: View, goals: FloatArray, cells: int = 64
+) -> FloatArray:
     """Return joint waypoints (P, n) from the start to a goal, (0, n) where none is found.
 
     Args:
         problem: any; only arms that slide first are searched.
         view: what must be seen.
         goals: goal configurations, (G, n).
+        cells: along each turning joint; more find narrower ways.
     """
     arm = problem.arm
     none = np.empty((0, arm.joint_count))
     if not slides_then_turns(arm):
         return none
     low, high = problem.joint_range()
-    width = (high[3:] - low[3:]) / CELLS
-    shape = np.full(len(width), CELLS)
-    everywhere = np.ones(CELLS ** len(width), dtype=np.bool_)
+    width = (high[3:] - low[3:]) / cells
+    shape = np.full(len(width), cells)
+    everywhere = np.ones(cells ** len(width), dtype=np.bool_)
     seen = visible_cells(arm.chain, view, low, high, low[3:], width, shape, everywhere, 0.0)
-    homes = [_cell_of(q[3:], low[3:], width) for q in (problem.q_start, *goals)]
+    homes = [_cell_of(q[3:], low[3:], width, shape) for q in (problem.q_start, *goals)]
     seen[homes] = True
-    cells = shortest_way(seen, shape, homes[0], np.array(homes[1:]))
-    if not len(cells):
+    way = shortest_way(seen, shape, homes[0], np.array(homes[1:]))
+    if not len(way):
         return none
-    goal = goals[homes[1:].index(int(cells[-1]))]
-    wrist = np.array(np.unravel_index(cells, tuple(shape))).T
+    goal = goals[homes[1:].index(int(way[-1]))]
+    wrist = np.array(np.unravel_index(way, tuple(shape))).T
     turned = _evened(low[3:] + (wrist + 0.5) * width)
     return _carried(problem, view, turned, goal)
 
 
-def _cell_of(q: FloatArray, low: FloatArray, width: FloatArray) -> int:
-    at = np.clip(((q - low) / width).astype(np.int64), 0, CELLS - 1)
-    return int(np.ravel_multi_index(tuple(at), (CELLS,) * len(q)))
+def _cell_of(q: FloatArray, low: FloatArray, width: FloatArray, shape: IntArray) -> int:
+    at = np.clip(((q - low) / width).astype(np.int64), 0, shape - 1)
+    return int(np.ravel_multi_index(tuple(at), tuple(shape)))
 
 
 def _evened(wrist: FloatArray) -> FloatArray:

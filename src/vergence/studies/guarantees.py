@@ -1,11 +1,10 @@
 """What the constrained law and the guard promise, tried on many runs and on the hard cases."""
 
-import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from vergence.runtime import Summary
 from vergence.runtime.recording import TickRecord
 from vergence.studies import guarantees_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
+from vergence.studies.guarantees_random import PAIRS_SEED, success_check, try_pair
 from vergence.studies.guarantees_runs import (
     CAMERA_MODEL,
     LAWS,
@@ -29,9 +29,11 @@ from vergence.studies.guarantees_runs import (
     joint_path,
     run_ideal,
 )
+from vergence.studies.processes import processes, try_all
 
 TITLE = "Limits are promises: the constrained servo and the guard"
 ATTEMPTS, ATTEMPTS_QUICK = 10_000, 400
+PAIRS, PAIRS_QUICK = 300, 24
 BATCH = 50
 RANGE_M, SPEED_M_S, WINDOW_PX = 2.5, 0.1, 32.0
 LATENCY_FRAMES = 2
@@ -49,40 +51,48 @@ def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
         quick: fewer attempts.
         progress: told what is being done.
     """
-    puma = arms()[0]
-    limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, progress)
-    progress("headings", 0.6)
+    puma, _, gantry = arms()
+    count = PAIRS_QUICK if quick else PAIRS
+    with processes() as pool:
+        limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, pool, progress)
+        pairs = try_all(
+            partial(try_pair, gantry, PAIRS_SEED),
+            count,
+            pool,
+            lambda done: progress(f"{count} random pairs", 0.4 + 0.4 * done),
+        )
+    progress("headings", 0.8)
     headings = _headings(puma)
-    progress("speed", 0.75)
+    progress("speed", 0.85)
     speed = _speed(puma)
-    progress("singularity", 0.9)
+    progress("singularity", 0.95)
     passed, sigma = _singularity(puma)
-    progress("soft limits", 0.95)
-    checks = (limits, headings, speed, passed, _outside_start(puma), _conflict(puma))
-    return StudyResult(TITLE, checks, figures.draw(out, ends, sigma))
+    progress("soft limits", 0.97)
+    others = (passed, _outside_start(puma), _conflict(puma))
+    checks = (limits, headings, speed, success_check(pairs), *others)
+    return StudyResult(TITLE, checks, figures.draw(out, ends, sigma, pairs))
 
 
 Ends = Counter[tuple[str, str]]  # how many runs of a law ended how
 
 
-def _try(seeds: Sequence[int]) -> tuple[list[Excess], Ends]:
-    known = arms()
+def _try(count: int, batch: int) -> tuple[list[Excess], Ends]:
+    known, seeds = arms(), range(batch * BATCH, min((batch + 1) * BATCH, count))
     tried = [(LAWS[(seed // len(known)) % len(LAWS)], attempt(known, seed).run()) for seed in seeds]
     ends = Counter((law, outcome.kind.value) for law, (_, outcome) in tried)
     return [excess for _, (excess, _) in tried], ends
 
 
-def _limits(count: int, progress: Progress) -> tuple[Check, Ends]:
+def _limits(count: int, pool: ProcessPoolExecutor | None, progress: Progress) -> tuple[Check, Ends]:
     """Run everything at random on every core, in an order that changes nothing."""
-    batches = [range(first, min(first + BATCH, count)) for first in range(0, count, BATCH)]
-    excess: list[Excess] = []
-    ends: Ends = Counter()
-    workers = min(len(os.sched_getaffinity(0)), len(batches))
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for done, (some, ended) in enumerate(pool.map(_try, batches)):
-            excess += some
-            ends.update(ended)
-            progress(f"{len(excess)} of {count} random runs", 0.6 * (done + 1) / len(batches))
+    batches = try_all(
+        partial(_try, count),
+        -(-count // BATCH),
+        pool,
+        lambda done: progress(f"{count} random runs", 0.4 * done),
+    )
+    excess = [worst for some, _ in batches for worst in some]
+    ends: Ends = sum((ended for _, ended in batches), Counter())
     violations = sum(worst.position > 0.0 or worst.rate > 1e-12 for worst in excess)
     check = Check(
         "limits.violations",

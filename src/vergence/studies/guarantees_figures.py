@@ -1,27 +1,39 @@
 """Figures of the guarantees: how random runs end, and the way through a singularity."""
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from vergence.arrays import FloatArray
 from vergence.drawing import COLORS, curve, figure, legend
 from vergence.studies.check import Figure
+from vergence.studies.ending_bars import ending_bars
 from vergence.studies.figure_files import save_figures
+from vergence.studies.guarantees_laws import LAWS
+from vergence.studies.guarantees_random import Pair, endings
 
 _WIDTH = 7.6  # inches
 
 
-def draw(out: Path, ends: Counter[tuple[str, str]], singular: FloatArray) -> tuple[Figure, ...]:
+def draw(
+    out: Path, ends: Counter[tuple[str, str]], singular: FloatArray, pairs: Sequence[Pair]
+) -> tuple[Figure, ...]:
     """Write the figures into a folder.
 
     Args:
         out: the folder.
         ends: how many runs of a law ended how.
         singular: rows of time (s), smallest singular value, error (px), (K, 3).
+        pairs: random starts and goals on the gantry.
     """
     drawn = {
         "ends": (_ends(ends), "How random runs end, law by law."),
+        "random": (
+            _random(pairs),
+            "How servoing ends from random starts to random goals on the gantry, inside view and "
+            "joint limits or not at all.",
+        ),
         "singularity": (_singular(singular), "Through the wrist's singularity with the target."),
     }
     return save_figures(out, drawn)
@@ -43,6 +55,16 @@ def _ends(ends: Counter[tuple[str, str]]) -> Any:
     axes.set_xlim(0, 100)
     axes.set_axisbelow(True)
     axes.grid(visible=False, axis="y")
+    legend(axes)
+    return drawing
+
+
+def _random(pairs: Sequence[Pair]) -> Any:
+    drawing, (axes,) = figure(_WIDTH, 3.6)
+    names = [", ".join(part for part in law if part) for law in LAWS]
+    ending_bars(axes, names, [endings(pairs, law) for law in LAWS])
+    feasible = sum(not pair.infeasible for pair in pairs)
+    axes.set_xlabel(f"of the {feasible} pairs of {len(pairs)} not proved infeasible (%)")
     legend(axes)
     return drawing
 

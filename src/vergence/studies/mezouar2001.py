@@ -20,17 +20,17 @@ from vergence.studies.mezouar2001_methods import (
     ROOM,
 )
 from vergence.studies.mezouar2001_run import Realised, plan_section6, run_section6
-from vergence.studies.mezouar2001_scene import Scene
 from vergence.studies.mezouar2001_trials import (
     NOISE_PX,
     ROLL_DEG,
     End,
     Trial,
     endings,
-    processes,
     random_starts,
     wrong_beliefs,
 )
+from vergence.studies.processes import processes
+from vergence.studies.reach_scene import Scene
 
 TITLE = "Mezouar and Chaumette (2001): trajectories in the image inside view and joint limits"
 COUNTS = {"random": 200, "random_roll": 100, "perturbed": 100}

@@ -9,11 +9,11 @@ import numpy as np
 from vergence.drawing import COLORS, curve, legend
 from vergence.planning import Path as PlannedPath
 from vergence.studies.check import Figure
+from vergence.studies.ending_bars import ending_bars
 from vergence.studies.figure_files import save_figures
-from vergence.studies.ideal_loop import Ending, Motion
+from vergence.studies.ideal_loop import Motion
 from vergence.studies.mezouar2001_methods import LABELS, METHODS
 from vergence.studies.mezouar2001_run import Realised, Section6
-from vergence.studies.mezouar2001_scene import Scene
 from vergence.studies.mezouar2001_trials import Trial, endings
 from vergence.studies.path_panels import (
     camera_paths,
@@ -23,6 +23,7 @@ from vergence.studies.path_panels import (
     picture,
     space,
 )
+from vergence.studies.reach_scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,13 +34,6 @@ _PATHS = {
     "visibility_only": "visibility only",
     "both": "both potentials",
     "optimised": "ours",
-}
-_ENDINGS = {
-    Ending.ARRIVED: COLORS[2],
-    Ending.VIEW: COLORS[1],
-    Ending.JOINT: COLORS[5],
-    Ending.SHORT: "#999999",
-    Ending.NO_PLAN: COLORS[4],
 }
 
 
@@ -188,17 +182,9 @@ def _success(starts: Mapping[str, Sequence[Trial]]) -> Any:
     titles = {"random": "random starts", "random_roll": "roll 120 to 180°"}
     for place, (name, trials) in zip(axes[0], starts.items(), strict=True):
         feasible = sum(not trial.infeasible for trial in trials)
-        left = np.zeros(len(METHODS))
-        for ending, color in _ENDINGS.items():
-            share = np.array([100.0 * endings(trials, m)[ending] for m in METHODS]) / feasible
-            place.barh(range(len(METHODS)), share, left=left, color=color, label=ending.value)
-            left += share
         names = [LABELS[m] for m in METHODS] if place is axes[0, 0] else [""] * len(METHODS)
-        place.set_yticks(range(len(METHODS)), names)
-        place.invert_yaxis()
-        place.set_xlim(0, 100)
+        ending_bars(place, names, [endings(trials, method) for method in METHODS])
         place.set_xlabel("of the feasible starts (%)")
         place.set_title(f"{titles[name]}: {feasible} of {len(trials)} feasible", fontsize=9)
-        place.grid(visible=False, axis="y")
     legend(axes[0, -1])
     return drawing

@@ -23,7 +23,7 @@ from vergence.planning import (
 )
 from vergence.robot import Arm, JointState
 from vergence.studies.ideal_loop import PERIOD, Ending, IdealLoop, Motion, Steer
-from vergence.studies.mezouar2001_scene import Scene
+from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view
 
 Method = Literal[

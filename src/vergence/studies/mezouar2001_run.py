@@ -17,7 +17,7 @@ from vergence.planning import Path, PlanFailure, PotentialFieldPlanner, Trajecto
 from vergence.runtime import run_cell
 from vergence.runtime.assembly.reach import look_twice, plan_reach
 from vergence.runtime.recording import RunInfo, TickRecord
-from vergence.studies.mezouar2001_scene import Scene
+from vergence.studies.reach_scene import Scene
 
 SETTLE_S = 4.0  # after a plan's end
 PLANNERS = {"both": "potential_field", "optimised": "optimised"}  # of the paths that are run

@@ -1,29 +1,23 @@
 """Many starts and many wrong beliefs: how often each way of getting there arrives."""
 
-import os
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from multiprocessing import get_context
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from vergence.planning import goal_configurations, proves_no_path
+from vergence.planning import proves_no_path
 from vergence.studies.ideal_loop import Ending, Motion
 from vergence.studies.mezouar2001_methods import METHODS, Belief, Method, servo
-from vergence.studies.mezouar2001_scene import Scene
+from vergence.studies.processes import try_all
+from vergence.studies.reach_scene import Scene
 
 NOISE_PX = 0.3
 ROLL_DEG = (120.0, 180.0)
 SEED_START, SEED_NOISE, SEED_WRONG = 0, 1, 2  # of the draws
 CELLS = 256  # of the proof's grid along each turning joint, at most
-GOALS = 50  # goal configurations asked for; the gantry's wrist has a handful at most
-
-
-Result = TypeVar("Result")
 
 
 class End(NamedTuple):
@@ -46,10 +40,11 @@ def try_start(scene: Scene, roll_deg: tuple[float, float] | None, index: int) ->
 
     Args:
         scene: arm, camera and marks.
-        roll_deg: see `Scene.elsewhere`.
+        roll_deg: see `Scene.drawn`.
         index: names the start.
     """
-    start = scene.elsewhere(np.random.default_rng([SEED_START, index]), roll_deg)
+    random = np.random.default_rng([SEED_START, index])
+    start = Scene.drawn(scene.arm, scene.camera, scene.marks, random, roll_deg)
     belief = Belief(scene.camera, noise_px=NOISE_PX)
     ends: dict[str, End] = {}
     for method in METHODS:
@@ -62,9 +57,7 @@ def try_start(scene: Scene, roll_deg: tuple[float, float] | None, index: int) ->
 
 def is_infeasible(scene: Scene) -> bool:
     """Return whether no motion inside view and limits joins start and goal, by proof."""
-    problem = scene.problem()
-    goals = goal_configurations(scene.arm, scene.T_world_goal, scene.q_start, GOALS)
-    return proves_no_path(problem, goals, CELLS)
+    return proves_no_path(scene.problem(), CELLS)
 
 
 def try_belief(scene: Scene, method: Method, index: int) -> End:
@@ -72,42 +65,6 @@ def try_belief(scene: Scene, method: Method, index: int) -> End:
     random = np.random.default_rng([SEED_WRONG, index])
     belief = Belief.perturbed(scene.camera, NOISE_PX, random)
     return _end(servo(scene, method, belief, random))
-
-
-def processes(
-    workers: int | None = None,
-) -> AbstractContextManager[ProcessPoolExecutor | None]:
-    """Return a pool of processes; None, which means this one, for one worker.
-
-    Args:
-        workers: how many; as many as there are cores, four at most, if None.
-    """
-    workers = workers or min(4, os.cpu_count() or 1)
-    if workers == 1:
-        return nullcontext()
-    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_one_thread)
-
-
-def try_all(
-    case: Callable[[int], Result],
-    count: int,
-    pool: ProcessPoolExecutor | None = None,
-    progress: Callable[[float], None] = lambda _share: None,
-) -> list[Result]:
-    """Return the results of cases 0 … count - 1, in order.
-
-    Args:
-        case: a function of the case's number that can be sent to a process.
-        count: how many.
-        pool: see `processes`.
-        progress: told the share done.
-    """
-    results = []
-    ongoing = pool.map(case, range(count), chunksize=2) if pool else map(case, range(count))
-    for result in ongoing:
-        results.append(result)
-        progress(len(results) / count)
-    return results
 
 
 def random_starts(
@@ -138,10 +95,3 @@ def endings(trials: Sequence[Trial], method: str) -> Counter[Ending]:
 
 def _end(motion: Motion) -> End:
     return End(motion.ending, motion.reason, motion.parts)
-
-
-def _one_thread() -> None:
-    """Keep a process to one core: the others have their own."""
-    import numba
-
-    numba.set_num_threads(1)

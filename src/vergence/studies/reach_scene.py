@@ -1,4 +1,4 @@
-"""What section 6 of [Mezouar2001] takes place with, and random starts on the same gantry."""
+"""An arm before an object, where it should go, and random displacements of its camera."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -76,22 +76,30 @@ class Scene:
             margin_joint,
         )
 
-    def elsewhere(
-        self, random: np.random.Generator, roll_deg: tuple[float, float] | None = None
+    @classmethod
+    def drawn(
+        cls,
+        arm: Arm,
+        camera: Camera,
+        marks: FloatArray,
+        random: np.random.Generator,
+        roll_deg: tuple[float, float] | None = None,
+        small: bool = False,
     ) -> Self:
-        """Return the scene with a random large displacement, marks in view at both ends.
+        """Draw a displacement of the camera, marks in view at both ends.
 
         The object faces the camera within 45 degrees at 0.45 to 1.2 m; start and goal are inside
         the joint limits. Nothing is known of what lies between.
 
         Args:
+            arm: up to the camera.
+            camera: its intrinsics.
+            marks: (N, 3) in the target's frame, m.
             random: draws it.
             roll_deg: range of the turn about the optical axis, either way; any if None.
+            small: whether displacements below both `EASY_M` and `EASY_RAD` count as well.
         """
-        middle, half = (
-            0.5 * (self.arm.q_max + self.arm.q_min),
-            0.5 * (self.arm.q_max - self.arm.q_min),
-        )
+        middle, half = 0.5 * (arm.q_max + arm.q_min), 0.5 * (arm.q_max - arm.q_min)
         free = 1.0 - END_MARGIN_JOINT
         while True:
             first, roll = random.uniform(-np.pi, np.pi, 2)
@@ -99,20 +107,22 @@ class Scene:
                 roll = first + random.choice([-1.0, 1.0]) * np.radians(random.uniform(*roll_deg))
             T_start, T_goal = _facing_pose(random, first), _facing_pose(random, roll)
             motion = T_goal @ se3_inverse(T_start)
-            if _is_easy(motion) or not (self._in_view(T_start) and self._in_view(T_goal)):
+            if not small and _is_easy(motion):
+                continue
+            if not (_in_view(camera, marks, T_start) and _in_view(camera, marks, T_goal)):
                 continue
             q = middle + free * half * random.uniform(-1, 1, len(half))
-            T_world_goal = self.arm.forward_kinematics(q) @ se3_inverse(motion)
-            goals = goal_configurations(self.arm, T_world_goal, q, 1)
-            if len(goals) and np.abs(self.arm.normalized(goals[0])).max() < free:
-                T_target = T_world_goal @ T_goal
-                return type(self)(self.arm, self.camera, self.marks, q, T_world_goal, T_target)
+            T_world_goal = arm.forward_kinematics(q) @ se3_inverse(motion)
+            goals = goal_configurations(arm, T_world_goal, q, 1)
+            if len(goals) and np.abs(arm.normalized(goals[0])).max() < free:
+                return cls(arm, camera, marks, q, T_world_goal, T_world_goal @ T_goal)
 
-    def _in_view(self, T_camera_target: FloatArray) -> bool:
-        points = transform_points(T_camera_target, self.marks.copy())
-        if points[:, 2].min() < 0.2:
-            return False
-        return bool(self.camera.contains(self.camera.project(points), END_MARGIN_PX).all())
+
+def _in_view(camera: Camera, marks: FloatArray, T_camera_target: FloatArray) -> bool:
+    points = transform_points(T_camera_target, marks.copy())
+    if points[:, 2].min() < 0.2:
+        return False
+    return bool(camera.contains(camera.project(points), END_MARGIN_PX).all())
 
 
 def _facing_pose(random: np.random.Generator, roll: float) -> FloatArray:

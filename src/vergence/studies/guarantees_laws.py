@@ -1,0 +1,221 @@
+"""A camera brought from a start to a goal before four points: laws plain, constrained, planned."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.camera import Camera, Frame
+from vergence.cell import IdealCell, IdealDriver
+from vergence.cell.ideal_driver import ARM, CAMERA
+from vergence.control import (
+    ConstrainedLaw,
+    ImageBased,
+    JointCommand,
+    Law,
+    OptimalTracking,
+    PlainLaw,
+)
+from vergence.control.image_motion import FeatureState
+from vergence.control.objective import Objective, TwistObjective
+from vergence.estimation import ExactPoints
+from vergence.features import Observation
+from vergence.geometry import se3_inverse, so3_log, transform_points
+from vergence.outcome import OutcomeKind
+from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Reference, Trajectory
+from vergence.robot import JointState
+from vergence.runtime import Loop, Patience
+from vergence.runtime.stages import Planner
+from vergence.studies.ideal_loop import Ending
+from vergence.studies.reach_scene import Scene
+from vergence.vision.two_view import TwoView, estimate_two_view
+
+RATE_HZ = 30.0
+ARRIVED_PX = 1.0  # every point, truly, this near to its goal at the end
+GAIN = 1.0  # 1/s
+SERVO_S = 25.0  # given to a law without a plan
+REST_S = (
+    4e-4  # at rest: no joint moves, in a second, as far as its rate limit takes it in this time
+)
+CAMERA_SPEED = 0.25  # m/s, of a plan
+SETTLE_S = 4.0  # after a plan's end
+
+PLANNED = "planned, constrained"
+PLAIN, CONSTRAINED = "plain", "constrained"
+VIEW_MARGIN_PX, JOINT_MARGIN = 10.0, 0.01  # kept without a plan; less than starts and goals have
+
+
+class PositionBased:
+    """Takes the camera straight to where it should be: v = -λ (Rᵀ t, θu) of its pose in the goal.
+
+    The pose is that which brings the points where they are, by their depths, onto those at the
+    goal.
+
+    Args:
+        points_goal: the points in the camera's frame at the goal, (N, 3), m.
+        gain: λ, 1/s.
+    """
+
+    def __init__(self, points_goal: FloatArray, gain: float) -> None:
+        self._goal, self._gain = points_goal, gain
+
+    def twist_objective(
+        self, features: FeatureState, found: BoolArray, depth: FloatArray, reference: Reference
+    ) -> TwistObjective:
+        """Return the quadratic for this tick."""
+        rays = np.column_stack((features.points, np.ones(len(depth))))
+        seen = rays * depth[:, None]
+        U, _, Vt = np.linalg.svd((seen - seen.mean(0)).T @ (self._goal - self._goal.mean(0)))
+        mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
+        R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
+        t = self._goal.mean(0) - R @ seen.mean(0)
+        return TwistObjective(np.eye(6), -self._gain * np.concatenate((R.T @ t, so3_log(R))))
+
+
+OBJECTIVES: dict[str, Callable[[Camera, FloatArray], Objective]] = {
+    "image-based, current L": lambda camera, _: ImageBased(camera, GAIN),
+    "image-based, desired L": lambda camera, goal: ImageBased(
+        camera, GAIN, "desired", goal_depth_m=goal[:, 2]
+    ),
+    "image-based, mean L": lambda camera, goal: ImageBased(
+        camera, GAIN, "mean", goal_depth_m=goal[:, 2]
+    ),
+    "optimal tracking": lambda camera, _: OptimalTracking(camera, R=1.0, period=1.0 / RATE_HZ),
+    "position-based": lambda _, goal: PositionBased(goal, GAIN),
+}
+LAWS = (*((name, how) for name in OBJECTIVES for how in (PLAIN, CONSTRAINED)), (PLANNED, ""))
+
+
+class _StrictView:
+    """Sees all points, or none as soon as one has left the picture."""
+
+    def __init__(self) -> None:
+        self._exact = ExactPoints(CAMERA)
+
+    def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
+        return self._exact.observe(
+            tuple(
+                frame for frame in frames if frame.truth is not None and frame.truth.visible.all()
+            )
+        )
+
+
+class _KnownTarget:
+    """Wants the goal's picture, and knows how far away the points are now."""
+
+    def __init__(self, driver: IdealDriver, goal_px: FloatArray) -> None:
+        self._driver, self._goal_px = driver, goal_px
+
+    def reference(self, time: float) -> Reference:
+        truth = self._driver.frame().truth
+        assert truth is not None
+        return Reference(time, self._goal_px, depth_m=truth.depth_m)
+
+
+class _UntilRest:
+    """Ends the run where the arm comes to rest: at the goal, or where the law is stuck."""
+
+    def __init__(self, law: Law, rate_max: FloatArray) -> None:
+        self._law, self._rate_max = law, rate_max
+        self._past: deque[FloatArray] = deque(maxlen=int(RATE_HZ) + 1)  # joints, a second of them
+
+    def command(
+        self, observation: Observation, reference: Reference, joints: JointState
+    ) -> JointCommand:
+        command = self._law.command(observation, reference, joints)
+        self._past.append(joints.position / self._rate_max)
+        if len(self._past) < RATE_HZ or np.ptp(self._past, axis=0).max() > REST_S:
+            return command
+        return replace(command, fault=(OutcomeKind.COMPLETED, "at rest"))
+
+
+def servo(scene: Scene, name: str, how: str) -> Ending:
+    """Bring the camera to the goal by one of `LAWS`, through the loop and the guard."""
+    if name == PLANNED:
+        return _planned(scene)
+    driver = _driver(scene)
+    goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
+    objective = OBJECTIVES[name](scene.camera, goal)
+    depth = goal[:, 2].copy()
+    built: Law = PlainLaw(scene.arm, scene.camera, objective, depth, singular_below=0.0)
+    if how == CONSTRAINED:
+        built = _constrained(scene, objective, depth, VIEW_MARGIN_PX, JOINT_MARGIN)
+    law = _UntilRest(built, scene.arm.rate_max)
+    return _run(scene, driver, law, _KnownTarget(driver, scene.goal_px), SERVO_S)
+
+
+def _planned(scene: Scene) -> Ending:
+    plan = plan_from_homography(scene)
+    if plan is None:
+        return Ending.NO_PLAN
+    trajectory = Trajectory.of(plan, CAMERA_SPEED)
+    objective = ImageBased(scene.camera, 2.0 * GAIN, "desired")
+    kept = 0.5 * plan.image_margin_px, 0.5 * plan.joint_margin
+    law = _constrained(scene, objective, plan.depth_m[-1], *kept)
+    duration = trajectory.duration + SETTLE_S
+    return _run(scene, _driver(scene), law, trajectory, duration)
+
+
+def plan_from_homography(scene: Scene) -> Path | None:
+    """Plan from the pictures at start and goal, d* and which way the points' plane faces there."""
+    goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
+    normal = np.cross(goal[1] - goal[0], goal[2] - goal[0])
+    normal *= np.sign(normal[2]) / np.linalg.norm(normal)
+    now = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
+    view = estimate_two_view(now, scene.goal_px, scene.camera, normal_hint=normal)
+    if not isinstance(view, TwoView):
+        return None
+    problem = PlanningProblem.from_two_view(
+        view, float(normal @ goal[0]), scene.arm, scene.camera, scene.q_start
+    )
+    plan = OptimisedPlanner().plan(problem)
+    return plan if isinstance(plan, Path) else None
+
+
+def _driver(scene: Scene) -> IdealDriver:
+    cell = IdealCell(
+        scene.arm, scene.camera, scene.q_start, lambda _: scene.T_world_target, scene.marks,
+        rate_hz=RATE_HZ,
+    )  # fmt: skip
+    return IdealDriver(cell)
+
+
+def _constrained(
+    scene: Scene, objective: Objective, depth: FloatArray, margin_px: float, margin_joint: float
+) -> ConstrainedLaw:
+    """Return the law with margins to the image's border and, of half the range, to joint limits."""
+    return ConstrainedLaw(
+        scene.arm,
+        scene.camera,
+        objective,
+        depth,
+        period=1.0 / RATE_HZ,
+        view_margin_px=margin_px,
+        joint_margin=0.5 * margin_joint,
+        depth_range=(0.9, 1.1),
+        flow_smoothing_s=np.inf,
+    )
+
+
+def _run(
+    scene: Scene,
+    driver: IdealDriver,
+    law: Law,
+    planner: Planner,
+    duration_s: float,
+) -> Ending:
+    loop = Loop(
+        driver, ARM, _StrictView(), planner, law, outer_rate_hz=RATE_HZ,
+        patience=Patience(image_s=0.0),
+    )  # fmt: skip
+    outcome = loop.run(duration_s)
+    if outcome.kind is OutcomeKind.COMPLETED:
+        truth = driver.frame().truth
+        assert truth is not None
+        error = np.linalg.norm(truth.points_px - scene.goal_px, axis=1).max()
+        return Ending.ARRIVED if error < ARRIVED_PX else Ending.SHORT
+    return {OutcomeKind.IMAGE_LATE: Ending.VIEW, OutcomeKind.JOINT_LIMIT: Ending.JOINT}[
+        outcome.kind
+    ]
