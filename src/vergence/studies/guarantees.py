@@ -33,7 +33,7 @@ from vergence.studies.processes import processes, try_all
 
 TITLE = "Limits are promises: the constrained servo and the guard"
 ATTEMPTS, ATTEMPTS_QUICK = 10_000, 400
-PAIRS, PAIRS_QUICK = 300, 24
+PAIRS, PAIRS_QUICK = 300, 12
 BATCH = 50
 RANGE_M, SPEED_M_S, WINDOW_PX = 2.5, 0.1, 32.0
 LATENCY_FRAMES = 2

@@ -175,10 +175,10 @@ def plan_from_homography(scene: Scene) -> Path | None:
 
 
 def _driver(scene: Scene) -> IdealDriver:
-    cell = IdealCell(
-        scene.arm, scene.camera, scene.q_start, lambda _: scene.T_world_target, scene.marks,
-        rate_hz=RATE_HZ,
-    )  # fmt: skip
+    def target(times: FloatArray) -> FloatArray:
+        return np.broadcast_to(scene.T_world_target, (len(times), 4, 4))
+
+    cell = IdealCell(scene.arm, scene.camera, scene.q_start, target, scene.marks, rate_hz=RATE_HZ)
     return IdealDriver(cell)
 
 
