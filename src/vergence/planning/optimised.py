@@ -19,7 +19,7 @@ from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
 
 PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
-WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint
+WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last
 MARGINS = (0.2, 0.0)  # shares of the margins that do where no path keeps them whole
 SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
 
@@ -58,20 +58,20 @@ class OptimisedPlanner:
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
-        plan = self._with_margins(problem)
+        plan = self._with_margins(problem, WRIST_CELLS[0])
         if isinstance(plan, Path) or plan.proved:
             return plan
         if proves_no_path(problem, PROOF_CELLS[1]):
             return _proved(plan)
-        if problem.margin_px > 0.0 or problem.margin_joint > 0.0:
-            for share in MARGINS:
-                px, joint = share * problem.margin_px, share * problem.margin_joint
-                closer = self._with_margins(replace(problem, margin_px=px, margin_joint=joint))
-                if closer:
-                    return closer
+        for share in MARGINS:
+            px, joint = share * problem.margin_px, share * problem.margin_joint
+            nearer = replace(problem, margin_px=px, margin_joint=joint)
+            found = self._with_margins(nearer, WRIST_CELLS[1])
+            if found:
+                return found
         return plan
 
-    def _with_margins(self, problem: PlanningProblem) -> Path | PlanFailure:
+    def _with_margins(self, problem: PlanningProblem, wrist_cells: int) -> Path | PlanFailure:
         goals = goal_configurations(
             problem.arm, problem.T_world_goal, problem.q_start, self.branches
         )
@@ -82,7 +82,7 @@ class OptimisedPlanner:
         if best is None:
             if proves_no_path(problem, PROOF_CELLS[0]):
                 return _proved(self._obstacle(problem, view, goals))
-            best = self._from_wrist(problem, view, goals)
+            best = self._from_wrist(problem, view, goals, wrist_cells)
             if best is None and self.tree_samples > 0:
                 best = self._from_tree(problem, view, goals)
         if best is None:
@@ -160,14 +160,10 @@ class OptimisedPlanner:
         )
 
     def _from_wrist(
-        self, problem: PlanningProblem, view: View, goals: FloatArray
+        self, problem: PlanningProblem, view: View, goals: FloatArray, cells: int
     ) -> _Candidate | None:
-        for cells in WRIST_CELLS:
-            guess = wrist_path(problem, view, goals, cells)
-            found = self._smoothest(problem, view, [guess]) if len(guess) else None
-            if found is not None:
-                return found
-        return None
+        guess = wrist_path(problem, view, goals, cells)
+        return self._smoothest(problem, view, [guess]) if len(guess) else None
 
     def _smoothest(
         self, problem: PlanningProblem, view: View, guesses: Sequence[FloatArray]

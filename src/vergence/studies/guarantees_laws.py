@@ -12,6 +12,7 @@ from vergence.cell import IdealCell, IdealDriver
 from vergence.cell.ideal_driver import ARM, CAMERA
 from vergence.control import (
     ConstrainedLaw,
+    ConstrainedSolver,
     ImageBased,
     JointCommand,
     Law,
@@ -186,17 +187,15 @@ def _constrained(
     scene: Scene, objective: Objective, depth: FloatArray, margin_px: float, margin_joint: float
 ) -> ConstrainedLaw:
     """Return the law with margins to the image's border and, of half the range, to joint limits."""
-    return ConstrainedLaw(
+    solver = ConstrainedSolver(
         scene.arm,
         scene.camera,
-        objective,
-        depth,
         period=1.0 / RATE_HZ,
         view_margin_px=margin_px,
         joint_margin=0.5 * margin_joint,
         depth_range=(0.9, 1.1),
-        flow_smoothing_s=np.inf,
     )
+    return ConstrainedLaw(solver, objective, depth, flow_smoothing_s=np.inf)
 
 
 def _run(
