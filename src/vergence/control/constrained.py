@@ -53,5 +53,6 @@ class ConstrainedLaw:
             joints.velocity,
             objective,
             pack_features(features.points, features.flow, depth),
+            reference.joint_rates,
         )
         return command_of(answer)

@@ -16,6 +16,7 @@ class Reference:
     velocity_px: FloatArray | None = None  # (M, 2) ds*/dt, px/s
     depth_m: FloatArray | None = None  # (M,) depth of the points as the planner knows it
     T_camera_target: FloatArray | None = None  # (4, 4) wanted relative pose
+    joint_rates: FloatArray | None = None  # (n,) at which the planner would get there
     # Wanted features (M, 2) in the pictures of further cameras, by their names.
     elsewhere_px: Mapping[str, FloatArray] = field(default_factory=dict)
 

@@ -65,6 +65,7 @@ class Trajectory:
             points_px=self._image(sigma),
             velocity_px=self._image(sigma, 1) * speed,
             depth_m=self._depth(sigma),
+            joint_rates=self._joints(sigma, 1) * speed,
         )
 
     def image_acceleration(self, time: float) -> FloatArray:

@@ -154,7 +154,9 @@ def _planned(scene: Scene) -> Ending:
     trajectory = Trajectory.of(plan, CAMERA_SPEED)
     objective = ImageBased(scene.camera, 2.0 * GAIN, "desired")
     kept = 0.5 * plan.image_margin_px, 0.5 * plan.joint_margin
-    law = _constrained(scene, objective, plan.depth_m[-1], *kept)
+    # The plan keeps clear of borders by itself: near them it is not to be slowed, and where the
+    # image says little the joints are to go the plan's way.
+    law = _constrained(scene, objective, plan.depth_m[-1], *kept, approach_rate=8.0, damping=1e-3)
     duration = trajectory.duration + SETTLE_S
     return _run(scene, _driver(scene), law, trajectory, duration)
 
@@ -184,7 +186,13 @@ def _driver(scene: Scene) -> IdealDriver:
 
 
 def _constrained(
-    scene: Scene, objective: Objective, depth: FloatArray, margin_px: float, margin_joint: float
+    scene: Scene,
+    objective: Objective,
+    depth: FloatArray,
+    margin_px: float,
+    margin_joint: float,
+    approach_rate: float = 2.0,
+    damping: float = 1e-6,
 ) -> ConstrainedLaw:
     """Return the law with margins to the image's border and, of half the range, to joint limits."""
     solver = ConstrainedSolver(
@@ -194,6 +202,8 @@ def _constrained(
         view_margin_px=margin_px,
         joint_margin=0.5 * margin_joint,
         depth_range=(0.9, 1.1),
+        approach_rate=approach_rate,
+        damping=damping,
     )
     return ConstrainedLaw(solver, objective, depth, flow_smoothing_s=np.inf)
 
