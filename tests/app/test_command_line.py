@@ -109,6 +109,9 @@ def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> N
         (["report", "nowhere"], "recording.mcap"),
         (["reproduce", "nelson1996"], "did you mean nelson1995?"),
         (["rnu"], "Did you mean 'run'?"),
+        (["bench", "contrl"], "did you mean control?"),
+        (["plan", "gantry", "--planner", "potential"], "did you mean potential_field?"),
+        (["map", "puma560", "--over", "heading"], "did you mean headings?"),
     ],
 )
 def test_a_mistake_is_one_message_and_exit_code_two(

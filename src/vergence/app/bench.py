@@ -5,18 +5,22 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from vergence.errors import InputError
+from vergence.app.names import benchmarks
+from vergence.errors import InputError, nearest
 
 
 def bench(names: Sequence[str], as_json: bool) -> int:
     """Run the benchmarks in a process of their own; return its exit code.
 
     Raises:
-        InputError: if this is not a source checkout.
+        InputError: if this is not a source checkout, or there is no such benchmark.
     """
     script = Path(__file__).parents[3] / "benchmarks" / "run.py"
     if not script.is_file():
         allowed = "a source checkout of vergence: the benchmarks are not part of the package"
         raise InputError("vergence bench", "", f"no {script}", allowed)
+    for name in names:
+        if name.removeprefix("bench_") not in benchmarks():
+            raise InputError("vergence bench", "", name, nearest(name, benchmarks()))
     options = ["--json"] if as_json else []
     return subprocess.run([sys.executable, str(script), *options, *names], check=False).returncode
