@@ -5,6 +5,7 @@ It reads the cell of docs/guide/own-arm.md from that page, so picture and page g
 
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -105,22 +106,43 @@ def inside(record):
 
 def report() -> None:
     """The head of the report of the tutorial's first run."""
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        raise SystemExit("the picture of the report needs chromium on the path")
     with tempfile.TemporaryDirectory() as folder:
         run = ("run", "puma560", "--set", "duration_s=4", "--out", folder)
         subprocess.run([VERGENCE, *run], check=True)
+        screenshot(f"file://{folder}/report.html", (1100, 1010), "report.jpg")
+
+
+def watch() -> None:
+    """The page of `vergence watch`, some seconds after the start."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [VERGENCE, "watch", "panda", "--no-browser", "--port", "8246", "--out", folder]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as served:
+            assert served.stdout
+            served.stdout.readline()
+            try:
+                screenshot("http://localhost:8246/", (1400, 900), "watch.jpg", wait_ms=12000)
+            finally:
+                served.send_signal(signal.SIGINT)
+
+
+def screenshot(address: str, size: tuple[int, int], name: str, wait_ms: int = 0) -> None:
+    """Write what a browser shows, at three quarters of its size."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        raise SystemExit(f"{name} needs chromium on the path")
+    with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder, "shot.png")
-        flags = ("--headless", "--no-sandbox", "--use-angle=swiftshader", "--hide-scrollbars")
-        size = ("--window-size=1100,1010", f"--screenshot={shot}", f"--user-data-dir={folder}/b")
-        page = f"file://{folder}/report.html"
-        subprocess.run([browser, *flags, *size, page], check=True, stderr=subprocess.DEVNULL)
-        picture = cv2.resize(cv2.imread(str(shot)), (825, 758), interpolation=cv2.INTER_AREA)
-    cv2.imwrite(str(DOCS / "images" / "report.jpg"), picture)
+        flags = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader")
+        flags += ("--enable-unsafe-swiftshader", "--hide-scrollbars", f"--user-data-dir={folder}/b")
+        flags += (f"--window-size={size[0]},{size[1]}", f"--screenshot={shot}")
+        flags += (f"--virtual-time-budget={wait_ms}",) if wait_ms else ()
+        subprocess.run([browser, *flags, address], check=True, stderr=subprocess.DEVNULL)
+        small = cv2.resize(cv2.imread(str(shot)), None, fx=0.75, fy=0.75, interpolation=3)
+    cv2.imwrite(str(DOCS / "images" / name), small, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
 if __name__ == "__main__":
     own_arm()
     own_object()
     report()
+    watch()

@@ -132,6 +132,7 @@ def _translation(trials: Trials, sign: int) -> Any:
                 textcoords="offset points",
                 va="center",
                 fontsize=8,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
             )
     legend(axes)
     return drawing
