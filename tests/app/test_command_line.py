@@ -24,6 +24,7 @@ COMMANDS = [
     "report",
     "reproduce",
     "plan",
+    "new",
     "track",
     "compare",
     "map",

@@ -32,6 +32,7 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
   vergence watch puma560                  the same in your browser, as it happens
   vergence run puma560 --no-images --set duration_s=5     in a blink, without pictures
   vergence cells                          the cells that come with vergence
+  vergence new my_robot.urdf --body tool0     a first cell for an arm of yours
   vergence compare panda                  several laws from the same random starts
   vergence reproduce nelson1995 --quick   a paper's experiments, checked
 
@@ -219,6 +220,23 @@ def track(
         overlay,
     )
     raise typer.Exit(command(request, out, as_json))
+
+
+@app.command(epilog="Example: vergence new my_robot.urdf --body tool0")
+def new(
+    model: Annotated[
+        str, typer.Argument(help="URDF or MJCF file of the arm; or package:NAME/PATH.")
+    ],
+    body: Annotated[
+        str, typer.Option(help="The arm's last body, which carries the camera; wrong: a list.")
+    ] = "",
+    out: Annotated[Path | None, typer.Option(help="Folder, instead of the model's name.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a first cell for an arm of yours: start, camera and target are found."""
+    from vergence.app.new import new as command
+
+    raise typer.Exit(command(model, body, out, as_json))
 
 
 @app.command(epilog="Example: vergence watch puma560    or vergence watch runs/NAME-TIME")

@@ -100,11 +100,7 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
     if table.body not in bodies:
         allowed = nearest(table.body, (b for b in bodies if b and b != "world"))
         raise InputError(str(cell.path), f"arms.{name}.body", table.body, allowed)
-    joints: list[str] = []
-    body = bodies[table.body]
-    while body is not None and body.name != "world":
-        joints[:0] = [joint.name for joint in body.joints]
-        body = body.parent
+    joints = named_joints(bodies[table.body])
     for actuator in list(model.actuators):
         if actuator.target in joints:
             model.delete(actuator)
@@ -120,6 +116,18 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
         )
         servo.set_to_position(kp=1.0, kv=1.0)
+
+
+def named_joints(last_body: Any) -> list[str]:
+    """Return the names of the joints that move a body, base first; those without get one."""
+    joints: list[Any] = []
+    body = last_body
+    while body is not None and body.name != "world":
+        joints[:0] = body.joints
+        body = body.parent
+    for number, joint in enumerate(joints, start=1):
+        joint.name = joint.name or f"joint{number}"
+    return [joint.name for joint in joints]
 
 
 def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:

@@ -1,0 +1,128 @@
+"""`vergence new`: a first cell for an arm of somebody's own."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vergence.app.output import SUCCESS, emit, say
+from vergence.errors import InputError
+from vergence.places import CELL
+
+if TYPE_CHECKING:
+    from vergence.arrays import FloatArray
+    from vergence.cell.draft import Draft
+
+_BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
+<mujoco model="board">
+  <asset>
+    <texture name="speckles" type="2d" builtin="flat" rgb1="0.9 0.9 0.9" mark="random"
+             markrgb="0.1 0.1 0.1" random="0.2" width="32" height="32"/>
+    <material name="speckles" texture="speckles" specular="0"/>
+  </asset>
+  <worldbody>
+    <body name="board">
+      <geom type="box" size="{half:.3f} {half:.3f} 0.005" pos="0 0 -0.005" material="speckles"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+_CELL = """# A first cell for {model_name}: a camera on {body} keeps its place
+# before a board that wanders. Start, mounting and board were found by `vergence new`; the arm's
+# rates and the camera are guesses, to be replaced by your own.
+name = "{name}"
+duration_s = 10.0
+
+[arms.arm]
+model = "{model}"
+body = "{body}"  # the arm's last body
+position_m = [0.0, 0.0, {height}]  # of its base
+start_deg = {start}  # metres for sliding joints
+rate_max_deg_s = 90.0  # from the robot's manual; one number, or one a joint
+acceleration_max_deg_s2 = 360.0
+
+[cameras.wrist]
+arm = "arm"
+position_m = {camera_m}  # in the last body: z looks ahead, x right, y down
+rotation_rpy_deg = {camera_rpy}
+resolution = [640, 480]
+focal_px = [600.0, 600.0]  # your lens, see `vergence calibrate --help`
+rate_hz = 30.0
+latency_frames = 1  # from exposure until the picture arrives
+
+[target]
+model = "board.xml"
+position_m = {target_m}
+rotation_rpy_deg = {target_rpy}
+
+[target.motion]
+kind = "random"
+amplitude_m = {amplitude}
+amplitude_rpy_deg = [4.0, 4.0, 8.0]
+start_s = 1.0
+
+[task]
+kind = "track"
+arm = "arm"
+camera = "wrist"
+feature_count = 4  # picked in the first picture
+
+[law]
+kind = "constrained"  # joint limits, view and singularities are kept
+gain = 3.0
+"""
+
+
+def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
+    """Write a cell for an arm into a new folder; return the exit code."""
+    from vergence.cell.draft import draft_cell
+    from vergence.cell.locate import locate_model
+
+    path = locate_model(Path(model), Path.cwd(), "vergence new", "MODEL")
+    folder = out or Path(path.stem)
+    if (folder / CELL).exists():
+        raise InputError(str(folder), "", "a cell is there already", "--out with another folder")
+    draft = draft_cell(path, body)
+    folder.mkdir(parents=True, exist_ok=True)
+    named = model if model.startswith("package:") else os.path.relpath(path, folder)
+    (folder / "board.xml").write_text(_BOARD.format(half=draft.half_side_m))
+    (folder / CELL).write_text(_text(draft, path.name, named, body, folder.resolve().name))
+    if as_json:
+        emit({"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()})
+    else:
+        say(f"wrote {folder / CELL} and board.xml: {len(draft.arm.names)} joints up to {body}")
+        say(f"next:  vergence watch {folder}      or  vergence run {folder}")
+    return SUCCESS
+
+
+def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> str:
+    unit = np.where(draft.arm.chain.sliding, 1.0, np.pi / 180)
+    camera_m, camera_rpy = _placement(draft.T_body_camera)
+    target_m, target_rpy = _placement(draft.T_world_target)
+    return _CELL.format(
+        model_name=model_name,
+        model=model,
+        body=body,
+        height=draft.height_m,
+        name=name,
+        start=_numbers(draft.start / unit, 3),
+        camera_m=camera_m,
+        camera_rpy=camera_rpy,
+        target_m=target_m,
+        target_rpy=target_rpy,
+        amplitude=_numbers(np.full(3, 0.2 * draft.half_side_m), 3),
+    )
+
+
+def _placement(T: "FloatArray") -> tuple[str, str]:
+    """Return position_m and rotation_rpy_deg of a pose (4, 4), as a cell file has them."""
+    from vergence.geometry import matrix_to_rpy
+
+    rpy = matrix_to_rpy(np.ascontiguousarray(T[:3, :3]))[::-1]
+    return _numbers(T[:3, 3], 4), _numbers(np.rad2deg(rpy), 3)
+
+
+def _numbers(values: "FloatArray", digits: int) -> str:
+    return "[" + ", ".join(str(round(float(v), digits) + 0.0) for v in values) + "]"

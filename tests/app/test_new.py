@@ -1,0 +1,104 @@
+"""`vergence new`: a cell for an arm nobody has set up, good enough to run at once."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vergence.app.main import main
+from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell.draft import draft_cell
+from vergence.errors import InputError
+from vergence.places import CELLS
+from vergence.runtime import run_cell
+
+ROBOTS = "package:example-robot-data/robots"
+ARMS = {  # by their number of joints
+    5: (f"{ROBOTS}/so_arm_description/urdf/so101.urdf", "gripper_link"),
+    6: (str(CELLS / "puma560" / "puma560.xml"), "flange"),
+    7: (f"{ROBOTS}/xarm_description/urdf/xarm7.urdf", "link_eef"),
+    8: (f"{ROBOTS}/tiago_description/robots/tiago.urdf", "arm_tool_link"),
+}
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Run the command line in an empty folder; return its exit code."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> object:
+        monkeypatch.setattr(sys, "argv", ["vergence", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        return end.value.code
+
+    return run
+
+
+@pytest.mark.parametrize("joints", ARMS)
+def test_an_arm_the_project_has_never_seen_follows_a_board(command, capsys, joints: int) -> None:
+    model, body = ARMS[joints]
+    assert command("new", model, "--body", body, "--out", "mine", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert len(answer["joints"]) == joints
+    result = run_cell(load_cell("mine", {"duration_s": "3"}), images=False)
+    assert result.outcome.succeeded, str(result.outcome)
+    assert result.summary["max_error_px"] < 20
+
+
+def test_features_are_found_on_its_board_in_rendered_pictures(command) -> None:
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1]) == 0
+    result = run_cell(load_cell("puma560", {"duration_s": "1"}))
+    assert result.outcome.succeeded
+
+
+def test_the_board_faces_the_camera_above_the_floor(command) -> None:
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1], "--out", "mine") == 0
+    world = SimulatedDriver(load_cell("mine"), images=False).world
+    T_camera_target = np.linalg.inv(world.camera_pose("wrist")) @ world.target_pose()
+    np.testing.assert_allclose(T_camera_target[:2, 3], 0.0, atol=1e-3)
+    np.testing.assert_allclose(T_camera_target[:3, 2], [0, 0, -1], atol=1e-3)
+    assert world.target_pose()[2, 3] > 0.05
+
+
+def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsys) -> None:
+    (tmp_path / "puma560").mkdir()
+    (tmp_path / "puma560" / "cell.toml").write_text("mine")
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1]) == 2
+    assert (tmp_path / "puma560" / "cell.toml").read_text() == "mine"
+    assert "--out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("body", ["", "flang"])
+def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsys, body) -> None:
+    assert command("new", ARMS[6][0], "--body", body) == 2
+    assert "flange" in capsys.readouterr().err
+
+
+def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        draft_cell(tmp_path / "no.urdf", "tool")
+    (tmp_path / "no.xml").write_text("<mujoco>")
+    with pytest.raises(InputError, match=r"no\.xml"):
+        draft_cell(tmp_path / "no.xml", "tool")
+
+
+def test_joints_without_a_name_get_one(command, tmp_path: Path) -> None:
+    arm = """<mujoco><worldbody><body name="arm" pos="0 0 1"><joint axis="0 0 1"/>
+      <geom size="0.02"/><body name="hand" pos="0.4 0 0"><joint axis="0 1 0"/><geom size="0.02"/>
+      </body></body></worldbody></mujoco>"""
+    (tmp_path / "arm.xml").write_text(arm)
+    assert command("new", "arm.xml", "--body", "hand") == 0
+    result = run_cell(load_cell("arm", {"duration_s": "1"}), images=False)
+    assert result.outcome.succeeded
+
+
+def test_an_arm_that_cannot_see_anything_is_refused(tmp_path: Path) -> None:
+    in_a_ball = """<mujoco><worldbody><body name="arm" pos="0 0 1"><joint axis="0 0 1"/>
+      <geom size="0.1"/><body name="hand" pos="1.5 0 0"><joint axis="0 1 0"/><geom size="0.25"/>
+      </body></body></worldbody></mujoco>"""
+    (tmp_path / "arm.xml").write_text(in_a_ball)
+    with pytest.raises(InputError, match="sees nothing"):
+        draft_cell(tmp_path / "arm.xml", "hand")
