@@ -17,7 +17,15 @@ from vergence.camera.calibration.joint_fit import JointProblem, State
 from vergence.camera.calibration.lens_fit import board_pose
 from vergence.camera.calibration.normal_equations import steps_without
 from vergence.camera.calibration.reprojection import lens_of, reproject, residuals, rms
-from vergence.geometry import se3_exp, se3_inverse, so3_log, transform_points
+from vergence.geometry import (
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    se3,
+    se3_exp,
+    se3_inverse,
+    so3_log,
+    transform_points,
+)
 
 FREE = free_parameters("full")
 HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -242,6 +250,23 @@ def test_poses_that_have_nothing_to_do_with_the_pictures_are_refused() -> None:
     fit = mounted(given._replace(T_base_flange=other.T_base_flange))
     assert not fit
     assert "contradict each other" in str(fit)
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["in hand", "to hand"])
+def test_the_mistake_that_was_made_is_named(fixed: bool) -> None:
+    given = scene(np.random.default_rng(15), 15, fixed)
+    arm = given.T_base_flange
+    other = mounted(given, fixed=not fixed)
+    assert "mounted the other way" in (other.hint if other else str(other))
+    q = [matrix_to_quaternion(np.ascontiguousarray(T[:3, :3])) for T in arm]
+    mixed = np.array([quaternion_to_matrix(np.roll(each, -1)) for each in q])
+    wrong = np.array([se3(R, T[:3, 3].copy()) for R, T in zip(mixed, arm, strict=True)])
+    wrongly_read = mounted(given._replace(T_base_flange=wrong), fixed)
+    words = wrongly_read.hint if wrongly_read else str(wrongly_read)
+    assert "in the order x, y, z, w" in words
+    larger = [s._replace(points=1.03 * s.points) for s in given.sightings]
+    scaled = mounted(given._replace(sightings=larger), fixed)
+    assert "if the squares were 97.1 % of the size" in (scaled.hint if scaled else str(scaled))
 
 
 def test_a_lens_that_is_known_stays_as_it_is() -> None:

@@ -67,6 +67,8 @@ def mounting_warnings(fit: MountingFit) -> list[str]:
             f"{1e3 * fit.noise.arm_m:.1f} mm and {np.rad2deg(fit.noise.arm_rad):.2f}°: were the "
             "poses recorded at rest, is the size of the squares right, is the board flat and fast?"
         )
+    if fit.hint:
+        said.append(f"pictures and arm poses disagree; {fit.hint}")
     return said + _too_small(fit.deviations[9:15], fit.jackknife[9:15])
 
 

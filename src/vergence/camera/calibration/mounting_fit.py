@@ -8,6 +8,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera.calibration.failure import CalibrationFailure
 from vergence.camera.calibration.hand_eye import TOLERATED, Agreement, agree, turning_deg
+from vergence.camera.calibration.hints import hint
 from vergence.camera.calibration.joint_fit import JointProblem, Noise, State
 from vergence.camera.calibration.lens_fit import board_pose
 from vergence.camera.calibration.normal_equations import (
@@ -24,6 +25,7 @@ FEWEST_POSES = 5
 _LEAST_TURN_DEG = 3.0
 _SUSPICIOUS = 4.0  # times the median residual
 _SMALLEST_PX = 0.5  # residuals below are never held against a picture
+_DOUBTFUL_M, _DOUBTFUL_RAD = 1e-3, np.deg2rad(0.2)  # disagreement for which a reason is sought
 _ROUNDS = 6
 
 
@@ -51,6 +53,7 @@ class MountingFit:
     left_out_rad: FloatArray  # (N,) and by what angle
     turning_deg: FloatArray  # (3,) how far the arm turned about three axes, largest first
     bad: tuple[BadPicture, ...]
+    hint: str  # which mistake would explain that pictures and poses disagree much; often empty
 
     @property
     def deviations(self) -> FloatArray:
@@ -99,7 +102,8 @@ def fit_mounting(
     kept = np.flatnonzero(start.residual_px < _limit(start.residual_px, camera.width))
     for _ in range(_ROUNDS):
         if 2 * len(kept) <= len(A) or len(kept) < FEWEST_POSES:
-            return CalibrationFailure(_contradiction(start, len(kept)))
+            words = hint(sightings, A, seen, lens, camera.width, fixed, rng)
+            return CalibrationFailure(_contradiction(start, len(kept), words))
         chosen = [sightings[n][int(start.turns[n])] for n in kept.tolist()]
         problem = JointProblem(tuple(chosen), A[kept], camera, free, fixed)
         state = problem.solved(state, Noise(noise_px))
@@ -123,7 +127,9 @@ def fit_mounting(
         for n in range(len(A))
         if n not in kept
     ]
-    return _finished(problem, state, noise, bad)
+    doubtful = noise.arm_m > _DOUBTFUL_M or noise.arm_rad > _DOUBTFUL_RAD
+    words = hint(sightings, A, seen, lens, camera.width, fixed, rng) if doubtful else ""
+    return _finished(problem, state, noise, bad, words)
 
 
 def _limit(sizes: FloatArray, width: int) -> float:
@@ -161,11 +167,11 @@ def _poses_too_few_or_alike(A: FloatArray, under: str) -> str:
     return ""
 
 
-def _contradiction(start: Agreement, agreeing: int) -> str:
+def _contradiction(start: Agreement, agreeing: int, words: str) -> str:
     typical = float(np.median(start.residual_px))
     return (
         f"pictures and arm poses contradict each other: only {agreeing} of {len(start.turns)} "
-        f"agree, and the usual picture is {typical:.0f} px off"
+        f"agree, and the usual picture is {typical:.0f} px off" + (words and f"; {words}")
     )
 
 
@@ -179,7 +185,7 @@ def _words(size: float, poses: FloatArray, seen: Sequence[Sighting], lens: Float
 
 
 def _finished(
-    problem: JointProblem, state: State, noise: Noise, bad: Sequence[BadPicture]
+    problem: JointProblem, state: State, noise: Noise, bad: Sequence[BadPicture], words: str
 ) -> MountingFit:
     shares = problem.shares(state, noise)
     free = np.concatenate((problem.free, np.ones(12)))
@@ -203,4 +209,5 @@ def _finished(
         left_out[:, 2],
         turning_deg(problem.A),
         tuple(bad),
+        words,
     )
