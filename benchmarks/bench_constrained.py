@@ -18,6 +18,7 @@ from vergence.control.constrained_rates import constrained_rates
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.constraints import DEPTH, pack_features
 from vergence.control.objective import least_squares_objective
+from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE
 from vergence.features import interaction_matrix_points
 from vergence.robot import Arm, yoshikawa_measure
 
@@ -32,10 +33,11 @@ class Tick(NamedTuple):
     q: FloatArray
     wanted: FloatArray
     features: FloatArray
+    solids: FloatArray
 
 
-def tick_of(cell: str, count: int) -> Tick:
-    """Make a tick in which a corner of the picture and a soft joint limit are near."""
+def tick_of(cell: str, count: int, posts: int = 0) -> Tick:
+    """Make a tick in which a corner of the picture, a soft joint limit, and posts are near."""
     driver = SimulatedDriver(load_cell(cell), images=False)
     task = driver.cell.task
     arm, camera = driver.world.arm_to_camera(task.camera), driver.cameras[task.camera]
@@ -47,11 +49,23 @@ def tick_of(cell: str, count: int) -> Tick:
     lowest = 0.5 * yoshikawa_measure(arm.jacobian(q))
     solver = ConstrainedSolver(arm, camera, manipulability_min=lowest, S=1e-3)
     features = pack_features(points, np.zeros_like(points), depth)
-    return Tick(arm, solver, q, points + np.array([0.06, -0.04]), features)
+    wanted = points + np.array([0.06, -0.04])
+    return Tick(arm, solver, q, wanted, features, beside(arm.forward_kinematics(q), posts))
+
+
+def beside(T_world_camera: FloatArray, count: int) -> FloatArray:
+    """Return posts of 4 cm half a metre before the camera, to its left and right in turn."""
+    posts = np.zeros((count, COLUMNS))
+    posts[:, AXES:MIDDLE] = T_world_camera[:3, :3].ravel()
+    for i, post in enumerate(posts):
+        aside = np.array([(-1.0) ** i * (0.12 + 0.05 * i), 0.0, 0.5])
+        post[MIDDLE:HALF] = T_world_camera[:3, :3] @ aside + T_world_camera[:3, 3]
+        post[HALF:] = 0.0, 0.5, 0.0, 0.02
+    return posts
 
 
 @njit
-def one_tick(chain, limits, q, wanted, features, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
     """From features and joints to joint rates, image-based under every constraint."""
     points = features[:, :2]
     L = interaction_matrix_points(points, features[:, DEPTH])
@@ -59,22 +73,33 @@ def one_tick(chain, limits, q, wanted, features, R, settings, avoidance):  # typ
     twist = least_squares_objective(L, error, np.ones(len(L)), R)
     rest = np.zeros(len(q))
     return constrained_rates(
-        chain, limits, q, rest, twist.H, twist.g, rest, features, PERIOD, settings, avoidance
+        chain,
+        limits,
+        q,
+        rest,
+        twist.H,
+        twist.g,
+        rest,
+        features,
+        solids,
+        PERIOD,
+        settings,
+        avoidance,
     ).rates
 
 
 @njit
-def repeat(count, chain, limits, q, wanted, features, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def repeat(count, chain, limits, q, wanted, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
     q, total = q.copy(), 0.0
     for _ in range(count):
         q[0] += 1e-9
-        total += one_tick(chain, limits, q, wanted, features, R, settings, avoidance)[0]
+        total += one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance)[0]
     return total
 
 
 def arguments(tick: Tick) -> tuple[Any, ...]:
     solver, R = tick.solver, np.full(6, 1e-6)
-    before = (tick.arm.chain, solver.limits, tick.q, tick.wanted, tick.features, R)
+    before = (tick.arm.chain, solver.limits, tick.q, tick.wanted, tick.features, tick.solids, R)
     return (*before, solver.settings, solver.avoidance)
 
 
@@ -85,12 +110,17 @@ def from_python(tick: Tick) -> Callable[[], object]:
 
 def run() -> list[dict[str, Any]]:
     rows = []
-    for cell, joints, count in (("puma560", 6, 4), ("puma560", 6, 9), ("lippiello2005", 7, 9)):
-        tick = tick_of(cell, count)
+    cases = (("puma560", 6, 4, 0), ("puma560", 6, 9, 0), ("lippiello2005", 7, 9, 0),
+             ("puma560", 6, 4, 2), ("lippiello2005", 7, 9, 2))  # fmt: skip
+    for cell, joints, count, posts in cases:
+        tick = tick_of(cell, count, posts)
         packed = arguments(tick)
         name = f"constrained tick: {joints} joints, {count} points"
+        if posts:
+            name += f", {posts} posts beside the lines of sight"
         ours = calls(from_python(tick))
-        peers = [visp("tick_joint_limits"), mink(), pink()] if count == 4 else [None]
+        compared = count == 4 and not posts
+        peers = [visp("tick_joint_limits"), mink(), pink()] if compared else [None]
         rows += [row(name, ours, peer, value_aim=12.0) for peer in peers]
         inside = loops(lambda n, packed=packed: repeat(n, *packed))
         rows.append(row(f"{name}, inside a kernel", inside, value_aim=8.0))

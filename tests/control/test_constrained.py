@@ -166,7 +166,7 @@ def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
     )
     w = yoshikawa_measure(J)
     rows = constraint_rows(
-        q, 0 * q, limits, PERIOD, J, features, w, slope,
+        q, 0 * q, limits, PERIOD, J, features, np.empty((0, 6)), np.empty(0), w, slope,
         settings._replace(depth_low=1.0, depth_high=1.0),
     )  # fmt: skip
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]

@@ -162,6 +162,14 @@ class World:
         """Whether a body is the target or a part of it."""
         return body in self._target_bodies
 
+    def bodies_of(self, arm: str) -> frozenset[int]:
+        """Return the bodies of an arm."""
+        return frozenset(
+            body
+            for body in range(self.model.nbody)
+            if self.model.body(self.model.body_rootid[body]).name.startswith(f"{arm}/")
+        )
+
     def arm_to_body(self, name: str) -> Arm:
         """Return an arm with its last body as its tip."""
         return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")

@@ -8,7 +8,8 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.control.active_set import solve_ordered_qp
 from vergence.control.constraints import KIND_NAMES, ConstraintSettings, constraint_rows
-from vergence.robot import Chain, manipulability
+from vergence.control.sight_lines import sight_rows
+from vergence.robot import Chain, forward_kinematics, manipulability
 from vergence.robot.manipulability import determinant_gradient
 from vergence.robot.positive_definite import invert_spd_any
 
@@ -46,6 +47,7 @@ def constrained_rates(
     g_twist: FloatArray,
     spare: FloatArray,
     features: FloatArray,
+    solids: FloatArray,
     period: float,
     settings: ConstraintSettings,
     avoidance: Avoidance,
@@ -65,6 +67,7 @@ def constrained_rates(
         g_twist: of the objective, (6,).
         spare: rates wanted of the joints where the objective leaves a choice, (n,).
         features: of `pack_features`, (M, 7).
+        solids: what may come between, (K, 16), see `sight_lines`.
         period: how long the command will act, s.
         settings: what is kept.
         avoidance: how good configurations are preferred.
@@ -83,7 +86,15 @@ def constrained_rates(
         g += pull * min(1.0, avoidance.rate_max / max(size, 1e-300))
     yoshikawa = np.sqrt(m.det_JJt)
     slope = determinant_gradient(J, m.J_inverse.T.copy(), m.det_JJt) / (2.0 * max(yoshikawa, 1e-9))
-    rows = constraint_rows(q, velocity, limits, period, J, features, yoshikawa, slope, settings)
+    C_sight, d_sight = np.empty((0, n)), np.empty(0)
+    if len(solids):
+        T = forward_kinematics(chain, q)
+        C_sight, d_sight = sight_rows(
+            T, J, features, solids, settings.clearance, settings.approach_rate
+        )
+    rows = constraint_rows(
+        q, velocity, limits, period, J, features, C_sight, d_sight, yoshikawa, slope, settings
+    )
     rank = np.empty(len(rows.d), dtype=np.int64)
     for i in range(len(rank)):
         rank[i] = settings.rank[rows.kind[i]]

@@ -1,6 +1,6 @@
 """The constrained servo: any objective, served as well as what is to be kept allows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import Avoidance, ConstrainedRates, constrained_rates
 from vergence.control.constraints import KIND_NAMES, SOFT, ConstraintSettings
 from vergence.control.objective import TwistObjective
+from vergence.control.sight_lines import NO_SOLIDS
 from vergence.errors import InputError, nearest
 from vergence.robot import Arm
 
@@ -28,6 +29,8 @@ class ConstrainedSolver:
         order: which of `SOFT` are kept, most important first.
         view_margin_px: how far features stay from the border of the picture.
         joint_margin: soft margin to position limits, share of each joint's range.
+        clearance_m: how far sight lines stay from what might come between.
+        solids: gives what might, now, (K, 16), see `sight_lines`; without it there is nothing.
         manipulability_min: lowest √det(J Jᵀ).
         approach_rate: share of the room left to a border that may be used up in a second.
         depth_range: factors between which the true depth lies of the believed one.
@@ -48,6 +51,8 @@ class ConstrainedSolver:
         order: Sequence[str] = SOFT,
         view_margin_px: float = 10.0,
         joint_margin: float = 0.03,
+        clearance_m: float = 0.02,
+        solids: Callable[[], FloatArray] | None = None,
         manipulability_min: float = 0.0,
         approach_rate: float = 2.0,
         depth_range: tuple[float, float] = (0.5, 2.0),
@@ -65,10 +70,12 @@ class ConstrainedSolver:
             high if "view" in order else np.full(2, np.inf),
             *depth_range,
             manipulability_min if "singularity" in order else 0.0,
+            clearance_m,
             _ranks(order),
         )
         self.limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
         self.avoidance = Avoidance(S, avoidance_rate_max, 50.0, damping)
+        self._solids = solids if "occlusion" in order else None
         self._rest = np.zeros(arm.joint_count)
 
     def solve(
@@ -97,6 +104,7 @@ class ConstrainedSolver:
             objective.g,
             self._rest if spare is None else spare,
             features,
+            NO_SOLIDS if self._solids is None else self._solids(),
             self.period,
             self.settings,
             self.avoidance,

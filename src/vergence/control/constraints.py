@@ -11,9 +11,10 @@ from vergence.features import interaction_matrix_points
 
 # Kinds of rows. The first three are what the arm can do: they never bend.
 KIND_NAMES = (
-    "joint positions", "joint rates", "joint accelerations", "view", "singularity", "joint margin",
+    "joint positions", "joint rates", "joint accelerations",
+    "view", "occlusion", "singularity", "joint margin",
 )  # fmt: skip
-POSITION, RATE, ACCELERATION, VIEW, SINGULARITY, JOINT_MARGIN = range(6)
+POSITION, RATE, ACCELERATION, VIEW, OCCLUSION, SINGULARITY, JOINT_MARGIN = range(7)
 SOFT = KIND_NAMES[3:]  # in the order in which they are kept, unless the user says otherwise
 X, Y, X_FLOW, Y_FLOW, DEPTH, X_SPREAD, Y_SPREAD = range(7)  # columns of `pack_features`
 
@@ -28,6 +29,7 @@ class ConstraintSettings(NamedTuple):
     depth_low: float  # the true depth is at least this factor of the believed one
     depth_high: float  # and at most this
     manipulability_min: float  # √det(J Jᵀ) is kept above it; 0 for no such row
+    clearance: float  # m, of sight lines from solids
     rank: IntArray  # (K,) by kind: 0 never bends, then the order of bending
 
 
@@ -62,6 +64,8 @@ def constraint_rows(
     period: float,
     J_camera: FloatArray,
     features: FloatArray,
+    C_sight: FloatArray,
+    d_sight: FloatArray,
     yoshikawa: float,
     yoshikawa_gradient: FloatArray,
     settings: ConstraintSettings,
@@ -80,12 +84,15 @@ def constraint_rows(
         period: how long the command will act, s.
         J_camera: (6, n).
         features: of `pack_features`, (M, 7).
+        C_sight: of `sight_rows`, (R, n).
+        d_sight: of `sight_rows`, (R,).
         yoshikawa: √det(J Jᵀ).
         yoshikawa_gradient: its gradient, (n,).
         settings: what is kept.
     """
     n, M = len(q), len(features)
-    m = 4 * n + 8 * M + 1
+    seen = 4 * n + 8 * M
+    m = seen + len(d_sight) + 1
     C, d = np.zeros((m, n)), np.full(m, -np.inf)
     kind = np.zeros(m, dtype=np.int64)
     gamma = settings.approach_rate
@@ -102,8 +109,10 @@ def constraint_rows(
             margin = settings.joint_margin * span
             C[row, i], d[row] = -1.0, -gamma * (limits[1, i] - margin - q[i])
             C[row + 1, i], d[row + 1] = 1.0, -gamma * (q[i] - limits[0, i] - margin)
-    view_rows(C[4 * n : m - 1], d[4 * n : m - 1], J_camera, features, settings)
-    kind[4 * n : m - 1] = VIEW
+    view_rows(C[4 * n : seen], d[4 * n : seen], J_camera, features, settings)
+    kind[4 * n : seen] = VIEW
+    C[seen : m - 1], d[seen : m - 1] = C_sight, d_sight
+    kind[seen : m - 1] = OCCLUSION
     kind[m - 1] = SINGULARITY
     if settings.manipulability_min > 0.0:
         C[m - 1] = yoshikawa_gradient

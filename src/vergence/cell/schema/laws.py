@@ -58,7 +58,7 @@ class ImageObjectiveTable(Table):
 
 
 class ConstrainedTable(ImageObjectiveTable, PoseTrajectoryTable):
-    """Any objective under hard joint limits, with view and singularities kept."""
+    """Any objective under hard joint limits, with view, sight and singularities kept."""
 
     kind: Literal["constrained"]
     objective: Objective | None = None  # position_based to follow, else image_based
@@ -66,12 +66,14 @@ class ConstrainedTable(ImageObjectiveTable, PoseTrajectoryTable):
     depth_range: tuple[Positive, Positive] | None = (
         None  # of depths: [0.5, 2]; with a filter [0.9, 1.1]
     )
-    order: tuple[Literal["view", "singularity", "joint margin"], ...] = (
+    order: tuple[Literal["view", "occlusion", "singularity", "joint margin"], ...] = (
         "view",
+        "occlusion",
         "singularity",
         "joint margin",
     )  # what is kept, most important first; joint limits always are
     view_margin_px: Annotated[float, Field(ge=0)] | None = None  # 10, or half a plan's
+    clearance_m: Annotated[float, Field(ge=0)] = 0.02  # of sight lines from what stands about
     joint_margin: Annotated[float, Field(ge=0)] | None = None  # of a range: 0.03, or half a plan's
     manipulability_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of √det(J Jᵀ) at the start
     approach_rate_hz: Positive = 2.0  # share of the room to a border used up in a second

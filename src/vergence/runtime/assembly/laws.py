@@ -13,6 +13,7 @@ from vergence.cell.schema import (
     PositionBasedTable,
     ReachTable,
 )
+from vergence.cell.solids import Solids
 from vergence.control import (
     CameraShare,
     Law,
@@ -180,6 +181,8 @@ def _solver(
         order=table.order,
         view_margin_px=view_px if table.view_margin_px is None else table.view_margin_px,
         joint_margin=joint if table.joint_margin is None else table.joint_margin,
+        clearance_m=table.clearance_m,
+        solids=None if _is_fixed(cell) else Solids(driver.world, task.arm),
         manipulability_min=table.manipulability_share * start,
         approach_rate=table.approach_rate_hz,
         depth_range=table.depth_range or depth_range,
