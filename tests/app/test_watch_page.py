@@ -213,7 +213,11 @@ def test_nothing_is_fetched_from_elsewhere_and_nothing_goes_wrong(
     assert browser.complaints == []
 
 
-def test_ctrl_c_stops_the_arm_and_leaves_a_recording(watched: Watched) -> None:
+def test_ctrl_c_stops_the_arm_though_it_is_paused_and_leaves_a_recording(
+    browser: Browser, watched: Watched
+) -> None:
+    browser.click("#pause")
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
     answer = watched.stop()
     assert answer["outcome"]["kind"] == "stopped"
     second = Path(answer["run"])

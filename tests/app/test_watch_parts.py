@@ -17,9 +17,10 @@ from vergence.app.watch.grip import Grip
 from vergence.app.watch.knobs import KNOBS, LAWS, knobs, law_choices
 from vergence.app.watch.moved_target import MovedTarget
 from vergence.app.watch.pace import Pace
-from vergence.app.watch.server import Server, is_loopback
+from vergence.app.watch.server import Server, listen
 from vergence.app.watch.shot import Shot
 from vergence.cell import built_in_cells, load_cell
+from vergence.cell.schema import Table
 from vergence.errors import InputError
 from vergence.geometry import se3, so3_exp
 
@@ -105,10 +106,18 @@ class TestPace:
 
 
 class TestKnobs:
-    @pytest.mark.parametrize("table", [table for kinds in LAWS.values() for table in kinds])
-    def test_every_number_of_every_law_has_a_label(self, table: Any) -> None:
-        structure = {"kind", "axes", "avoidance_axes", "order", "depth_range"}
-        assert set(table.model_fields) - structure <= set(KNOBS)
+    def test_no_label_is_left_of_a_number_that_is_gone(self) -> None:
+        tables = [table for kinds in LAWS.values() for table in kinds]
+        assert set(KNOBS) <= {key for table in tables for key in table.model_fields}
+
+    def test_a_number_without_a_label_is_called_by_its_name(self) -> None:
+        class NewTable(Table):
+            kind: str = "new"
+            reach_share: float = 0.5
+            smallest_gap_m: float = 0.2
+
+        shown = [(knob["label"], knob["unit"], knob["value"]) for knob in knobs(NewTable())]
+        assert shown == [("reach share", "", 0.5), ("smallest gap", "m", 0.2)]
 
     @pytest.mark.parametrize("name", [n for n in built_in_cells() if n not in ("ur5", "panda")])
     def test_every_choice_is_a_law_that_the_cell_file_takes(self, name: str) -> None:
@@ -135,6 +144,22 @@ class TestBoard:
         news = board.news(reader)
         assert news is not None
         assert (news.about, news.rows, news.shots) == (None, [[0.1, [2.0]]], [])
+
+    def test_of_a_long_run_the_last_is_kept_and_told_once(self) -> None:
+        board, reader = Board(), Reader()
+        board.begin({"cell": "c"})
+        told = []
+        for number in range(9000):
+            board.tick([number], [])
+            if number % 100 == 99:
+                news = board.news(reader)
+                assert news is not None
+                told += [row[0] for row in news.rows]
+        assert told == list(range(9000))
+        late = board.news(Reader())
+        assert late is not None
+        assert 1800 <= len(late.rows) <= 3600
+        assert late.rows[-1] == [8999]
 
     def test_a_new_run_starts_afresh_for_everyone(self) -> None:
         board, reader = Board(), Reader()
@@ -174,8 +199,7 @@ class TestServer:
         board = Board()
         board.begin({"cell": "made-up"})
         self.asked = []
-        server = Server("127.0.0.1", 0, board, self.asked.append, None)
-        server.start()
+        server = Server(listen("127.0.0.1", 0), board, self.asked.append, None)
         yield server
         server.close()
 
@@ -223,12 +247,14 @@ class TestServer:
 
     def test_a_port_in_use_is_bad_input(self, server: Server) -> None:
         with pytest.raises(InputError, match="--port"):
-            Server("127.0.0.1", server.port, Board(), self.asked.append, None)
+            listen("127.0.0.1", server.port)
+        assert server.only_here
 
 
-def test_loopback_is_known_by_its_names() -> None:
-    assert all(map(is_loopback, ("localhost", "127.0.0.1", "127.1.2.3", "::1")))
-    assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.1.2", "robot")))
+@pytest.mark.parametrize("host", ["192.0.2.1", "no-such-host.invalid"])
+def test_a_host_that_is_not_this_machine_is_bad_input(host: str) -> None:
+    with pytest.raises(InputError, match="--host"):
+        listen(host, 0)
 
 
 def _own_address() -> str:

@@ -10,6 +10,8 @@ from vergence.arrays import FloatArray
 
 Row = list[Any]  # time, s, then the values of each plot
 
+_KEPT_ROWS = 1800  # of a running cell: what a page shows is the last minute at most
+
 
 @dataclass(slots=True)
 class Reader:
@@ -45,6 +47,7 @@ class Board:
         self._about: Mapping[str, Any] = {}
         self._status: dict[str, Any] = {}
         self._rows: list[Row] = []
+        self._dropped = 0  # rows
         self._events: list[Mapping[str, Any]] = []
         self._shots: dict[str, Shot] = {}
         self.state: FloatArray | None = None
@@ -59,6 +62,7 @@ class Board:
         with self._lock:
             self._run += 1
             self._about, self._rows, self._events = about, list(rows), []
+            self._dropped = 0
             self._shots = {}
             self._version += 1
 
@@ -66,6 +70,9 @@ class Board:
         """Add a row of the plots, and put up new pictures."""
         with self._lock:
             self._rows.append(row)
+            if len(self._rows) > 2 * _KEPT_ROWS:
+                del self._rows[:_KEPT_ROWS]
+                self._dropped += _KEPT_ROWS
             self._shots.update({shot.camera: shot for shot in shots})
             self._version += 1
 
@@ -109,11 +116,12 @@ class Board:
             news = News(
                 about,
                 dict(self._status),
-                self._rows[reader.rows :],
+                self._rows[max(reader.rows - self._dropped, 0) :],
                 self._events[reader.events :],
                 fresh,
             )
             reader.version = self._version
-            reader.rows, reader.events = len(self._rows), len(self._events)
+            reader.rows = self._dropped + len(self._rows)
+            reader.events = len(self._events)
             reader.shots = dict(self._shots)
             return news

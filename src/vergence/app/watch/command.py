@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -55,22 +56,17 @@ def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
             raise InputError("watch", option, given, "nothing: a recording is only shown")
     from vergence.app.progress import working
     from vergence.app.watch.replay import Replay
-    from vergence.app.watch.server import Server
+    from vergence.app.watch.server import Server, listen
     from vergence.runtime import Recording
 
+    door = listen(request.host, request.port)
     with working("reading the recording"):
         replay = Replay(Recording.open(path))
-    try:
-        port = replay.scene.port if replay.scene is not None else None
-        server = Server(request.host, request.port, replay.board, replay.ask, port)
-        if replay.scene is not None:
-            replay.scene.start()
-        server.start()
-        _invite(server, request)
-        replay.run()
-        server.close()
-    finally:
-        replay.close()
+    with closing(replay):
+        scene = replay.scene.port if replay.scene is not None else None
+        with closing(Server(door, replay.board, replay.ask, scene)) as server:
+            _invite(server, request)
+            replay.run()
     return {"run": path.parent, "address": server.address}
 
 
@@ -83,35 +79,28 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
     from vergence.app.progress import working
     from vergence.app.watch.law_desk import LawDesk
     from vergence.app.watch.live import Live
-    from vergence.app.watch.server import Server
+    from vergence.app.watch.server import Server, listen
 
+    door = listen(request.host, request.port)
     desk = LawDesk(request.source, settings, request.seed)
     out = request.out or new_folder(desk.cell.name)
     with working("setting up the cell"):
         live = Live(desk, request.images, out, request.image_every)
-    try:
-        server = Server(request.host, request.port, live.board, live.ask, live.scene.port)
-        live.scene.start()
-        server.start()
+    with closing(live), closing(Server(door, live.board, live.ask, live.scene.port)) as server:
         _invite(server, request)
         try:
             outcome = live.run().outcome
             end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
         except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
             end = {"kind": "stopped", "reason": "stopped by the user", "time": 0.0}
-        server.close()
-    finally:
-        live.close()
     _say(f"recorded: `vergence watch {live.folder}` shows it again", request)
     return {"cell": desk.cell.name, "address": server.address, "run": live.folder, "outcome": end}
 
 
 def _invite(server: "Server", request: Request) -> None:
     """Say where the page is and who can reach it; open it where there is a screen."""
-    from vergence.app.watch.server import is_loopback
-
     _say(f"watch at  {server.address}   (Ctrl-C stops)", request)
-    if is_loopback(server.host):
+    if server.only_here:
         _say("Only this machine can reach it; --host opens it to others.", request)
     else:
         warn(

@@ -39,6 +39,7 @@ KNOBS = {
     "penalty": Knob("joint limit penalty"),
     "penalty_k": Knob("its steepness k"),
     "depth_m": Knob("believed depth", "m"),
+    "carries_depth": Knob("carry the depth through the motion"),
     "avoidance_speed_max_m_s": Knob("fastest avoidance", "m/s"),
     "singular_below": Knob("singular below"),
     "filter_hz": Knob("interpolating filter", "Hz"),
@@ -52,6 +53,16 @@ KNOBS = {
     "manipulability_share": Knob("least manipulability", "of the start's"),
     "approach_rate_hz": Knob("approach to a border", "1/s"),
     "flow_smoothing_s": Knob("smoothing of the flow", "s"),
+}
+
+UNITS = {
+    "_m_s": "m/s",
+    "_deg_s": "°/s",
+    "_hz": "Hz",
+    "_px": "px",
+    "_deg": "°",
+    "_m": "m",
+    "_s": "s",
 }
 
 
@@ -74,10 +85,10 @@ def knobs(law: Table) -> list[dict[str, Any]]:
     """Return what may be turned on a law: keys, labels, units, values, and what is allowed."""
     found = []
     for key, about in type(law).model_fields.items():
-        if key not in KNOBS:
+        if key == "kind":
             continue
         value = getattr(law, key)
-        knob: dict[str, Any] = {"key": key, **KNOBS[key]._asdict(), "value": value}
+        knob: dict[str, Any] = {"key": key, **_about(key)._asdict(), "value": value}
         if isinstance(value, bool):
             knob["kind"] = "switch"
         elif isinstance(value, int | float):
@@ -93,6 +104,16 @@ def knobs(law: Table) -> list[dict[str, Any]]:
 def turned(key: str, value: Any) -> dict[str, str]:
     """Return the setting of a cell file, key and TOML, that a turned knob stands for."""
     return {f"law.{key}": json.dumps(value)}
+
+
+def _about(key: str) -> Knob:
+    """Return what is known of a knob; of one that is new, what its name says."""
+    if key in KNOBS:
+        return KNOBS[key]
+    for suffix, unit in UNITS.items():
+        if key.endswith(suffix):
+            return Knob(key.removesuffix(suffix).replace("_", " "), unit)
+    return Knob(key.replace("_", " "))
 
 
 def _suits(cell: Cell, kind: str) -> bool:

@@ -22,7 +22,7 @@ _FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its vi
 
 
 class Scene:
-    """Serves the view on a loopback port.
+    """Serves the view on a loopback port, in threads of its own, until it is closed.
 
     Args:
         model: MuJoCo's.
@@ -56,9 +56,6 @@ class Scene:
         self._signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._show, name="scene", daemon=True)
-
-    def start(self) -> None:
-        """Begin to serve."""
         self._server.start()
         self._thread.start()
 
@@ -85,7 +82,7 @@ class Scene:
         low, high = points.min(axis=0), points.max(axis=0)
         way = points[-1] - points[0]
         self._camera.lookat[:] = (low + high) / 2
-        self._camera.distance = 1.1 * float(np.linalg.norm(high - low)) + 0.7
+        self._camera.distance = 1.5 * float(np.linalg.norm(high - low)) + 0.15
         self._camera.azimuth = float(np.rad2deg(np.arctan2(way[1], way[0]))) + 70.0
         self._camera.elevation = -22.0
 
@@ -135,8 +132,9 @@ def world_state(model: Any, data: Any) -> FloatArray:
 
 
 def in_view(world: World) -> FloatArray:
-    """Return what the first view should show, (K, 3): arms, cameras, and at last the target."""
-    model, data = world.model, world.data
+    """Return what the first view should show, (K, 3): from the foot of the arm to the target."""
+    model, data, cell = world.model, world.data, world.cell
+    foot = np.array(cell.arms[cell.task.arm].position_m)
     bodies = [data.xpos[body] for body in range(1, model.nbody)]
     cameras = [data.cam_xpos[camera] for camera in range(model.ncam)]
-    return np.array([*bodies, *cameras, world.target_pose()[:3, 3]])
+    return np.array([foot, *bodies, *cameras, world.target_pose()[:3, 3]])

@@ -1,6 +1,7 @@
 """Serves the page, and what is on the board to everyone who has it open."""
 
 import asyncio
+import errno
 import json
 import socket
 import threading
@@ -34,49 +35,47 @@ _HEADERS = {
 
 
 class Server:
-    """Listens on one port, in a thread of its own.
+    """Serves on one port, in a thread of its own, until it is closed.
 
     Args:
-        host: where to listen.
-        port: likewise; None for the first free one from `DEFAULT_PORT` on, 0 for any.
+        door: where to listen; see `listen`.
         board: what to show.
         ask: is given what pages ask for, in the server's thread.
         scene_port: of the view in three dimensions, on loopback; None without one.
 
     Attributes:
-        port: where it listens.
-
-    Raises:
-        InputError: if it cannot listen there.
+        host: where it listens.
+        port: likewise.
     """
 
     def __init__(
         self,
-        host: str,
-        port: int | None,
+        door: socket.socket,
         board: Board,
         ask: Callable[[Mapping[str, Any]], None],
         scene_port: int | None,
     ) -> None:
-        self._board, self._ask, self._scene_port = board, ask, scene_port
-        self._socket = _listen(host, port)
-        self.host, self.port = host, int(self._socket.getsockname()[1])
-        self._hosts = _LOOPBACK if is_loopback(host) else frozenset[str]()
+        self._socket, self._board, self._ask = door, board, ask
+        self._scene_port = scene_port
+        host, port, *_ = door.getsockname()
+        self.host, self.port = str(host), int(port)
         self._loop = asyncio.new_event_loop()
         self._ending = asyncio.Event()
-        self._thread = threading.Thread(target=self._run, name="pages", daemon=True)
         self._inner_port = 0
+        self._thread = threading.Thread(target=self._run, name="pages", daemon=True)
+        self._thread.start()
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
-        anywhere = self.host in ("0.0.0.0", "::")
-        name = "localhost" if anywhere or is_loopback(self.host) else self.host
-        return f"http://{name}:{self.port}/"
+        """What to open in a browser on this machine."""
+        here = self.only_here or self.host in ("0.0.0.0", "::")
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{'localhost' if here else name}:{self.port}/"
 
-    def start(self) -> None:
-        """Begin to serve."""
-        self._thread.start()
+    @property
+    def only_here(self) -> bool:
+        """Whether no other machine reaches it."""
+        return self.host.startswith("127.") or self.host == "::1"
 
     def close(self) -> None:
         """Hang up on everyone."""
@@ -97,7 +96,7 @@ class Server:
             max_size=_LONGEST_COMMAND,
         )
         self._inner_port = next(iter(inner.sockets)).getsockname()[1]
-        door = Door(self._way, self._hosts)
+        door = Door(self._way, _LOOPBACK if self.only_here else frozenset())
         async with inner, await asyncio.start_server(door.enter, sock=self._socket):
             await self._ending.wait()
             await door.close()
@@ -155,18 +154,24 @@ class Server:
                 self._ask(command)
 
 
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a host's address."""
-    return host == "localhost" or host.startswith("127.") or host == "::1"
+def listen(host: str, port: int | None) -> socket.socket:
+    """Return a socket that listens.
 
+    Args:
+        host: a name or address of this machine.
+        port: None for the first free one from `DEFAULT_PORT` on, 0 for any.
 
-def _listen(host: str, port: int | None) -> socket.socket:
+    Raises:
+        InputError: if it cannot be had.
+    """
     ports = range(DEFAULT_PORT, DEFAULT_PORT + _OTHERS) if port is None else (port,)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in ports:
         try:
             return socket.create_server((host, number), family=family)
         except OSError as error:
-            last = error
-    key, given = ("--host", host) if port == 0 else ("--port", port or f"{ports[0]}…{ports[-1]}")
-    raise InputError("watch", key, given, f"an address that is free here ({last.strerror})")
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                allowed = "127.0.0.1, or another address of this machine"
+                raise InputError("watch", "--host", host, allowed) from None
+    given = f"{ports[0]} … {ports[-1]}" if port is None else port
+    raise InputError("watch", "--port", given, "a port that is free and that you may use")

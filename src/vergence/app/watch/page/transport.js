@@ -44,7 +44,7 @@ export class Transport {
     const over = outcome && !this.recording;
     this.pause.disabled = this.step.disabled = Boolean(over);
     if (over) this.measured.textContent = "";
-    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}`);
+    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}${over ? ". Reset begins again." : ""}`);
     else this.mark(paused ? "paused" : "running", paused ? "plain" : "good", "");
   }
 
