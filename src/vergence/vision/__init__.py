@@ -1,5 +1,6 @@
 """Image points from windows of images, and what two views of them tell."""
 
+from vergence.vision.board import Board
 from vergence.vision.image import grey_image
 from vergence.vision.picking import Picked, pick_features
 from vergence.vision.ssd_tracker import SsdTracker
@@ -12,6 +13,7 @@ from vergence.vision.two_view import (
 )
 
 __all__ = [
+    "Board",
     "Picked",
     "PointTracker",
     "SsdTracker",

@@ -79,8 +79,9 @@ def fit_lens(
 ) -> LensFit | CalibrationFailure:
     """Estimate a lens, leaving out pictures that the others contradict.
 
-    OpenCV minimises the squared distances of all corners over lens and poses, after Zhang's closed
-    form. Then the picture with the largest residual goes while it is far beyond the usual.
+    OpenCV minimises the squared distances of all corners over lens and poses, from the closed form
+    of [Zhang2000]. Then the picture with the largest residual goes while it is far beyond the
+    usual.
 
     Args:
         sightings: of one board, in pictures by one camera.
