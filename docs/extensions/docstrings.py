@@ -21,15 +21,17 @@ def _list_fields(
     """Append a class's fields to its docstring, where that does not list them itself."""
     if what != "class" or any(re.match(r"(Attributes|Args):", line) for line in lines):
         return
-    fields = {n: c for n, c in field_comments(obj).items() if not n.startswith("_")}
-    if any(fields.values()):
-        lines += ["", "Fields:", *(f"    {name}: {said or '–'}" for name, said in fields.items())]
+    fields = {n: c for n, c in field_comments(obj).items() if c and not n.startswith("_")}
+    if fields:
+        lines += ["", "Fields:", *(f"    {name}: {said}" for name, said in fields.items())]
 
 
 def _as_plain_text(
     app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
 ) -> None:
     """Keep |w| a magnitude and F* a name: neither is markup in our docstrings."""
+    if what in ("property", "attribute"):
+        lines.insert(0, "")  # else napoleon takes what stands before a colon for a type
     lines[:] = [
         "".join(
             part if part.startswith("`") else re.sub(r"([|*])", r"\\\1", part)

@@ -128,11 +128,11 @@ def _translation(trials: Trials, sign: int) -> Any:
             axes.annotate(
                 trial.outcome.kind.value,
                 (time[-1], trial.camera_m[-1]),
-                xytext=(4, -11 * sign),
+                xytext=(6 if index else -6, 9 * sign),  # where no curve runs
                 textcoords="offset points",
+                ha="left" if index else "right",
                 va="center",
                 fontsize=8,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
             )
     legend(axes)
     return drawing
