@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera
+from vergence.camera import Camera, FrameTruth
 from vergence.cell import IdealCell, IdealDriver, load_cell
 from vergence.cell.ideal_driver import ARM, CAMERA
 from vergence.control import Law, OptimalTrackingLaw
@@ -15,17 +15,32 @@ from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.image_based import ImageBased
 from vergence.control.optimal_objective import OptimalTracking
+from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
+from vergence.control.position_based import PositionBasedLaw
+from vergence.control.target_keeper import TargetKeeper
 from vergence.estimation import ExactPoints
 from vergence.geometry import se3, se3_inverse, so3_exp
 from vergence.outcome import Outcome
 from vergence.planning import FixedReference, Reference
 from vergence.robot import Arm, Sample, Setpoint
 from vergence.runtime import Listener, Loop
+from vergence.runtime.stages import Planner
+from vergence.studies.wrong_beliefs import MovingGoal, WrongDepthPose
 
 CAMERA_MODEL = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
-LAWS = ("plain", "optimal tracking", "constrained image-based", "constrained tracking")
-CELLS = ("puma560", "lippiello2005", "gantry")  # six turning joints, seven with a track, 3 + 3
+LAWS = (
+    "plain",
+    "optimal tracking",
+    "position-based",
+    "path tracking",
+    "constrained image-based",
+    "constrained tracking",
+    "constrained position-based",
+    "constrained path tracking",
+)
+# Six turning joints, seven with a track, three that slide and three that turn, six, seven.
+CELLS = ("puma560", "lippiello2005", "gantry", "ur5", "panda")
 RUN_S = 2.0
 
 
@@ -110,14 +125,15 @@ def run_ideal(
     driver = IdealDriver(cell)
     truth = driver.frame().truth
     assert truth is not None
-    wanted = truth.points_px + (0.0 if offset_px is None else offset_px)
+    offset = np.zeros(2) if offset_px is None else offset_px
+    depth = truth.depth_m * depth_factor
     watched = Watched(driver, cell.arm)
     loop = Loop(
         watched,
         ARM,
-        ExactPoints(CAMERA),
-        FixedReference(Reference(0.0, wanted)),
-        build(law, cell, truth.depth_m * depth_factor),
+        WrongDepthPose(CAMERA, depth_factor) if "position" in law else ExactPoints(CAMERA),
+        _goal(law, truth, offset, depth),
+        build(law, cell, depth),
         outer_rate_hz=cell.rate_hz,
         listeners=listeners,
     )
@@ -125,9 +141,20 @@ def run_ideal(
     return watched.excess, outcome
 
 
+def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray) -> Planner:
+    """Return what a law aims at: points beside the first, those on the way on, or a pose."""
+    wanted = truth.points_px + offset_px
+    T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
+    T_camera_target[:2, 3] += offset_px / CAMERA_MODEL.focal_px * T_camera_target[2, 3]
+    if "path" in law:
+        return MovingGoal(wanted, offset_px, depth, T_camera_target)
+    return FixedReference(Reference(0.0, wanted, T_camera_target=T_camera_target))
+
+
 def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
     """Make one of `LAWS`."""
     arm, camera, period = cell.arm, cell.camera, 1.0 / cell.rate_hz
+    inner = 1.0 / cell.inner_rate_hz
     solver = ConstrainedSolver(arm, camera, period=period, S=1e-3)
     match law:
         case "plain":
@@ -138,6 +165,16 @@ def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
                 arm, camera, depth, axes=axes, avoidance_axes=avoiding, S=1e-3, period=period,
                 singular_below=1e-4,
             )  # fmt: skip
+        case "position-based":
+            return PositionBasedLaw(arm, inner)
+        case "constrained position-based":
+            inner_solver = ConstrainedSolver(arm, camera, period=inner, depth_range=(0.9, 1.1))
+            keeper = TargetKeeper(inner_solver, cell.features)
+            return PositionBasedLaw(arm, inner, keeper=keeper)
+        case "path tracking":
+            return PathTrackingLaw(arm, camera)
+        case "constrained path tracking":
+            return ConstrainedLaw(solver, ImageBased(camera, 2.0, "desired"), depth)
         case "constrained image-based":
             objective = ImageBased(camera, gain=2.0)
             return ConstrainedLaw(solver, objective, depth)
@@ -149,7 +186,11 @@ def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
 
 
 def arms() -> tuple[Arm, ...]:
-    """Return the arms of the built-in cells, each up to a camera in its hand."""
+    """Return the arms of `CELLS`, each up to a camera in its hand.
+
+    Raises:
+        InputError: if the models of the UR5 and the Panda are not installed, with how to do it.
+    """
     from vergence.cell import SimulatedDriver
 
     found = []
