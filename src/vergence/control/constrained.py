@@ -6,6 +6,7 @@ from vergence.control.constrained_solver import ConstrainedSolver, command_of
 from vergence.control.constraints import pack_features
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import Objective, seen_only
+from vergence.errors import InputError
 from vergence.features import Observation
 from vergence.planning import Reference
 from vergence.robot import JointState
@@ -33,6 +34,8 @@ class ConstrainedLaw:
     ) -> None:
         self.solver, self.objective = solver, objective
         self.depth_m = frozen(depth_m, (None,), "depth_m")
+        if not (self.depth_m > 0).all():
+            raise InputError("law", "depth_m", depth_m, "depths above zero")
         self._motion = ImageMotion(
             solver.arm, solver.camera, flow_smoothing_s, carries_depth=carries_depth
         )

@@ -61,6 +61,18 @@ class ConstrainedSolver:
         damping: float = 1e-6,
     ) -> None:
         self.arm, self.camera, self.period = arm, camera, period
+        half = 0.5 * (min(camera.width, camera.height) - 1)
+        _require("view_margin_px", view_margin_px, 0 <= view_margin_px < half,
+                 f"from 0 to less than half the picture, {half:g}")  # fmt: skip
+        _require("joint_margin", joint_margin, 0 <= joint_margin < 0.5,
+                 "from 0 to less than half of a joint's range, 0.5")  # fmt: skip
+        _require("depth_range", depth_range, 0 < depth_range[0] <= 1 <= depth_range[1],
+                 "a factor above 0 up to 1, and one from 1")  # fmt: skip
+        _require("clearance_m", clearance_m, clearance_m >= 0, "0 or more")
+        _require("S", S, S >= 0, "0 or more")
+        # Faster, and one command would use up more room than there is.
+        _require("approach_rate_hz", approach_rate, 0 < approach_rate * period <= 1,
+                 f"above 0, up to one command's share, {1 / period:g}")  # fmt: skip
         x_min, x_max, y_min, y_max = camera.rectangle(view_margin_px + 0.5)
         low, high = np.array([x_min, y_min]), np.array([x_max, y_max])
         self.settings = ConstraintSettings(
@@ -143,10 +155,16 @@ def command_of(answer: ConstrainedRates) -> JointCommand:
     )
 
 
+def _require(key: str, given: object, fits: bool, allowed: str) -> None:
+    if not fits:
+        raise InputError("law", key, given, allowed)
+
+
 def _ranks(order: Sequence[str]) -> IntArray:
     for name in order:
         if name not in SOFT:
             raise InputError("law", "order", name, nearest(name, SOFT))
+    _require("order", list(order), len(set(order)) == len(order), "each constraint once")
     ranks = np.zeros(len(KIND_NAMES), dtype=np.int64)
     for place, name in enumerate(order, start=1):
         ranks[KIND_NAMES.index(name)] = place

@@ -8,6 +8,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
 from vergence.control.image_motion import FeatureState
 from vergence.control.objective import TwistObjective, least_squares_objective
+from vergence.errors import InputError
 from vergence.features import interaction_matrix_points
 from vergence.planning import Reference
 
@@ -34,6 +35,8 @@ class ImageBased:
         damping: float = 1e-6,
         goal_depth_m: FloatArray | None = None,
     ) -> None:
+        if not gain > 0:
+            raise InputError("law", "gain", gain, "a number above zero")
         self._camera, self._gain, self._model = camera, gain, model
         self._R = np.full(6, damping)
         self._goal_depth_m = goal_depth_m

@@ -9,7 +9,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
 from vergence.control.image_motion import FeatureState
 from vergence.control.objective import TwistObjective, least_squares_objective
-from vergence.control.optimal_tracking import AXES, axis_mask
+from vergence.control.optimal_tracking import AXES, axis_mask, weights_of
 from vergence.control.tracking_kernels import SHARING
 from vergence.features import interaction_matrix_points
 from vergence.planning import Reference
@@ -41,7 +41,7 @@ class OptimalTracking:
         period: float = 1 / 30,
     ) -> None:
         self._camera, self._Q, self._period = camera, Q, period
-        given = np.broadcast_to(np.asarray(R, dtype=np.float64), (len(axes),))
+        given = np.broadcast_to(weights_of(Q, R, axes), (len(axes),))
         used = axis_mask(axes, "axes")
         weights = np.full(6, _UNUSED_AXIS * given.max())
         weights[used] = [given[list(axes).index(axis)] for axis in AXES if axis in axes]

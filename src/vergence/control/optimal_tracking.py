@@ -75,9 +75,9 @@ class OptimalTrackingLaw:
             raise InputError("law", "avoidance_axes", list(avoidance_axes), "a subset of axes")
         if not (self.depth_m > 0).all():
             raise InputError("law", "depth_m", depth_m, "depths above zero")
-        R_axes = np.broadcast_to(np.asarray(R, dtype=np.float64), (len(axes),))
-        if not (R_axes > 0).all() or Q <= 0 or S < 0:
-            raise InputError("law", "Q, R, S", (Q, R, S), "Q > 0, R > 0, S >= 0")
+        R_axes = np.broadcast_to(weights_of(Q, R, axes), (len(axes),))
+        if S < 0:
+            raise InputError("law", "S", S, "0 or more")
         R_full = np.ones(6)
         R_full[[AXES.index(axis) for axis in axes]] = R_axes
         self.gains = TrackingGains(
@@ -136,3 +136,20 @@ def axis_mask(axes: Sequence[str], name: str) -> BoolArray:
         if axis not in AXES:
             raise InputError("law", name, axis, nearest(axis, AXES))
     return np.array([axis in axes for axis in AXES])
+
+
+def weights_of(Q: float, R: float | Sequence[float], axes: Sequence[str]) -> FloatArray:
+    """Return R as an array, () or one for each axis.
+
+    Raises:
+        InputError: if Q or R is not above zero, or there are too many or too few.
+    """
+    weights = np.asarray(R, dtype=np.float64)
+    if not Q > 0:
+        raise InputError("law", "Q", Q, "a number above zero")
+    if weights.shape not in ((), (len(axes),)):
+        given = f"{weights.size} weights"
+        raise InputError("law", "R", given, f"one, or {len(axes)}, one for each of the axes")
+    if not (weights > 0).all():
+        raise InputError("law", "R", R, "numbers above zero")
+    return weights

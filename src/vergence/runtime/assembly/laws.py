@@ -28,11 +28,14 @@ from vergence.control.held_target_keeper import HeldTargetKeeper
 from vergence.control.image_based import ImageBased
 from vergence.control.objective import Objective
 from vergence.control.optimal_objective import OptimalTracking
+from vergence.control.optimal_tracking import AXES, axis_mask
 from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
 from vergence.control.target_keeper import TargetKeeper
 from vergence.errors import InputError
+from vergence.features import interaction_matrix_points
 from vergence.robot import Arm, manipulability_measure, reverse_arm
+from vergence.runtime.assembly.motion_needed import require_motion
 from vergence.runtime.assembly.pose import camera_poses, target_shape
 
 
@@ -42,6 +45,35 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
     Raises:
         InputError: if the law does not fit the task, or its numbers do not fit the arm.
     """
+    try:
+        law = _law(cell, driver)
+    except InputError as error:
+        if error.source != "law":
+            raise
+        # What a law says of its arguments is said of the file's keys.
+        key = f"law.{error.key}"
+        raise InputError(str(cell.path), key, error.given, error.allowed) from None
+    _require_motion(cell, driver)
+    return law
+
+
+def _require_motion(cell: Cell, driver: SimulatedDriver) -> None:
+    """Refuse an arm that cannot do with its camera what the law asks of it."""
+    arm, name = _arm(cell, driver), cell.task.camera
+    q = driver.read().joints[cell.task.arm].position
+    axes = axis_mask(getattr(cell.law, "axes", AXES), "axes")
+    L = np.eye(6)
+    if cell.task.kind != "follow":
+        truth = driver.first_frame(name).truth
+        assert truth is not None
+        points = driver.cameras[name].normalize(truth.points_px)
+        L = interaction_matrix_points(points, truth.depth_m)
+        if getattr(cell.law, "objective", "") in ("image_based", None):
+            axes = np.ones(6, dtype=np.bool_)
+    require_motion(str(cell.path), name, arm, q[::-1] if _is_fixed(cell) else q, L, axes)
+
+
+def _law(cell: Cell, driver: SimulatedDriver) -> Law:
     match cell.law:
         case OptimalTrackingTable():
             _require_task(cell, "track")
@@ -98,7 +130,6 @@ def _optimal_tracking(
     cell: Cell, driver: SimulatedDriver, table: OptimalTrackingTable
 ) -> OptimalTrackingLaw:
     name = cell.task.camera
-    _check_weights(cell, table)
     if extra := set(table.avoidance_axes) - set(table.axes):
         raise InputError(
             str(cell.path), "law.avoidance_axes", ", ".join(sorted(extra)), "a subset of law.axes"
@@ -241,24 +272,19 @@ def _objective(
     camera = driver.cameras[name]
     if kind == "image_based":
         return ImageBased(camera, table.gain, table.interaction)
-    _check_weights(cell, table)
     period = 1.0 / cell.cameras[name].rate_hz
     count = len(_depth(driver, name, table.depth_m))
     return OptimalTracking(camera, table.axes, table.Q / count, table.R, period)
 
 
-def _check_weights(cell: Cell, table: OptimalTrackingTable | ConstrainedTable | PlainTable) -> None:
-    if isinstance(table.R, tuple) and len(table.R) != len(table.axes):
-        raise InputError(
-            str(cell.path), "law.R", f"{len(table.R)} weights", f"one, or {len(table.axes)}"
-        )
-
-
 def _depth(driver: SimulatedDriver, camera: str, given: float | str) -> FloatArray:
     """Return the depth of every feature, (M,): as given, or as the start shows."""
     truth = driver.first_frame(camera).truth
-    assert truth is not None
-    return np.full(len(truth.depth_m), given) if isinstance(given, float) else truth.depth_m
+    if isinstance(given, float) and truth is not None:
+        return np.full(len(truth.depth_m), given)
+    if truth is None or not (truth.depth_m > 0).all():  # false for one that is not a number, too
+        raise InputError("law", "depth_m", "initial, which nothing tells here", "a depth in metres")
+    return truth.depth_m
 
 
 def _position_based(

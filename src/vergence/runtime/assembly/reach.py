@@ -37,6 +37,7 @@ def reach_parts(
     cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool
 ) -> Parts | Outcome:
     """Put together what plans a path in the image and tracks it; or why there is none."""
+    law = build_law(cell, driver)
     pictures = look_twice(cell, task, driver, images)
     if isinstance(pictures, PlanFailure):
         return pictures.outcome(0.0)
@@ -50,7 +51,7 @@ def reach_parts(
     if duration > cell.duration_s:
         reason = f"the way takes {duration:.1f} s, duration_s is {cell.duration_s:g}"
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
-    return Parts(pictures.perception, trajectory, build_law(cell, driver), duration)
+    return Parts(pictures.perception, trajectory, law, duration)
 
 
 def plan_reach(
