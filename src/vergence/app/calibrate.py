@@ -293,7 +293,7 @@ def _table(found: Calibration) -> list[str]:
     rows = [heads]
     for e in found.estimates:
         values = (e.value, e.deviation, e.jackknife, *((e.truth, e.error) if truth else ()))
-        rows.append((e.name, *(_number(value) for value in values), e.unit))
+        rows.append((e.name, *(e.words(value) for value in values), e.unit))
     widths = [max(len(row[n]) for row in rows) for n in range(len(heads))]
     return [
         "  "
@@ -303,12 +303,6 @@ def _table(found: Calibration) -> list[str]:
         ).rstrip()
         for row in rows
     ]
-
-
-def _number(value: float) -> str:
-    if value != value:
-        return "–"
-    return f"{value:.4f}" if abs(value) < 10.0 else f"{value:.3f}"
 
 
 def _tell_left_out(bad: "Sequence[BadPicture]") -> None:

@@ -30,6 +30,14 @@ class Estimate(NamedTuple):
         off = self.value - self.truth
         return (off + 180.0) % 360.0 - 180.0 if self.unit == "°" else off
 
+    def words(self, value: float) -> str:
+        """Return one of its numbers with as many digits as its deviation makes sense of."""
+        if np.isnan(value):
+            return "–"
+        known = self.deviation > 0.0  # neither 0 nor NaN
+        digits = 1 - int(np.floor(np.log10(self.deviation))) if known else 4
+        return f"{value:.{min(max(digits, 1), 7)}f}"
+
 
 def lens_estimates(fit: LensFit | MountingFit, truth: Truth | None) -> list[Estimate]:
     """Return the parameters of the lens."""

@@ -46,10 +46,17 @@ def _header(name: str, found: "Calibration") -> str:
     remarks = "".join(f"<li>{escape(text)}</li>" for text in warnings)
     return (
         '<header><span class="kicker">vergence calibrate</span>'
-        f"<h1>{escape(name)}</h1><p>{markup.badge(words, not warnings)}</p>"
+        f"<h1>{escape(name)}</h1><p>{markup.badge(words, not warnings)}{_bad(found)}</p>"
         + (f"<ul>{remarks}</ul>" if remarks else "")
         + "</header>"
     )
+
+
+def _bad(found: "Calibration") -> str:
+    """Return how many pictures were not used; empty if all were."""
+    count = len(found.bad)
+    pictures = "one picture was" if count == 1 else f"{count} pictures were"
+    return markup.badge(f"{pictures} not used", False) if count else ""
 
 
 def _result(found: "Calibration") -> str:
@@ -64,9 +71,7 @@ def _result(found: "Calibration") -> str:
 
 def _row(e: Estimate, truth: bool) -> str:
     values = [e.value, e.deviation, e.jackknife, *((e.truth, e.error) if truth else ())]
-    cells = "".join(
-        f'<td class="number">{"–" if np.isnan(value) else f"{value:.4f}"}</td>' for value in values
-    )
+    cells = "".join(f'<td class="number">{e.words(value)}</td>' for value in values)
     return f'<tr><th scope="row">{e.name}</th>{cells}<td class="unit">{e.unit}</td></tr>'
 
 

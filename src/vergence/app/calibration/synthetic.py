@@ -199,7 +199,7 @@ class Studio:
         roll = np.deg2rad(rng.uniform(-_ROLL_DEG, _ROLL_DEG))
         R = rpy_to_matrix(np.array([roll, tilt * np.sin(about), tilt * np.cos(about)]))
         depth = self._depth * rng.uniform(*_NEARER)
-        x, y = c.normalize(rng.uniform((0.22, 0.22), (0.78, 0.78), (1, 2)) * (c.width, c.height))[0]
+        x, y = c.normalize(rng.uniform((0.15, 0.2), (0.85, 0.8), (1, 2)) * (c.width, c.height))[0]
         middle = depth * np.array([x, y, 1.0])
         T: FloatArray = se3(R, middle - R @ self.board.center)
         return T

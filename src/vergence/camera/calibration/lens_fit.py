@@ -21,7 +21,7 @@ from vergence.camera.calibration.reprojection import (
     residuals,
     rms,
 )
-from vergence.camera.calibration.sighting import BadPicture, Sighting
+from vergence.camera.calibration.sighting import BadPicture, Sighting, pixels
 from vergence.camera.pinhole import Camera
 from vergence.errors import InputError
 from vergence.geometry import se3, se3_exp, so3_exp
@@ -113,8 +113,8 @@ def fit_lens(
         if sizes[worst] <= max(_SUSPICIOUS * usual, _SMALLEST_PX):
             break
         reason = (
-            f"its corners lie {sizes[worst]:.2g} px from where a flat board can show them; in the "
-            f"other pictures {usual:.2g} px is usual: blurred, bent, or not this board"
+            f"its corners lie {pixels(sizes[worst])} from where a flat board can show them; in the "
+            f"other pictures {pixels(usual)} is usual: blurred, bent, or not this board"
         )
         bad.append(BadPicture(kept[worst].name, float(sizes[worst]), reason))
         del kept[worst]

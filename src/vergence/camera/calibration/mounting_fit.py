@@ -17,7 +17,7 @@ from vergence.camera.calibration.normal_equations import (
     steps_without,
 )
 from vergence.camera.calibration.reprojection import lens_of, residuals, rms
-from vergence.camera.calibration.sighting import BadPicture, Sighting
+from vergence.camera.calibration.sighting import BadPicture, Sighting, pixels
 from vergence.camera.pinhole import Camera
 from vergence.geometry import se3_inverse
 
@@ -178,8 +178,8 @@ def _contradiction(start: Agreement, agreeing: int, words: str) -> str:
 def _words(size: float, poses: FloatArray, seen: Sequence[Sighting], lens: FloatArray) -> str:
     alone = rms(residuals(lens, np.ascontiguousarray(poses[0]), seen[0]))
     return (
-        f"by the arm's pose its corners belong {size:.2g} px from where they are, although the "
-        f"picture by itself fits within {alone:.2g} px: a pose of another picture, taken while "
+        f"by the arm's pose its corners belong {pixels(size)} from where they are, although the "
+        f"picture by itself fits within {pixels(alone)}: a pose of another picture, taken while "
         "moving, or the board was moved"
     )
 

@@ -18,6 +18,11 @@ class Sighting(NamedTuple):
         return len(self.points)
 
 
+def pixels(size: float) -> str:
+    """Return a distance in words, to two digits or whole pixels."""
+    return f"{size:.0f} px" if size >= 10.0 else f"{size:.2g} px"
+
+
 class BadPicture(NamedTuple):
     """A picture that the others contradict, or that shows no board."""
 
