@@ -224,9 +224,9 @@ def test_rates_never_pass_their_limits_and_the_command_says_when_they_were_cut()
     [
         ({"axes": ("x", "yaw")}, "axes"),
         ({"axes": ("x", "y"), "avoidance_axes": ("z",)}, "avoidance_axes"),
-        ({"Q": 0.0}, "Q, R, S"),
-        ({"R": [1.0, 1.0, 0.0, 1.0, 1.0, 1.0]}, "Q, R, S"),
-        ({"S": -1.0}, "Q, R, S"),
+        ({"Q": 0.0}, "Q"),
+        ({"R": [1.0, 1.0, 0.0, 1.0, 1.0, 1.0]}, "R"),
+        ({"S": -1.0}, "S"),
         ({"depth_m": [1.0, 0.0]}, "depth_m"),
     ],
 )
