@@ -23,6 +23,7 @@ from vergence.runtime.campaign import (
     Aim,
     CellSource,
     Crew,
+    Draws,
     Ending,
     Trial,
     TrialResult,
@@ -30,7 +31,6 @@ from vergence.runtime.campaign import (
     heading_trials,
     law_table,
     place_trials,
-    random_starts,
     run_campaign,
     run_trial,
     run_trials,
@@ -50,7 +50,9 @@ def source():
 
 @pytest.fixture(scope="module")
 def trials(source):
-    return start_trials(source.load(), ["image_based", "constrained"], 6, seed=3, spread=0.1)
+    return start_trials(
+        source.load(), ["image_based", "constrained"], 6, seed=3, draws=Draws(spread=0.1)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +77,7 @@ def quick_trials(source):
     """Trials of the cell's own law, which the batch kernel knows."""
     cell = source.load()
     near, far = place_trials(cell, 0.3, 3, 0.2), heading_trials(cell, 3.0, 3, (1.0, 3.0))
-    return [*near, *far, *start_trials(cell, [OWN], 5, seed=3, spread=0.3)]
+    return [*near, *far, *start_trials(cell, [OWN], 5, seed=3, draws=Draws(spread=0.3))]
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +120,8 @@ def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
         assert plain.changes["arms"] == constrained.changes["arms"]
         assert plain.changes["law"] != constrained.changes["law"]
     cell = source.load()
-    aim = Aim.of(cell)
-    fewer = random_starts(cell, aim, 2, seed=3, spread=0.1)
-    np.testing.assert_array_equal(fewer[1], trials[1].changes["arms"]["puma"]["start_deg"])
+    fewer = Draws(spread=0.1).changes(cell, Aim.of(cell), 2, seed=3)
+    assert fewer[1]["arms"] == trials[1].changes["arms"]
 
 
 def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_path):
@@ -212,9 +213,47 @@ def test_laws_are_found_by_name(tmp_path):
         law_table(cell, "image_basde")
 
 
-def test_a_campaign_needs_a_task_in_the_image():
-    with pytest.raises(InputError, match=r"task\.kind"):
-        Aim.of(load_cell("four_cameras"))
+@pytest.mark.parametrize(("name", "seconds"), [("lippiello2005", "0.5"), ("eye_to_hand_pose", "4")])
+def test_a_campaign_holds_the_pose_a_cell_follows_fast(name, seconds):
+    changed = {"duration_s": seconds, "target.motion": "{ kind = 'still' }"}
+    cell, source = load_cell(name, changed), CellSource.of(name, changed, None)
+    aim = Aim.of(cell)
+    again = Aim.of(cell.replace(**aim.tables))
+    np.testing.assert_allclose(again.desired_px, aim.desired_px, atol=1e-3)
+    (result,) = run_trials(source, [Trial("own", aim.tables)], 5.0)
+    assert result.ending is Ending.CONVERGED, result
+
+
+def test_a_reach_is_tried_from_random_starts_before_random_targets():
+    cell = load_cell("gantry")
+    drawn = start_trials(cell, [OWN], 2, 0, Draws(("starts", "targets"), 0.05))
+    results = run_trials(CellSource.of("gantry", {}, None), drawn, 2.0)
+    assert {result.ending for result in results} == {Ending.CONVERGED}
+    assert len({result.start_m for result in results}) == 2
+    (short,) = run_trials(CellSource.of("gantry", {}, None), [Trial("short", {"duration_s": 1})], 2)
+    assert short.ending is Ending.OTHER
+    assert "the way takes" in short.reason
+    with pytest.raises(InputError, match="headings"):
+        heading_trials(cell, 1.0, 4, (0.1,))
+
+
+def test_targets_and_motions_are_drawn_by_seed_and_refused_where_they_cannot_be():
+    cell = load_cell("puma560")
+    draws = Draws(("targets", "motions"), 0.1, 0.2)
+    aim = Aim.of(cell)
+    first, second = draws.changes(cell, aim, 2, seed=1)
+    assert draws.changes(cell, aim, 1, seed=1) == [first]
+    assert first["target"]["position_m"] != second["target"]["position_m"]
+    speeds = np.linalg.norm(
+        [d["target"]["motion"]["velocity_m_s"] for d in (first, second)], axis=1
+    )
+    assert (speeds <= 0.2).all()
+    assert "arms" not in first
+    held = load_cell("eye_to_hand_pose")
+    with pytest.raises(InputError, match="in the hand"):
+        draws.changes(held, Aim.of(held), 1, seed=1)
+    with pytest.raises(InputError, match="did you mean targets"):
+        Draws(("target",))
 
 
 def test_an_address_without_a_scheduler_is_refused(source, trials, tmp_path):

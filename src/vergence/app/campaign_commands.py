@@ -46,19 +46,31 @@ def register(app: typer.Typer) -> None:
     def compare(
         cell: Annotated[str, cell_argument],
         laws: Annotated[
-            str,
+            str | None,
             typer.Option(
                 help="Names, with commas between: own (the cell's law), a name in the file's laws, "
                 "image_based, image_based_desired, image_based_mean, optimal_tracking, "
-                "constrained, constrained_tracking.",
+                "constrained, constrained_tracking. If absent, own and the file's laws.",
                 autocompletion=names.laws,
             ),
-        ] = "own,image_based,constrained",
+        ] = None,
         starts: Annotated[int, typer.Option(min=1, help="How many, for each law.")] = 20,
-        seed: Annotated[int, typer.Option(min=0, help="Of the starts.")] = 0,
+        vary: Annotated[
+            str,
+            typer.Option(help="What is drawn, with commas between: starts, targets, motions."),
+        ] = "starts",
+        seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
         spread: Annotated[
-            float, typer.Option(min=0.0, max=1.0, help="Of the starts, share of a joint's range.")
+            float,
+            typer.Option(
+                min=0.0,
+                max=1.0,
+                help="Of starts, share of a joint's range; of targets, of their distance.",
+            ),
         ] = 0.2,
+        speed: Annotated[
+            float, typer.Option(min=0.0, help="Of the fastest motion that is drawn, m/s.")
+        ] = 0.1,
         tolerance_px: _Tolerance = 2.0,
         workers: _Workers = None,
         scheduler: _Scheduler = None,
@@ -67,7 +79,7 @@ def register(app: typer.Typer) -> None:
         settings: _Set = None,
         as_json: _Json = False,
     ) -> None:
-        """Run several laws from the same random starts: one table, and where each fails."""
+        """Run several laws from the same random draws: one table, and where each fails."""
         find_cell(cell)  # a mistake is told before all is loaded
         from vergence.app.campaign import prepare
         from vergence.app.compare import compare as command
@@ -75,7 +87,11 @@ def register(app: typer.Typer) -> None:
         source, how = prepare(
             "compare", cell, settings or (), out, tolerance_px, workers, scheduler, physics
         )
-        raise typer.Exit(command(source, _names(laws), starts, seed, spread, how, as_json))
+        from vergence.runtime.campaign import Draws
+
+        named = () if laws is None else _names("--laws", laws)
+        draws = Draws(_names("--vary", vary), spread, speed)
+        raise typer.Exit(command(source, named, starts, seed, draws, how, as_json))
 
     @app.command(
         name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2"
@@ -120,17 +136,17 @@ def register(app: typer.Typer) -> None:
         from vergence.app.map_region import Region
         from vergence.app.map_region import map_region as command
 
-        region = Region(over, extent, steps, _speeds(speeds), _names(laws))
+        region = Region(over, extent, steps, _speeds(speeds), _names("--laws", laws))
         source, how = prepare(
             "map", cell, settings or (), out, tolerance_px, workers, scheduler, physics
         )
         raise typer.Exit(command(source, region, how, as_json))
 
 
-def _names(text: str) -> tuple[str, ...]:
+def _names(option: str, text: str) -> tuple[str, ...]:
     given = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not given:
-        raise InputError("--laws", "", text, "names with commas between")
+        raise InputError(option, "", text, "names with commas between")
     return given
 
 

@@ -19,11 +19,11 @@ from vergence.app.output import SUCCESS, emit, say
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.runtime.campaign import CellSource, Score, TrialResult
+    from vergence.runtime.campaign import CellSource, Draws, Score, TrialResult
 
 _REMARK = (
-    "Every law sets out from the same random joints, from which it sees the target, for the same "
-    "picture; on exact projections, under the cell's rate and acceleration limits; {motion}."
+    "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
+    "view of it; on exact projections, under the cell's rate and acceleration limits; {motion}."
 )
 
 
@@ -32,7 +32,7 @@ def compare(
     laws: Sequence[str],
     starts: int,
     seed: int,
-    spread: float,
+    draws: "Draws",
     how: Running,
     as_json: bool,
 ) -> int:
@@ -40,20 +40,21 @@ def compare(
 
     Args:
         source: of the cell.
-        laws: their names.
+        laws: their names; those that suit the cell if there are none.
         starts: how many each.
-        seed: of the starts.
-        spread: share of each joint's range over which they are spread.
+        seed: of the draws.
+        draws: what is drawn for each.
         how: to run it.
         as_json: whether to answer with one JSON object.
     """
-    from vergence.runtime.campaign import scores, start_trials
+    from vergence.runtime.campaign import scores, start_trials, usual_laws
 
     cell = source.load()
-    results = run(source, start_trials(cell, laws, starts, seed, spread), how)
+    results = run(source, start_trials(cell, laws or usual_laws(cell), starts, seed, draws), how)
     found = scores(results)
     data = write_table(how.folder / "compare.csv", results)
-    report = _write_page(source, results, found, how)
+    remark = _REMARK.format(drawn=", ".join(draws.vary), motion=how.motion)
+    report = _write_page(source, results, found, how, remark)
     if as_json:
         answer = {"command": "compare", "cell": cell.name, "starts": starts, "seed": seed}
         rows = [_as_json(score) for score in found]
@@ -105,7 +106,11 @@ def _tell(found: "Sequence[Score]") -> None:
 
 
 def _write_page(
-    source: "CellSource", results: "Sequence[TrialResult]", found: "Sequence[Score]", how: Running
+    source: "CellSource",
+    results: "Sequence[TrialResult]",
+    found: "Sequence[Score]",
+    how: Running,
+    remark: str,
 ) -> "Path":
     from vergence.app.figures.endings import scores_figure, starts_figure
     from vergence.runtime.campaign import Aim
@@ -136,6 +141,4 @@ def _write_page(
         markup.section("Why", reasons_table(results, "{law}, start {start}")),
     ]
     title = f"{cell.name}: {len(found)} laws from {found[0].trials} starts"
-    return write_page(
-        how.folder, "vergence compare", title, _REMARK.format(motion=how.motion), parts
-    )
+    return write_page(how.folder, "vergence compare", title, remark, parts)

@@ -3,13 +3,14 @@
 from vergence.runtime.campaign.aim import Aim
 from vergence.runtime.campaign.campaign import run_campaign
 from vergence.runtime.campaign.crew import Crew, WorkersLostError
+from vergence.runtime.campaign.draws import Draws
 from vergence.runtime.campaign.ledger import RESULTS, Ledger
-from vergence.runtime.campaign.presets import OWN, PRESETS, law_table
+from vergence.runtime.campaign.presets import OWN, PRESETS, law_table, usual_laws
 from vergence.runtime.campaign.region import heading_trials, place_trials
 from vergence.runtime.campaign.run_trial import run_trial, run_trials
 from vergence.runtime.campaign.score import Score, scores
 from vergence.runtime.campaign.source import CellSource
-from vergence.runtime.campaign.starts import random_starts, start_trials
+from vergence.runtime.campaign.starts import start_trials
 from vergence.runtime.campaign.trace import TrialTrace
 from vergence.runtime.campaign.trial import Ending, Trial, TrialResult
 
@@ -17,6 +18,7 @@ __all__ = [
     "Aim",
     "CellSource",
     "Crew",
+    "Draws",
     "Ending",
     "Ledger",
     "OWN",
@@ -30,10 +32,10 @@ __all__ = [
     "heading_trials",
     "law_table",
     "place_trials",
-    "random_starts",
     "run_campaign",
     "run_trial",
     "run_trials",
     "scores",
     "start_trials",
+    "usual_laws",
 ]

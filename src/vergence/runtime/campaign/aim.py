@@ -6,8 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from vergence.arrays import FloatArray
 from vergence.cell import Cell, SimulatedDriver
-from vergence.errors import InputError
+from vergence.cell.joint_positions import joint_positions
+from vergence.cell.schema import ReachTable
+from vergence.geometry import matrix_to_rpy, transform_points
 from vergence.outcome import Outcome
 from vergence.runtime.assembly import assemble_parts
 
@@ -16,35 +19,52 @@ _DIGITS = 9  # kept of what goes into a trial, so that its text is the same ever
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """The features of the target, and where the task's camera should see them."""
+    """The features of the target, and how the task's camera should see it."""
 
     features: tuple[tuple[float, ...], ...]  # (M, 3) m, in the target
     desired_px: tuple[tuple[float, ...], ...]  # (M, 2)
+    tables: Mapping[str, Any]  # of a cell, that hold the aim fast
 
     @classmethod
     def of(cls, cell: Cell) -> "Aim":
         """Return what a cell aims at from its own start.
 
         Raises:
-            InputError: if its task is not to track features in the image.
+            InputError: if the cell cannot be run as it is written.
         """
-        if cell.task.kind != "track":
-            raise InputError(str(cell.path), "task.kind", cell.task.kind, "track")
         driver = SimulatedDriver(cell, images=False)
         try:
+            if isinstance(cell.task, ReachTable):
+                return cls._of_picture(cell, cell.task, driver)
             parts = assemble_parts(cell, driver, images=False)
             assert not isinstance(parts, Outcome)
-            points_px = parts.planner.reference(0.0).points_px
-            assert points_px is not None
-            return cls(_rows(driver.features), _rows(points_px))
+            reference = parts.planner.reference(0.0)
+            if reference.T_camera_target is not None:
+                return cls._of_pose(cell, driver, reference.T_camera_target)
+            assert reference.points_px is not None
+            features, desired = _rows(driver.features), _rows(reference.points_px)
+            held = {
+                "target": {"features": [list(row) for row in features]},
+                "task": {"desired": [list(row) for row in desired]},
+            }
+            return cls(features, desired, held)
         finally:
             driver.close()
 
-    def changes(self) -> dict[str, Any]:
-        """Return the values of a cell that hold it fast."""
-        features = [list(row) for row in self.features]
-        desired = [list(row) for row in self.desired_px]
-        return {"target": {"features": features}, "task": {"desired": desired}}
+    @classmethod
+    def _of_pose(cls, cell: Cell, driver: SimulatedDriver, T_camera_target: FloatArray) -> "Aim":
+        points = transform_points(T_camera_target.copy(), driver.features)
+        desired = driver.cameras[cell.task.camera].project(points)
+        held = {"task": {"desired": placed(T_camera_target)}}
+        return cls(_rows(driver.features), _rows(desired), held)
+
+    @classmethod
+    def _of_picture(cls, cell: Cell, task: ReachTable, driver: SimulatedDriver) -> "Aim":
+        arm = driver.arms[task.arm]
+        goal = joint_positions(cell, "task.goal_deg", task.goal_deg, arm)
+        truth = driver.frame_at(task.camera, task.arm, goal).truth
+        assert truth is not None
+        return cls(_rows(driver.features), _rows(truth.points_px), {})
 
 
 def merged(*changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,5 +78,16 @@ def merged(*changes: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
+def placed(T: FloatArray) -> dict[str, list[float]]:
+    """Return the keys of a cell file that say a pose (4, 4)."""
+    yaw, pitch, roll = np.degrees(matrix_to_rpy(T[:3, :3].copy()))
+    return {"position_m": listed(T[:3, 3]), "rotation_rpy_deg": listed([roll, pitch, yaw])}
+
+
+def listed(values: Any) -> list[float]:
+    """Return numbers as a trial has them."""
+    return [round(float(value), _DIGITS) for value in values]
+
+
 def _rows(values: Any) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(round(float(v), _DIGITS) for v in row) for row in np.asarray(values))
+    return tuple(tuple(listed(row)) for row in np.asarray(values))

@@ -21,6 +21,15 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
 _SHARED = ("gain", "axes", "Q", "R", "depth_m", "flow_smoothing_s")
 
 
+def usual_laws(cell: Cell) -> tuple[str, ...]:
+    """Return the laws to hold against each other: those of the file, or some that suit its task."""
+    if cell.laws:
+        return (OWN, *cell.laws)
+    return (
+        (OWN, "image_based", "constrained") if cell.task.kind == "track" else (OWN, "constrained")
+    )
+
+
 def law_table(cell: Cell, name: str) -> dict[str, Any]:
     """Return the table of a law, complete, as JSON values.
 

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from vergence.cell import Cell
-from vergence.runtime.campaign.aim import Aim, merged
+from vergence.errors import InputError
+from vergence.runtime.campaign.aim import Aim, listed, merged
 from vergence.runtime.campaign.presets import OWN, law_table
 from vergence.runtime.campaign.trial import Trial
 
@@ -17,6 +18,8 @@ def place_trials(
 ) -> list[Trial]:
     """Return trials in which the target goes from its place to each point of a level square.
 
+    Where the task is to reach, the target stands at each point instead, from the start on.
+
     Args:
         cell: the cell.
         extent_m: how far the square reaches to each side.
@@ -24,12 +27,12 @@ def place_trials(
         speed_m_s: of the target.
         law: see `law_table`.
     """
-    fixed = _fixed(cell, law)
+    fixed, reaching = _fixed(cell, law), cell.task.kind == "reach"
     marks = np.linspace(-extent_m, extent_m, steps)
     return [
         Trial(
             f"{law}/place/{i}/{j}",
-            merged(fixed, _going(x, y, speed_m_s)),
+            merged(fixed, _standing(cell, x, y) if reaching else _going(x, y, speed_m_s)),
             {
                 "law": law,
                 "x_m": round(float(x), 9),
@@ -53,7 +56,12 @@ def heading_trials(
         headings: how many directions, evenly around.
         speeds_m_s: its speeds.
         law: see `law_table`.
+
+    Raises:
+        InputError: if the task is to reach a target that stands.
     """
+    if cell.task.kind == "reach":
+        raise InputError("over", "", "headings, but the task is to reach", "places")
     fixed = _fixed(cell, law)
     trials = []
     for speed in speeds_m_s:
@@ -72,7 +80,12 @@ def heading_trials(
 
 
 def _fixed(cell: Cell, law: str) -> dict[str, Any]:
-    return merged(Aim.of(cell).changes(), {"law": law_table(cell, law)})
+    return merged(dict(Aim.of(cell).tables), {"law": law_table(cell, law)})
+
+
+def _standing(cell: Cell, x: float, y: float) -> dict[str, Any]:
+    place = listed(np.add(cell.target.position_m, (x, y, 0.0)))
+    return {"target": {"position_m": place}}
 
 
 def _going(x: float, y: float, speed: float) -> dict[str, Any]:

@@ -26,9 +26,12 @@ class Sight(NamedTuple):
     target_m: FloatArray  # (F, 3) and of the target
 
     def errors(self) -> FloatArray:
-        """Return how far the farthest feature is from its goal, (F,), px; NaN if unknown."""
+        """Return how far the farthest feature is from its goal, (F,), px; NaN if none is seen.
+
+        A corner on the far side of what is seen has its place in the picture too.
+        """
         far = np.linalg.norm(self.points_px - self.wanted_px, axis=2).max(axis=1, initial=0.0)
-        known = self.visible.all(axis=1)
+        known = self.visible.any(axis=1)
         return np.where(known, far, np.nan)
 
     def middles(self) -> FloatArray:
