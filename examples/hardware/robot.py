@@ -90,7 +90,8 @@ def listen(
 
 if __name__ == "__main__":
     cell, port = sys.argv[1], int(sys.argv[2])
-    robot = SimulatedDriver(load_cell(cell))
+    settings = dict(setting.split("=", 1) for setting in sys.argv[3:])
+    robot = SimulatedDriver(load_cell(cell, settings))
     with Listener(("localhost", port)) as door:
         print("ready", flush=True)
         print(serve(robot, door))
