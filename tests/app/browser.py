@@ -43,19 +43,20 @@ class Browser:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        self._held = ExitStack()
-        self._held.callback(self._quit)
-        port = _port_in(folder / "DevToolsActivePort")
-        with urlopen(f"http://127.0.0.1:{port}/json") as answer:
-            pages = [target for target in json.load(answer) if target["type"] == "page"]
-        address = pages[0]["webSocketDebuggerUrl"]
-        self._line = self._held.enter_context(connect(address, max_size=None, close_timeout=1))
         self._numbers = itertools.count(1)
         self.told: list[dict[str, Any]] = []  # what the browser said unasked
-        for domain in ("Page", "Runtime", "Network"):
-            self.call(f"{domain}.enable")
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-        self.call("Emulation.setDeviceMetricsOverride", **size)
+        with ExitStack() as undo:
+            undo.callback(self._quit)
+            port = _port_in(folder / "DevToolsActivePort")
+            with urlopen(f"http://127.0.0.1:{port}/json") as answer:
+                pages = [target for target in json.load(answer) if target["type"] == "page"]
+            address = pages[0]["webSocketDebuggerUrl"]
+            self._line = undo.enter_context(connect(address, max_size=None, close_timeout=1))
+            for domain in ("Page", "Runtime", "Network"):
+                self.call(f"{domain}.enable")
+            size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+            self.call("Emulation.setDeviceMetricsOverride", **size)
+            self._held = undo.pop_all()
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Call a method of the DevTools protocol."""

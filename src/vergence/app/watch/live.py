@@ -12,7 +12,7 @@ from vergence.app.watch.law_desk import LawDesk
 from vergence.app.watch.outline import outline_from, target_corners
 from vergence.app.watch.pace import Pace
 from vergence.app.watch.publisher import Publisher
-from vergence.app.watch.scene import Scene, in_view, world_state
+from vergence.app.watch.scene import Scene, world_state
 from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
@@ -52,7 +52,7 @@ class Live:
         self._runs, self._again = 0, True
         self.board = Board()
         self._hand = Hand(self._driver, self.board)
-        self.scene = Scene(self._driver.world.model, self.board, in_view(self._driver.world))
+        self.scene = Scene(self._driver.world, self.board)
 
     @property
     def folder(self) -> Path:

@@ -1,5 +1,6 @@
 """A recording that somebody watches: it plays, pauses and goes where the slider is."""
 
+import contextlib
 import queue
 from collections.abc import Mapping
 from time import perf_counter
@@ -10,7 +11,7 @@ import numpy as np
 from vergence.app.watch.board import Board
 from vergence.app.watch.playback import Playback
 from vergence.app.watch.recorded_world import RecordedWorld
-from vergence.app.watch.scene import Scene, in_view
+from vergence.app.watch.scene import Scene
 from vergence.runtime.recording import Recording
 
 _PERIOD_S = 1 / 30
@@ -37,7 +38,7 @@ class Replay:
         self.board = Board()
         self.scene: Scene | None = None
         if known is not None:
-            self.scene = Scene(known.world.model, self.board, in_view(known.world))
+            self.scene = Scene(known.world, self.board)
         self._begin("" if known is not None else str(world))
 
     def ask(self, command: Mapping[str, Any]) -> None:
@@ -46,24 +47,24 @@ class Replay:
 
     def run(self) -> None:
         """Play until Ctrl-C."""
-        before = perf_counter()
-        while True:
-            try:
-                self._obey(self._inbox.get(timeout=_PERIOD_S))
-            except queue.Empty:
-                pass
-            except KeyboardInterrupt:
-                return
-            now = perf_counter()
-            if not self._paused:
-                self._go_to(self._time + self._speed * (now - before))
-            before = now
-            self._show()
+        with contextlib.suppress(KeyboardInterrupt):
+            self._play()
 
     def close(self) -> None:
         """Let go of everything."""
         if self.scene is not None:
             self.scene.close()
+
+    def _play(self) -> None:
+        before = perf_counter()
+        while True:
+            with contextlib.suppress(queue.Empty):
+                self._obey(self._inbox.get(timeout=_PERIOD_S))
+            now = perf_counter()
+            if not self._paused:
+                self._go_to(self._time + self._speed * (now - before))
+            before = now
+            self._show()
 
     def _begin(self, why_no_scene: str) -> None:
         info, outcome = self._recording.info, self._recording.outcome

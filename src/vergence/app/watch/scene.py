@@ -25,21 +25,21 @@ class Scene:
     """Serves the view on a loopback port, in threads of its own, until it is closed.
 
     Args:
-        model: MuJoCo's.
-        board: has the state to show.
-        looks_at: what to have in view, (K, 3), m, in the world.
+        world: of the cell, as it stands at first.
+        board: has the state to show from then on.
 
     Attributes:
         port: where it listens, on 127.0.0.1.
     """
 
-    def __init__(self, model: Any, board: Board, looks_at: FloatArray) -> None:
+    def __init__(self, world: World, board: Board) -> None:
         import mujoco
         from mujoco.studio import ux
         from mujoco.studio.web import client_camera, headless_ui, state_payload, web_server
 
         logging.getLogger("WebServer").setLevel(logging.WARNING)  # it writes to stdout
         logging.getLogger("asyncio").addFilter(_is_no_hang_up)
+        model = world.model
         self._model, self._board = model, board
         self._payload, self._mode = state_payload, ux.TUMBLE_CAMERA_IDX
         bundle = state_payload.serialize_model_bundle(model)
@@ -51,10 +51,12 @@ class Scene:
         self._interface = headless_ui.HeadlessUi("vergence", behind.getsockname()[1], "")
         self._camera = mujoco.MjvCamera()
         self._sync = client_camera.ClientCameraSync()
-        self._look_at(looks_at)
+        self._look_at(_in_view(world))
         self._rest: tuple[Any, ...] = (mujoco.MjvPerturb(), mujoco.MjvOption(), model, _FLAGS, [])
         self._signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         self._ending = threading.Event()
+        # A browser that is shown nothing looks from where it likes, and soon gives the viewer up.
+        board.state = world_state(model, world.data)
         self._thread = threading.Thread(target=self._show, name="scene", daemon=True)
         self._server.start()
         self._thread.start()
@@ -131,7 +133,7 @@ def world_state(model: Any, data: Any) -> FloatArray:
     return state
 
 
-def in_view(world: World) -> FloatArray:
+def _in_view(world: World) -> FloatArray:
     """Return what the first view should show, (K, 3): from the foot of the arm to the target."""
     model, data, cell = world.model, world.data, world.cell
     foot = np.array(cell.arms[cell.task.arm].position_m)
