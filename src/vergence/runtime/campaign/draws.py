@@ -9,6 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera, FrameTruth
 from vergence.cell import Cell, SimulatedDriver, placement_pose
+from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError, nearest
 from vergence.geometry import so3_exp
@@ -43,7 +44,8 @@ class Draws:
         turn for those without limits or with a range beyond it; places of the target within a share
         of its distance from the camera, turned by up to that share of a right angle; motions in any
         level direction, at up to the fastest speed. Each draw is made until every feature is in the
-        picture at the start. A trial depends on the seed and its number only.
+        picture at the start, and from where a goal's picture was taken. A trial depends on the seed
+        and its number only.
 
         Args:
             cell: the cell.
@@ -80,8 +82,11 @@ class Draws:
                 T = _moved(T_target, self.spread, float(away), rng)
                 driver.world.move_target(T)
                 driver.world.update()
-            truth = driver.frame_at(camera, name, q).truth
-            if truth is not None and _in_picture(truth, driver.cameras[camera], cell):
+            seen_from = [q]
+            if isinstance(cell.task, ReachTable):
+                seen_from.append(joint_positions(cell, "task.goal_deg", cell.task.goal_deg, arm))
+            truths = [driver.frame_at(camera, name, place).truth for place in seen_from]
+            if all(t is not None and _in_picture(t, driver.cameras[camera], cell) for t in truths):
                 break
         else:
             given = f"{self.spread:g}: {_MOST_TRIES} draws, and none of them sees the target"
