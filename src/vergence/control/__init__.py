@@ -14,6 +14,7 @@ from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.guard import Guard, guarded_step, guarded_steps, stoppable_speed
+from vergence.control.held_target_keeper import HeldTargetKeeper
 from vergence.control.image_based import ImageBased
 from vergence.control.image_motion import FeatureState, ImageMotion
 from vergence.control.inner import InnerLaw
@@ -21,13 +22,14 @@ from vergence.control.interpolator import MovingPose, interpolate, moved, pose_d
 from vergence.control.law import Law
 from vergence.control.objective import Objective, TwistObjective
 from vergence.control.optimal_objective import OptimalTracking
-from vergence.control.optimal_tracking import OptimalTrackingLaw
+from vergence.control.optimal_tracking import AXES, OptimalTrackingLaw, axis_mask
 from vergence.control.path_tracking import PathTrackingLaw
 from vergence.control.plain import PlainLaw
 from vergence.control.position_based import PositionBasedLaw, hand_rates
 from vergence.control.redundancy import resolve_redundant
 from vergence.control.resolve import resolve_twist
 from vergence.control.several_cameras import SeveralCamerasLaw
+from vergence.control.target_keeper import TargetKeeper
 from vergence.control.tracking_kernels import (
     PackedSetup,
     TrackingGains,
@@ -43,6 +45,10 @@ from vergence.control.tracking_kernels import (
 )
 
 __all__ = [
+    "AXES",
+    "HeldTargetKeeper",
+    "TargetKeeper",
+    "axis_mask",
     "CameraShare",
     "ConstrainedLaw",
     "ConstrainedSolver",

@@ -6,7 +6,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.errors import InputError
 from vergence.robot import Arm
 
-_NEEDED = 5  # of six axes: an arm of five joints comes near any pose; fewer must name their axes
+_LEAST = 2  # of six axes: laws do what an arm of few joints can, unless they name axes
 _TURN = 0.05  # rad or m: near a singular start there are postures that are not
 _RANK = 1e-6  # singular values below this share of the largest are none
 
@@ -30,7 +30,7 @@ def require_motion(
     rng = np.random.default_rng(0)
     nearby = [q, *(q + _TURN * rng.uniform(-1, 1, (4, len(q))))]
     most = max(_rank(L[:, axes] @ arm.jacobian(posture)[axes]) for posture in nearby)
-    asked = min(int(axes.sum()), len(L), _NEEDED)
+    asked = min(_LEAST if axes.all() else int(axes.sum()), len(L))
     if most >= asked:
         return
     ways = f"{len(arm.names)} joint{'s' if len(arm.names) > 1 else ''}"
