@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from vergence.app import names
+from vergence.app.options import Json, Out
 
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-_Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of runs/NAME-TIME.")]
 _EXAMPLE = "vergence calibrate photos/ --board 11x8 --square-mm 20 --marker-mm 15"
 
 
@@ -67,9 +66,9 @@ def calibrate(
         bool, typer.Option("--projected", help="Project corners instead of rendering pictures.")
     ] = False,
     noise_px: Annotated[float, typer.Option(min=0, help="Of projected corners.")] = 0.1,
-    out: _Out = None,
+    out: Out = None,
     seed: Annotated[int, typer.Option(help="Of all chance.")] = 0,
-    as_json: _Json = False,
+    as_json: Json = False,
 ) -> None:
     """Find a camera's lens, and where it is mounted, from pictures of a board.
 

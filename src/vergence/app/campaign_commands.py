@@ -6,17 +6,13 @@ from typing import Annotated
 import typer
 
 from vergence.app import names
+from vergence.app.options import CellName, Json, Settings
 from vergence.errors import InputError, nearest
 from vergence.places import find_cell
 
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 _Out = Annotated[
     Path | None,
     typer.Option(help="Folder to write to, instead of runs/NAME-TIME; goes on with what is there."),
-]
-_Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
 ]
 _Tolerance = Annotated[
     float, typer.Option(min=0.0, help="Converged: every feature this near at the end, px.")
@@ -36,15 +32,12 @@ _Physics = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the two commands to the command line."""
-    cell_argument = typer.Argument(
-        help="Name of a built-in cell, a cell file or folder.", autocompletion=names.cells
-    )
 
     @app.command(
         epilog="Example: vergence compare panda --laws image_based,constrained --starts 40"
     )
     def compare(
-        cell: Annotated[str, cell_argument],
+        cell: CellName,
         laws: Annotated[
             str | None,
             typer.Option(
@@ -76,8 +69,8 @@ def register(app: typer.Typer) -> None:
         scheduler: _Scheduler = None,
         physics: _Physics = False,
         out: _Out = None,
-        settings: _Set = None,
-        as_json: _Json = False,
+        settings: Settings = None,
+        as_json: Json = False,
     ) -> None:
         """Run several laws from the same random draws: one table, and where each fails."""
         find_cell(cell)  # a mistake is told before all is loaded
@@ -97,7 +90,7 @@ def register(app: typer.Typer) -> None:
         name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2"
     )
     def map_region(
-        cell: Annotated[str, cell_argument],
+        cell: CellName,
         over: Annotated[
             str,
             typer.Option(
@@ -125,8 +118,8 @@ def register(app: typer.Typer) -> None:
         scheduler: _Scheduler = None,
         physics: _Physics = False,
         out: _Out = None,
-        settings: _Set = None,
-        as_json: _Json = False,
+        settings: Settings = None,
+        as_json: Json = False,
     ) -> None:
         """Map where a cell's law works: how far it follows the target, and what ends it."""
         if over not in names.OVER:

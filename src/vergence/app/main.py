@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from vergence.app import calibrate_command, campaign_commands, names
+from vergence.app.options import CellName, ImageEvery, Images, Json, Out, Seed, Settings
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
@@ -23,16 +24,13 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of runs/NAME-TIME.")]
-
 _NEXT = """vergence servoes robot arms by what their cameras see.
 
   vergence run puma560                    an arm follows a moving board; ends with a report to open
   vergence watch puma560                  the same in your browser, as it happens
-  vergence run puma560 --no-images --set duration_s=5     in a blink, without pictures
+  vergence run puma560 --no-images        without pictures, much faster
   vergence cells                          the cells that come with vergence
-  vergence new my_robot.urdf --body tool0     a first cell for an arm of yours
+  vergence new ARM.urdf --body LAST_LINK  a first cell for an arm of yours
   vergence compare panda                  several laws from the same random starts
   vergence reproduce nelson1995 --quick   a paper's experiments, checked
 
@@ -67,24 +65,12 @@ def start(
 
 @app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
 def run(
-    cell: Annotated[
-        str,
-        typer.Argument(
-            help="Name of a built-in cell, a cell file or folder.", autocompletion=names.cells
-        ),
-    ],
+    cell: CellName,
     out: Out = None,
-    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
-    images: Annotated[
-        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
-    ] = True,
-    image_every: Annotated[
-        int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
-    ] = 2,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
-    ] = None,
+    seed: Seed = None,
+    images: Images = True,
+    image_every: ImageEvery = 2,
+    settings: Settings = None,
     as_json: Json = False,
 ) -> None:
     """Run a work cell: progress, a summary, and a folder with recording and report."""
@@ -132,14 +118,9 @@ def plan(
         ),
     ] = None,
     out: Out = None,
-    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
-    images: Annotated[
-        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
-    ] = True,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
-    ] = None,
+    seed: Seed = None,
+    images: Images = True,
+    settings: Settings = None,
     as_json: Json = False,
 ) -> None:
     """Plan the way between two pictures and draw it; nothing moves."""
@@ -250,17 +231,10 @@ def watch(
         ),
     ],
     out: Out = None,
-    seed: Annotated[int | None, typer.Option(help="Replaces the cell's seed.")] = None,
-    images: Annotated[
-        bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
-    ] = True,
-    image_every: Annotated[
-        int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
-    ] = 5,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
-    ] = None,
+    seed: Seed = None,
+    images: Images = True,
+    image_every: ImageEvery = 5,
+    settings: Settings = None,
     host: Annotated[
         str, typer.Option(help="Where to listen; only this machine can reach the default.")
     ] = "127.0.0.1",

@@ -1,0 +1,28 @@
+"""Arguments and options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app import names
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Out = Annotated[Path | None, typer.Option(help="Folder to write to, instead of runs/NAME-TIME.")]
+CellName = Annotated[
+    str,
+    typer.Argument(
+        help="Name of a built-in cell, a cell file or folder.", autocompletion=names.cells
+    ),
+]
+Seed = Annotated[int | None, typer.Option(help="Replaces the cell's seed.")]
+Images = Annotated[
+    bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
+]
+ImageEvery = Annotated[
+    int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
+]
