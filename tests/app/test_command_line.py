@@ -113,6 +113,10 @@ def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> N
         (["bench", "contrl"], "did you mean control?"),
         (["plan", "gantry", "--planner", "potential"], "did you mean potential_field?"),
         (["map", "puma560", "--over", "heading"], "did you mean headings?"),
+        (["map", "puma560", "--extent", "0"], "above zero"),
+        (["map", "puma560", "--speeds", "nan"], "above zero"),
+        (["calibrate", "--synthetic", "puma560", "--lens", "k1k3"], "did you mean k1k2?"),
+        (["run", "puma560", "--out", sys.executable], f"{sys.executable}: File exists"),
     ],
 )
 def test_a_mistake_is_one_message_and_exit_code_two(

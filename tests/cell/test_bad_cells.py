@@ -183,6 +183,44 @@ def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:
     assert (error.given, error.allowed) == ("2 points", "1 points")
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "place", "allowed"),
+    [
+        ("duration_s", "inf", "duration_s", "a finite number"),
+        ("target.position_m", "[nan, 0, 0]", "target.position_m.0", "a finite number"),
+        ("task", "[]", "task", "a table"),
+        ("law", "3", "law", "a table"),
+        ("laws.other", "{}", "laws.other.kind", "this key is required"),
+        ("name", '"../elsewhere"', "name", "letters, digits"),
+        ("law.axes", "[]", "law.axes", "at least 1 value"),
+        ("law.R", "[1, -1]", "law.R.1", "greater than 0"),
+        ("task.desired", "3", "task.desired", "centred, initial"),
+        ("cameras.wrist.position_m", "3", "cameras.wrist.position_m", "a list"),
+        ("cameras.wrist.distortion", "[1, 2, 3, 4, 5, 6]", "cameras.wrist.distortion", "at most 5"),
+        ("cameras.wrist.blind_s", "[[2, 1]]", "cameras.wrist.blind_s", "from before to"),
+        ("cameras.wrist.rate_hz", "501", "cameras.wrist.rate_hz", "up to inner_rate_hz, 500"),
+        ("law.kind", "path_tracking", "law.kind", "constrained, optimal_tracking, plain"),
+    ],
+)
+def test_a_value_that_cannot_be_used(
+    folder: Path, key: str, value: str, place: str, allowed: str
+) -> None:
+    error = complaint(folder, **{key.replace(".", "__"): value})
+    assert error.key == place
+    assert allowed in error.allowed
+
+
+def test_where_two_things_may_stand_the_nearer_mistake_is_told() -> None:
+    with pytest.raises(InputError, match="position_m, rotation_rpy_deg") as caught:
+        load_cell("four_cameras", {"task.desired": "{position = [1, 2, 3]}"})
+    assert caught.value.key == "task.desired.position"
+
+
+def test_a_camera_that_is_blind_at_the_start(folder: Path) -> None:
+    error = complaint(folder, cameras__wrist__blind_s="[[0, 1]]")
+    assert "cameras.wrist.blind_s" in str(error.given)
+
+
 def test_avoidance_along_an_axis_that_is_not_controlled(folder: Path) -> None:
     error = complaint(folder, law__avoidance_axes='["z"]')
     assert (error.key, error.given) == ("law.avoidance_axes", "z")

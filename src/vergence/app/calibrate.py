@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
-from vergence.errors import InputError
+from vergence.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from vergence.app.calibration.dataset import Dataset
@@ -95,6 +95,7 @@ def calibrate(request: Request, out: Path | None, seed: int, as_json: bool) -> i
     from vergence.app.progress import working
 
     _require_one_source(request)
+    _require_lens(request.lens)
     T_world_base = _base(request)
     name = request.synthetic or str(request.images)
     folder = out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
@@ -124,6 +125,13 @@ def _require_one_source(request: Request) -> None:
         for key, value in (("--watch", request.watch), ("--projected", request.projected)):
             if value:
                 raise InputError("vergence calibrate", key, value, "with --synthetic CELL")
+
+
+def _require_lens(lens: str) -> None:
+    from vergence.camera.calibration import MODELS
+
+    if lens not in MODELS:
+        raise InputError("vergence calibrate", "--lens", lens, nearest(lens, MODELS))
 
 
 def _base(request: Request) -> "FloatArray":

@@ -1,5 +1,6 @@
 """The options of `vergence compare` and `vergence map`."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -124,6 +125,8 @@ def register(app: typer.Typer) -> None:
         """Map where a cell's law works: how far it follows the target, and what ends it."""
         if over not in names.OVER:
             raise InputError("--over", "", over, nearest(over, names.OVER))
+        if not 0 < extent < math.inf:
+            raise InputError("--extent", "", extent, "above zero, in m")
         find_cell(cell)  # a mistake is told before all is loaded
         from vergence.app.campaign import prepare
         from vergence.app.map_region import Region
@@ -148,6 +151,6 @@ def _speeds(text: str) -> tuple[float, ...]:
         speeds = tuple(float(word) for word in text.split(","))
     except ValueError:
         speeds = ()
-    if not speeds or min(speeds) <= 0:
+    if not speeds or not all(0 < speed < math.inf for speed in speeds):
         raise InputError("--speeds", "", text, "numbers above zero with commas between, in m/s")
     return speeds

@@ -43,8 +43,12 @@ def main() -> None:
     """Run the command line; a mistake of the user is one message and exit code 2."""
     try:
         app()
-    except (VergenceError, OSError) as error:  # such as a folder that cannot be written
+    except VergenceError as error:
         warn(f"vergence: {error}")
+        sys.exit(BAD_INPUT)
+    except OSError as error:  # such as a folder that cannot be written
+        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        warn(f"vergence: {told}")
         sys.exit(BAD_INPUT)
 
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError, field_validator
+from pydantic_core import ErrorDetails
 
 from vergence.cell.schema import (
     TABLES,
@@ -43,6 +44,13 @@ class Cell(Table):
     laws: dict[str, Law] = Field(default_factory=dict)  # others, by name, to compare it with
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        if not re.fullmatch(r"\w[\w .-]*", name):
+            raise ValueError("letters, digits, spaces, and . _ - after the first")
+        return name
 
     @property
     def path(self) -> Path:
@@ -173,14 +181,16 @@ def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, A
 
 def _explain(error: ValidationError, source: str, values: Any) -> InputError:
     """Turn pydantic's first complaint into ours: file, key, given, allowed."""
-    first = error.errors()[0]
-    parts = [str(part) for part in first["loc"]]
-    key = ".".join(_in_file(parts, values))
+    first = _deepest(error.errors(), values)
+    key = ".".join(_in_file(first, values))
     if first["type"] == "extra_forbidden":
+        parts = [str(part) for part in first["loc"]]
         return InputError(
             source, key, "a key that is not known", nearest(parts[-1], _known_keys(parts[:-1]))
         )
-    if first["type"] == "missing":
+    without_kind = first["type"] == "union_tag_not_found" and isinstance(first["input"], Mapping)
+    if first["type"] == "missing" or without_kind:
+        key += ".kind" if without_kind else ""
         return InputError(source, key, "nothing", "a value; this key is required")
     if first["type"] == "union_tag_invalid":
         given, tags = first["ctx"]["tag"], first["ctx"]["expected_tags"].replace("'", "")
@@ -188,19 +198,50 @@ def _explain(error: ValidationError, source: str, values: Any) -> InputError:
     if first["type"] == "literal_error":
         choices = re.findall(r"'([^']*)'", first["ctx"]["expected"])
         return InputError(source, key, first["input"], nearest(str(first["input"]), choices))
-    message = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    return InputError(source, key, first["input"], message)
+    return InputError(source, key, first["input"], _allowed(first))
 
 
-def _in_file(parts: list[str], values: Any) -> list[str]:
+def _allowed(complaint: ErrorDetails) -> str:
+    """Say what may stand there in the words of the file's format, not of pydantic's types."""
+    match complaint["type"]:
+        case "dict_type" | "model_type" | "model_attributes_type" | "union_tag_not_found":
+            return "a table"
+        case "tuple_type":
+            return "a list"
+        case "path_type":
+            return "a file's path"
+        case "too_long":
+            return f"at most {complaint['ctx']['max_length']} values"
+        case "too_short":
+            fewest = complaint["ctx"]["min_length"]
+            return f"at least {fewest} value{'s' if fewest > 1 else ''}"
+    message = complaint["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return message.partition(", unable to parse")[0]
+
+
+def _deepest(complaints: list[ErrorDetails], values: Any) -> ErrorDetails:
+    """Return the complaint about the first bad key that says most exactly where in it.
+
+    Where a key may hold one thing or another, pydantic complains once for each.
+    """
+    places = [_in_file(complaint, values) for complaint in complaints]
+    rivals = [i for i, place in enumerate(places) if place[: len(places[0])] == places[0]]
+    return complaints[max(rivals, key=lambda i: len(places[i]))]
+
+
+def _in_file(complaint: ErrorDetails, values: Any) -> list[str]:
     """Leave out of a place what is no key of the file: the names pydantic has for its kinds."""
     kept = []
+    about_keys = complaint["type"] in ("missing", "extra_forbidden")
+    parts = [str(part) for part in complaint["loc"]]
     for i, part in enumerate(parts):
-        known = isinstance(values, Mapping) and part in values
-        if known or i == len(parts) - 1 or not isinstance(values, Mapping):
+        absent = about_keys and i == len(parts) - 1
+        if isinstance(values, Mapping) and (part in values or absent):
             kept.append(part)
-        if known:
-            values = values[part]
+            values = values.get(part)
+        elif isinstance(values, list | tuple) and part.isdigit():
+            kept.append(part)
+            values = dict(enumerate(values)).get(int(part))
     return kept
 
 
@@ -220,6 +261,9 @@ def _check_names(cell: Cell) -> None:
     for name, camera in cell.cameras.items():
         if camera.arm is not None:
             check(f"cameras.{name}.arm", camera.arm, cell.arms)
+        if camera.rate_hz > cell.inner_rate_hz:  # a picture a tick at most
+            allowed = f"up to inner_rate_hz, {cell.inner_rate_hz:g}"
+            raise InputError(str(cell.path), f"cameras.{name}.rate_hz", camera.rate_hz, allowed)
     for name in cell.perception.cameras or ():
         check("perception.cameras", name, cell.cameras)
     if cell.target.carried_by is not None:

@@ -71,8 +71,10 @@ class OptimalTrackingLaw:
         self.depth_m = frozen(depth_m, (None,), "depth_m")
         controlled = axis_mask(axes, "axes")
         avoiding = axis_mask(avoidance_axes, "avoidance_axes")
-        if (avoiding & ~controlled).any():
-            raise InputError("law", "avoidance_axes", list(avoidance_axes), "a subset of axes")
+        if stray := [axis for axis in avoidance_axes if axis not in axes]:
+            raise InputError(
+                "law", "avoidance_axes", ", ".join(stray), f"of axes: {', '.join(axes)}"
+            )
         if not (self.depth_m > 0).all():
             raise InputError("law", "depth_m", depth_m, "depths above zero")
         R_axes = np.broadcast_to(weights_of(Q, R, axes), (len(axes),))

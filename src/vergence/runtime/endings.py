@@ -1,5 +1,6 @@
 """How a run ends, in words: for the loop and for the batch that stands for it."""
 
+import re
 from collections.abc import Iterable
 
 from vergence.outcome import Outcome, OutcomeKind
@@ -22,8 +23,9 @@ def target_lost(reasons: Iterable[str], time: float) -> Outcome:
 
 
 def why_lost(reasons: Iterable[str]) -> str:
-    """Say why there is no feature, each reason once."""
-    return "no feature found: " + "; ".join(sorted({reason for reason in reasons if reason}))
+    """Say why there is no feature, each reason once: of those that differ in numbers, one."""
+    kinds = {re.sub(r"-?\d[\d.]*", "", reason): reason for reason in reasons if reason}
+    return "no feature found: " + "; ".join(sorted(kinds.values()))
 
 
 def joint_limit(joints: Iterable[str], time: float) -> Outcome:

@@ -77,6 +77,7 @@ __all__ = [
 
 # What stands at a place in the file, or is the kind of what stands there.
 TABLES: dict[str, type[Table]] = {
+    "Placement": Placement,  # by pydantic's name: it has no kind
     "scene": SceneTable,
     "arms": ArmTable,
     "joints": JointMotion,

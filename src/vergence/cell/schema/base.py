@@ -10,9 +10,9 @@ Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 
 class Table(BaseModel):
-    """A table of the file: unknown keys are mistakes, values do not change."""
+    """A table of the file: unknown keys are mistakes, numbers finite, values do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Placement(Table):

@@ -6,12 +6,14 @@ from pydantic import Field
 
 from vergence.cell.schema.base import Axis, Positive, Table
 
+Axes = Annotated[tuple[Axis, ...], Field(min_length=1)]
+
 
 class OptimalTrackingTable(Table):
     """The law of [Nelson1995] eq. (29), its gains in the paper's units (pixels, metres a frame)."""
 
     kind: Literal["optimal_tracking"]
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of the camera, that track
+    axes: Axes = ("x", "y", "z", "rx", "ry", "rz")  # of the camera, that track
     avoidance_axes: tuple[Axis, ...] = ()  # of the camera, that avoid limits
     Q: Positive = 2e-6  # 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 10.0  # one for all controlled axes, or one each
@@ -50,7 +52,7 @@ class ImageObjectiveTable(Table):
 
     gain: Positive = 1.0  # λ of image_based, 1/s
     interaction: Literal["current", "desired", "mean"] = "current"  # where image_based takes L
-    axes: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
+    axes: Axes = ("x", "y", "z", "rx", "ry", "rz")  # of optimal_tracking
     Q: Positive = 2e-6  # of optimal_tracking, 1/px², shared by the features
     R: Positive | tuple[Positive, ...] = 1.0  # of optimal_tracking, one for all axes, or one each
     depth_m: Positive | Literal["initial"] = "initial"  # believed of the features at the start

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from vergence.cell.schema.base import Placement, Positive, Table, Vector3
 
@@ -93,6 +93,15 @@ class CameraTable(Placement):
         if by_lens == (self.focal_px is not None):
             raise ValueError("either focal_mm and pixel_um, or focal_px, or calibration")
         return self
+
+    @field_validator("blind_s")
+    @classmethod
+    def _forwards(
+        cls, intervals: tuple[tuple[float, float], ...]
+    ) -> tuple[tuple[float, float], ...]:
+        if any(end <= begin for begin, end in intervals):
+            raise ValueError("[from, to] of each, from before to")
+        return intervals
 
 
 class StillMotion(Table):
@@ -211,9 +220,10 @@ class ReachTable(Table):
     target_timeout_s: Positive = 0.5  # with pictures, but the target lost
 
 
-def _task_kind(value: Any) -> str:
-    kind = value.get("kind", "track") if isinstance(value, dict) else value.kind
-    return str(kind)
+def _task_kind(value: Any) -> str | None:
+    if isinstance(value, Table):
+        return str(getattr(value, "kind", None))
+    return str(value.get("kind", "track")) if isinstance(value, dict) else None
 
 
 Task = Annotated[

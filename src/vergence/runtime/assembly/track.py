@@ -70,6 +70,8 @@ def _unseen(driver: SimulatedDriver, camera: str, truth: FrameTruth) -> str:
     """Say which features a camera does not see, and why."""
     missing = np.flatnonzero(~truth.visible)
     which = "feature " + ", ".join(str(j) for j in missing)
+    if any(begin <= 0 < end for begin, end in driver.cell.cameras[camera].blind_s):
+        return f"{which}; it is blind then, by cameras.{camera}.blind_s"
     lens, points_px = driver.cameras[camera], truth.points_px[missing]
     inside = (truth.depth_m[missing] > 0) & lens.contains(np.nan_to_num(points_px, nan=-1.0))
     if not inside.any():

@@ -41,7 +41,10 @@ def build_law(cell: Cell, driver: SimulatedDriver) -> Law:
     """
     kind = cell.law.kind
     if _TASK.get(kind, cell.task.kind) != cell.task.kind:
-        allowed = "a law for the task " + cell.task.kind
+        serving = sorted(
+            {"constrained", *(law for law, task in _TASK.items() if task == cell.task.kind)}
+        )
+        allowed = f"for the task {cell.task.kind}: {', '.join(serving)}"
         raise InputError(str(cell.path), "law.kind", kind, allowed)
     site = Site(cell, driver)
     try:
