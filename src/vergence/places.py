@@ -27,7 +27,10 @@ def find_cell(name_or_path: str | Path) -> Path:
         for file in (candidate, candidate / CELL):
             if file.is_file():
                 return file.resolve()
-    allowed = "a cell file, or a built-in cell: " + nearest(str(name_or_path), built_in_cells())
+    here = sorted(file.parent.name for file in Path().glob(f"*/{CELL}"))
+    yours = f"one in this folder ({', '.join(here)}), " if here else ""
+    built_in = nearest(str(name_or_path), built_in_cells())
+    allowed = f"a cell file, {yours}or a built-in cell: {built_in}"
     raise InputError("cell", "", name_or_path, allowed)
 
 

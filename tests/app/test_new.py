@@ -80,6 +80,9 @@ def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsy
 def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         draft_cell(tmp_path / "no.urdf", "tool")
+    (tmp_path / "no.urdf.xacro").write_text("<robot/>")
+    with pytest.raises(InputError, match=r"xacro no.urdf.xacro > no.urdf"):
+        draft_cell(tmp_path / "no.urdf.xacro", "tool")
     (tmp_path / "no.xml").write_text("<mujoco>")
     with pytest.raises(InputError, match=r"no\.xml"):
         draft_cell(tmp_path / "no.xml", "tool")

@@ -1,6 +1,7 @@
 """`vergence new`: a first cell for an arm of somebody's own."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,7 +94,8 @@ def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
         emit({"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()})
     else:
         say(f"wrote {folder / CELL} and board.xml: {len(draft.arm.names)} joints up to {body}")
-        say(f"next:  vergence watch {folder}      or  vergence run {folder}")
+        typed = shlex.quote(str(folder))
+        say(f"next:  vergence watch {typed}      or  vergence run {typed}")
     return SUCCESS
 
 

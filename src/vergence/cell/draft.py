@@ -71,12 +71,17 @@ def draft_cell(model_path: Path, body: str) -> Draft:
 def _compile(path: Path, body: str) -> Any:
     if not path.is_file():
         raise InputError(str(path), "", "no such file", "an MJCF or URDF file")
+    if path.suffix.lower() == ".xacro":
+        first = (
+            f"a URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf"
+        )
+        raise InputError(str(path), "", "an xacro", first)
     try:
         is_urdf = path.suffix.lower() == ".urdf"
         spec = read_urdf(path, body) if is_urdf else mujoco.MjSpec.from_file(str(path))
         bodies = {one.name: one for one in spec.bodies if one.name and one.name != "world"}
         if body not in bodies:
-            raise InputError(str(path), "body", body or "none", nearest(body, bodies))
+            raise InputError(str(path), "--body", body or "none", nearest(body, bodies))
         named_joints(bodies[body])
         return spec.compile()
     except InputError:
