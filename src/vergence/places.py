@@ -27,7 +27,8 @@ def find_cell(name_or_path: str | Path) -> Path:
         for file in (candidate, candidate / CELL):
             if file.is_file():
                 return file.resolve()
-    here = sorted(file.parent.name for file in Path().glob(f"*/{CELL}"))
+    folders = (file.parent for file in Path().glob(f"*/{CELL}"))
+    here = sorted(folder.name for folder in folders if not (folder / RECORDING).exists())
     yours = f"one in this folder ({', '.join(here)}), " if here else ""
     built_in = nearest(str(name_or_path), built_in_cells())
     allowed = f"a cell file, {yours}or a built-in cell: {built_in}"

@@ -105,3 +105,14 @@ def test_an_arm_that_cannot_see_anything_is_refused(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(in_a_ball)
     with pytest.raises(InputError, match="sees nothing"):
         draft_cell(tmp_path / "arm.xml", "hand")
+
+
+def test_a_cell_that_is_not_there_is_answered_with_those_of_this_folder(
+    command, tmp_path: Path, capsys
+) -> None:
+    for folder in ("mine", "recorded"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "cell.toml").touch()
+    (tmp_path / "recorded" / "recording.mcap").touch()
+    assert command("run", "min") == 2
+    assert "in this folder (mine)" in capsys.readouterr().err

@@ -172,7 +172,7 @@ def test_a_start_with_something_in_the_way_names_it(folder: Path) -> None:
     error = complaint(folder, **behind, target__features="[[0.0, 0.0, 0.0]]")
     assert "camera wrist does not see feature 0; in the way: puma/" in str(error.given)
     error = complaint(folder, **behind)
-    assert "does not fill the middle of camera wrist's picture" in str(error.given)
+    assert "does not fill the middle of camera wrist's picture: it is " in str(error.given)
 
 
 def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:

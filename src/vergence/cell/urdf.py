@@ -106,7 +106,10 @@ def _find_mesh(name: str, urdf: Path) -> Path:
     for candidate in candidates:
         if candidate.is_file():
             return candidate
-    raise InputError(str(urdf), "mesh filename", name, "a file that exists")
+    allowed = f"a file that exists, such as {candidates[0]}"
+    if scheme == "package":
+        allowed = f"a file in a folder {Path(rest).parts[0]}/ beside or above the URDF"
+    raise InputError(str(urdf), "mesh filename", name, allowed)
 
 
 def _in_packages(path: Path, urdf: Path) -> Iterator[Path]:

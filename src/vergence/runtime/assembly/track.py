@@ -11,7 +11,7 @@ from vergence.cell.schema import ToolTable, TrackTable
 from vergence.errors import InputError
 from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.tracked_points import TrackedPoints
-from vergence.geometry import transform_points
+from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import FixedReference, Reference
 from vergence.runtime.assembly.laws import build_law
 from vergence.runtime.assembly.parts import Parts
@@ -90,7 +90,8 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
     if image is None:
         points = _grid(camera.width, camera.height, count)
         if np.isnan(driver.anchor(name, points)).any():
-            given = f"at the start it does not fill the middle of camera {name}'s picture"
+            given = f"at the start it does not fill the middle of camera {name}'s picture: "
+            given += _whereabouts(driver, name)
             raise InputError(str(cell.path), "target", given, "features, or a start before it")
         return points
     points = _far_apart(image, count, driver, name)
@@ -102,6 +103,14 @@ def _pick(cell: Cell, task: TrackTable, driver: SimulatedDriver) -> FloatArray:
             f"at most {len(points)}: no more good features of the target are in the first picture",
         )
     return points[:count]
+
+
+def _whereabouts(driver: SimulatedDriver, camera: str) -> str:
+    """Say where the target's frame is, as the camera sees it."""
+    world = driver.world
+    x, y, z = (se3_inverse(world.camera_pose(camera)) @ world.target_pose())[:3, 3]
+    side = "ahead" if z > 0 else "behind"
+    return f"it is {abs(z):.2f} m {side}, {x:.2f} m to the right, {y:.2f} m down"
 
 
 def _far_apart(image: ImageArray, count: int, driver: SimulatedDriver, camera: str) -> FloatArray:
