@@ -46,7 +46,9 @@ def servo(driver: Driver, model: SimulatedDriver, duration_s: float, folder: Pat
 
 
 def main(cell: str, port: int) -> None:
-    model = SimulatedDriver(load_cell(cell), images=False)  # only its arm and camera are used
+    model = SimulatedDriver(load_cell(cell))
+    # What runs for the first time is compiled; a rehearsal spares the robot the wait.
+    servo(model, model, 0.2, Path("runs/rehearsal"))
     driver = SocketDriver(("localhost", port), model.arms, model.cameras, model.inner_rate_hz)
     folder = Path("runs/robot-over-a-socket")
     print(servo(driver, model, 5.0, folder))

@@ -136,7 +136,6 @@ def test_a_region_is_mapped_to_a_picture_and_a_table(
     [
         (["compare", "puma560", "--laws", ","], "--laws"),
         (["compare", "puma560", "--laws", "imagebased"], "did you mean image_based"),
-        (["compare", "four_cameras"], "task.kind"),
         (["map", "puma560", "--over", "starts"], "headings, places"),
         (["map", "puma560", "--speeds", "0,1"], "--speeds"),
         (["map", "no_such_cell"], "a built-in cell"),

@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray, frozen
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,3 +28,12 @@ class Frame:
     image: ImageArray | None  # (height, width) grey; None from a driver that makes no pictures
     joints: Mapping[str, FloatArray]  # arm name to joint positions at exposure, rad or m
     truth: FrameTruth | None = None
+
+    def __post_init__(self) -> None:
+        # Read-only like every value, whoever took the picture: kernels are compiled for such once.
+        if self.image is not None:
+            image = np.ascontiguousarray(self.image).view()
+            image.flags.writeable = False
+            object.__setattr__(self, "image", image)
+        joints = {arm: frozen(position) for arm, position in self.joints.items()}
+        object.__setattr__(self, "joints", joints)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera, Frame, FrameTruth, picture_tick
 from vergence.cell.motion import TargetPoses
 from vergence.geometry import se3_inverse, transform_points
@@ -75,7 +75,7 @@ class IdealDriver:
         frames = []
         while self._queue and self._queue[0][0] <= self._tick:
             frames.append(self._queue.popleft()[1])
-        joints = JointState(self.time, frozen(self._position), frozen(self._velocity))
+        joints = JointState(self.time, self._position, self._velocity)
         return Sample(self.time, {ARM: joints}, tuple(frames))
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
@@ -91,7 +91,7 @@ class IdealDriver:
 
     def frame(self) -> Frame:
         """Return what the camera sees now."""
-        return Frame(CAMERA, self.time, None, {ARM: frozen(self._position)}, self._truth())
+        return Frame(CAMERA, self.time, None, {ARM: self._position}, self._truth())
 
     def _expose(self) -> None:
         arrival = self._tick_of(self._exposed + self._cell.latency_frames)

@@ -79,9 +79,7 @@ class CameraRenderer:
             row, column = self._rng.integers(0, _NOISE_POOL, 2)
             window = self._noise[row : row + grey.shape[0], column : column + grey.shape[1]]
             grey = cv2.add(grey, window, dtype=cv2.CV_8U)
-        image: ImageArray = np.asarray(grey, dtype=np.uint8)
-        image.flags.writeable = False
-        return image
+        return np.asarray(grey, dtype=np.uint8)
 
     def _draw(self, data: Any) -> Any:
         import cv2

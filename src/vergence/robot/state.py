@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from vergence.arrays import FloatArray
+from vergence.arrays import FloatArray, frozen
 from vergence.camera import Frame
 
 
@@ -14,6 +14,10 @@ class JointState:
     time: float  # s
     position: FloatArray  # (n,) rad, m for sliding joints
     velocity: FloatArray  # (n,) rad/s or m/s
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", frozen(self.position, (None,), "position"))
+        object.__setattr__(self, "velocity", frozen(self.velocity, (None,), "velocity"))
 
 
 @dataclass(frozen=True, slots=True)

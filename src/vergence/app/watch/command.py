@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -64,7 +64,8 @@ def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
         replay = Replay(Recording.open(path))
     with closing(replay):
         scene = replay.scene.port if replay.scene is not None else None
-        with closing(Server(door, replay.board, replay.ask, scene)) as server:
+        server = Server(door, replay.board, replay.ask, scene)
+        with closing(server), suppress(KeyboardInterrupt):
             _invite(server, request)
             replay.run()
     return {"run": path.parent, "address": server.address}
@@ -87,8 +88,8 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
     with working("setting up the cell"):
         live = Live(desk, request.images, out, request.image_every)
     with closing(live), closing(Server(door, live.board, live.ask, live.scene.port)) as server:
-        _invite(server, request)
         try:
+            _invite(server, request)
             outcome = live.run().outcome
             end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
         except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
