@@ -89,7 +89,7 @@ def _write_page(
     cell: "Cell", region: Region, results: "Sequence[TrialResult]", how: Running
 ) -> "tuple[Path, Path]":
     from vergence.drawing import save
-    from vergence.runtime.campaign import scores
+    from vergence.runtime.campaign import OWN, scores
 
     panels, caption, name = _picture(cell, region, results)
     picture = how.folder / "map.png"
@@ -100,7 +100,9 @@ def _write_page(
         markup.section("Endings", html_table(("law", "endings"), rows)),
         markup.section("Why", reasons_table(results, name)),
     ]
-    title = f"{cell.name}: where does {' and '.join(region.laws)} work?"
+    laws = ["its own law" if law == OWN else law for law in region.laws]
+    verb = "does" if len(laws) == 1 else "do"
+    title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
         f"{len(results)} runs on exact projections; {how.motion}; converged: every feature within "
         f"{how.tolerance_px:g} px at the end."
@@ -116,7 +118,8 @@ def _picture(
 
     if region.over == "headings":
         caption = (
-            "How far the target came in each direction before what the colour says, for each speed."
+            "How far the target came in each direction, in m, before what the colour says, for "
+            "each speed."
         )
         return headings_figure(results), caption, "{law}, {heading_deg:g}° at {speed_m_s:g} m/s"
     bases = {

@@ -8,7 +8,7 @@ from vergence.outcome import Outcome, OutcomeKind
 
 def completed(duration_s: float, time: float) -> Outcome:
     """Return the end of a run that went on as long as it should."""
-    reason = f"ran for {duration_s:g} s with the target in view"
+    reason = f"ran for {round(duration_s, 3):g} s with the target in view"
     return Outcome(OutcomeKind.COMPLETED, reason, time)
 
 

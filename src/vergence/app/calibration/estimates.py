@@ -36,7 +36,7 @@ class Estimate(NamedTuple):
             return "–"
         known = self.deviation > 0.0  # neither 0 nor NaN
         digits = 1 - int(np.floor(np.log10(self.deviation))) if known else 4
-        return f"{value:.{min(max(digits, 1), 7)}f}"
+        return f"{value:z.{min(max(digits, 1), 7)}f}"
 
 
 def lens_estimates(fit: LensFit | MountingFit, truth: Truth | None) -> list[Estimate]:

@@ -28,7 +28,8 @@ def starting_pose(text: str, camera: Camera) -> FloatArray:
         T, source = _from_file(Path(text), camera), text
     else:
         source = "--start"
-        values = numbers({"--start": text.replace(",", " ").split()}, "--start", (6,), source)
+        given = {"--start": text.replace(",", " ").split()}
+        values = numbers(given, "--start", (6,), "vergence track")
         T = se3(_rotation(values[3:]), values[:3].copy())
     if not T[2, 3] > 0.0:
         allowed = "a place before the camera: its z axis points forward"
