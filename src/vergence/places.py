@@ -23,6 +23,9 @@ def find_cell(name_or_path: str | Path) -> Path:
     Raises:
         InputError: if there is no such cell.
     """
+    if (Path(name_or_path) / RECORDING).is_file():
+        ways = f"a cell; try vergence report {name_or_path}, or vergence watch {name_or_path}"
+        raise InputError("cell", "", f"{name_or_path}, which holds a recording", ways)
     for candidate in (Path(name_or_path), CELLS / name_or_path):
         for file in (candidate, candidate / CELL):
             if file.is_file():

@@ -164,6 +164,18 @@ def test_a_folder_that_cannot_be_written_is_a_mistake(
     assert "Traceback" not in written
 
 
+def test_a_recording_is_neither_written_over_nor_taken_for_a_cell(
+    command: Command, capsys: object, tmp_path: Path
+) -> None:
+    (tmp_path / "before").mkdir()
+    (tmp_path / "before" / "recording.mcap").write_bytes(b"what was recorded")
+    assert command(*QUICK_RUN, "--out", "before") == 2
+    assert "which holds a recording" in capsys.readouterr().err
+    assert (tmp_path / "before" / "recording.mcap").read_bytes() == b"what was recorded"
+    assert command("run", "before") == 2
+    assert "vergence watch before" in capsys.readouterr().err
+
+
 def test_an_interrupted_run_leaves_a_recording_and_says_where(
     command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say, warn
 from vergence.errors import InputError
 from vergence.outcome import Outcome, OutcomeKind
+from vergence.places import RECORDING
 
 if TYPE_CHECKING:
     from vergence.cell import Cell
@@ -26,6 +27,8 @@ def run(
     from vergence.cell import load_cell
 
     loaded = load_cell(cell, overrides(settings), seed)  # a mistake is told before all is loaded
+    if out is not None and (out / RECORDING).exists():
+        raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
     from vergence.app.progress import working
     from vergence.app.report import write_report
     from vergence.runtime import Recorder
