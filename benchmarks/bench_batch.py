@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from harness import Block, Peer, measured, row
-from vergence.cell import IdealCell, SimulatedDriver, load_cell, target_poses
-from vergence.runtime import assemble_parts
-from vergence.runtime.assembly import Parts
-from vergence.runtime.batch import IdealRun, run_batch
-from vergence.runtime.batch.closed_loop import closed_loops
-from vergence.runtime.batch.run_batch import empty_records, pack
+from vergence.assembly import Parts, assemble_parts
+from vergence.cell import load_cell
+from vergence.experiments.batch import IdealRun, run_batch
+from vergence.experiments.batch.closed_loop import closed_loops
+from vergence.experiments.batch.run_batch import empty_records, pack
+from vergence.simulation import IdealCell, SimulatedDriver, target_poses
 
 RUN_S, RUNS = 25.0, 500
 TICKS = 750  # of a run, at 30 Hz

@@ -13,7 +13,7 @@ from numba import njit
 from harness import calls, loops, row
 from peer_programs import mink, pink, visp
 from vergence.arrays import FloatArray
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control.constrained_rates import constrained_rates
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.constraints import DEPTH, pack_features
@@ -21,6 +21,7 @@ from vergence.control.objective import least_squares_objective
 from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE
 from vergence.features import interaction_matrix_points
 from vergence.robot import Arm, yoshikawa_measure
+from vergence.simulation import SimulatedDriver
 
 GAIN, PERIOD = 2.0, 1 / 30
 

@@ -9,7 +9,7 @@ from numba import njit
 from harness import Block, Peer, calls, loops, row
 from peer_programs import SOURCES, python_peer
 from vergence.arrays import FloatArray, IntArray
-from vergence.camera import Camera, Frame
+from vergence.camera import Camera
 from vergence.estimation import (
     CameraRig,
     Candidates,
@@ -22,8 +22,8 @@ from vergence.estimation import (
 from vergence.estimation.information import compress, joseph_update
 from vergence.estimation.motion import predict_covariance, predict_pose
 from vergence.estimation.pose_filter import correct
-from vergence.features import ImagePoints
 from vergence.geometry import se3, se3_compose, se3_inverse, transform_points
+from vergence.signals import Frame, ImagePoints
 
 PERIOD = 1.0 / 26.0
 CAMERA = Camera.from_lens(8.0, (8.3, 8.3), 768, 576)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from harness import measured
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
-from vergence.runtime import Recorder, run_cell
+from vergence.runtime import Recorder
 
 SECONDS = "4"
 ROUNDS = 3

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.camera import Camera
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.control import JointCommand
+from vergence.cell import load_cell
 from vergence.estimation import ExactPoints
-from vergence.features import Observation, interaction_matrix_points
-from vergence.planning import FixedReference, Reference
-from vergence.robot import Arm, JointState
+from vergence.features import interaction_matrix_points
+from vergence.planning import FixedReference
+from vergence.robot import Arm
 from vergence.runtime import Loop
+from vergence.signals import JointCommand, JointState, Observation, Reference
+from vergence.simulation import SimulatedDriver
 
 SQUARE = "[[0.06, 0.06, 0.0], [-0.06, 0.06, 0.0], [-0.06, -0.06, 0.0], [0.06, -0.06, 0.0]]"
 

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import ConstrainedLaw, ConstrainedSolver, ImageBased, Law, PlainLaw
 from vergence.estimation import ExactPoints
-from vergence.planning import FixedReference, Reference
+from vergence.planning import FixedReference
 from vergence.robot import manipulability_measure
 from vergence.runtime import Loop, Recorder, Recording
 from vergence.runtime.recording import RunInfo
+from vergence.signals import Reference
+from vergence.simulation import SimulatedDriver
 
 MARGIN_PX = 20.0
 BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are wanted

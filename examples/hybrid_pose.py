@@ -3,8 +3,8 @@
 Both cameras' pictures are fused into the object's pose, which the hand keeps its distance from.
 """
 
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
-from vergence.runtime import run_cell
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
 """Two pictures of an object nobody has a model of: plan a path between them and look at it."""
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.planning import OptimisedPlanner, PlanningProblem, Trajectory
+from vergence.simulation import SimulatedDriver
 from vergence.vision import estimate_two_view
 
 

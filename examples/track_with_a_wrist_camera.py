@@ -2,11 +2,13 @@
 
 import numpy as np
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import OptimalTrackingLaw
 from vergence.estimation import TrackedPoints
-from vergence.planning import FixedReference, Reference
+from vergence.planning import FixedReference
 from vergence.runtime import Loop
+from vergence.signals import Reference
+from vergence.simulation import SimulatedDriver
 from vergence.vision import SsdTracker, pick_features
 
 

@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from vergence.cell import choose_renderer
+from vergence.simulation import choose_renderer
 
 choose_renderer()
 
@@ -19,9 +19,9 @@ import cv2  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 
+from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
-from vergence.cell.world import World  # noqa: E402
-from vergence.runtime import run_cell  # noqa: E402
+from vergence.simulation.world import World  # noqa: E402
 
 DOCS = Path(__file__).parents[1] / "docs"
 VERGENCE = Path(sys.executable).with_name("vergence")

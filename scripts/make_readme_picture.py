@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vergence.cell import choose_renderer
+from vergence.simulation import choose_renderer
 
 choose_renderer()
 
@@ -12,9 +12,9 @@ import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
+from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
 from vergence.drawing import SETTINGS, curve  # noqa: E402
-from vergence.runtime import run_cell  # noqa: E402
 from vergence.studies.nelson1995 import STRATEGIES, moving  # noqa: E402
 from vergence.studies.trace import Trace  # noqa: E402
 
@@ -47,7 +47,7 @@ def run(strategy):
 
 
 def cell_view(cell, record):
-    from vergence.cell.world import World
+    from vergence.simulation.world import World
 
     world = World(cell)
     frame = record.sample.frames[-1]

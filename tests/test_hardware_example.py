@@ -16,10 +16,11 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.errors import DriverSilent
-from vergence.outcome import OutcomeKind
 from vergence.runtime import Recording
+from vergence.signals import OutcomeKind
+from vergence.simulation import SimulatedDriver
 
 FOLDER = Path(__file__).parents[1] / "examples" / "hardware"
 PATIENCE_S = 2.0  # of a machine that has other things to do

@@ -20,6 +20,7 @@ PROJECT = Path(__file__).parents[1]
 # A room uses rooms above it, never below; the modules of the root are above all rooms.
 ROOMS = (
     "geometry",
+    "signals",
     "camera",
     "features",
     "robot",
@@ -29,6 +30,10 @@ ROOMS = (
     "control",
     "cell",
     "runtime",
+    "drivers",
+    "simulation",
+    "assembly",
+    "experiments",
     "studies",
     "app",
 )

@@ -8,10 +8,11 @@ from time import monotonic, sleep
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera, Frame
+from vergence.camera import Camera
 from vergence.errors import DriverSilent
-from vergence.robot import Arm, JointState, Sample, Setpoint
+from vergence.robot import Arm
 from vergence.runtime.hardware import JointHistory, VideoCamera
+from vergence.signals import Frame, JointState, Sample, Setpoint
 
 
 def connect(address: tuple[str, int], within_s: float = 30.0) -> Connection:

@@ -17,10 +17,11 @@ from threading import Thread
 
 import numpy as np
 
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.robot import Sample, Setpoint
+from vergence.cell import load_cell
 from vergence.runtime import Driver
 from vergence.runtime.hardware import Metronome, Watchdog
+from vergence.signals import Sample, Setpoint
+from vergence.simulation import SimulatedDriver
 
 
 def serve(robot: Driver, listener: Listener, patience_s: float = 0.5) -> str:

@@ -9,14 +9,15 @@ from pathlib import Path
 
 from driver import SocketDriver
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import OptimalTrackingLaw
 from vergence.errors import VergenceError
 from vergence.estimation import TrackedPoints
-from vergence.outcome import Outcome
-from vergence.planning import FixedReference, Reference
+from vergence.planning import FixedReference
 from vergence.runtime import Driver, Loop, Recorder
 from vergence.runtime.recording import RunInfo
+from vergence.signals import Outcome, Reference
+from vergence.simulation import SimulatedDriver
 from vergence.vision import SsdTracker, pick_features
 
 

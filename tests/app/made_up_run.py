@@ -6,14 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.camera import Camera, Frame, FrameTruth
-from vergence.control import JointCommand
-from vergence.features import ImagePoints, Observation
-from vergence.outcome import Outcome, OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import JointState
-from vergence.runtime.driver import Sample
+from vergence.camera import Camera
 from vergence.runtime.recording import ArmInfo, Recorder, RunInfo, TickRecord
+from vergence.signals import (
+    Frame,
+    FrameTruth,
+    ImagePoints,
+    JointCommand,
+    JointState,
+    Observation,
+    Outcome,
+    OutcomeKind,
+    Reference,
+    Sample,
+)
 
 CAMERA = Camera(320, 240, 400.0, 400.0, 159.5, 119.5)
 CORNERS_PX = np.array([[-30.0, -30.0], [30.0, -30.0], [30.0, 30.0], [-30.0, 30.0]])

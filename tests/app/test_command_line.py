@@ -15,8 +15,8 @@ import pytest
 
 from vergence.app.main import main
 from vergence.app.output import new_folder
-from vergence.outcome import OutcomeKind
 from vergence.runtime.recording import Recording
+from vergence.signals import OutcomeKind
 from vergence.studies import Check, Figure, StudyResult
 
 COMMANDS = [

@@ -10,7 +10,7 @@ import cv2
 import pytest
 
 from vergence.app.main import main
-from vergence.runtime.campaign import Crew, Ledger, Trial, TrialResult, WorkersLostError
+from vergence.experiments import Crew, Ledger, Trial, TrialResult, WorkersLostError
 
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]

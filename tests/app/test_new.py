@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from vergence.app.main import main
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.cell.draft import draft_cell
+from vergence.assembly import run_cell
+from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.places import CELLS
-from vergence.runtime import run_cell
+from vergence.simulation import SimulatedDriver
+from vergence.simulation.draft import draft_cell
 
 ROBOTS = "package:example-robot-data/robots"
 ARMS = {  # by their number of joints

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence.app.overlay import Marks, draw
-from vergence.features import SearchWindows
+from vergence.signals import SearchWindows
 
 NOWHERE = np.full((1, 2), np.nan)
 GREY = np.full((80, 100), 128, dtype=np.uint8)

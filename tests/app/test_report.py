@@ -12,8 +12,8 @@ import pytest
 from vergence.app.report import make_report, write_report
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.errors import InputError
-from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime.recording import Recording
+from vergence.signals import Outcome, OutcomeKind
 
 
 @pytest.fixture(scope="module")

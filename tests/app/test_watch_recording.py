@@ -11,8 +11,9 @@ from watched import Watched
 
 from vergence.app.watch.playback import Playback
 from vergence.app.watch.recorded_world import RecordedWorld
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
-from vergence.runtime import Recorder, run_cell
+from vergence.runtime import Recorder
 from vergence.runtime.recording import Recording
 
 SMALL = {

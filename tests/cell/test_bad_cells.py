@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from vergence.cell import built_in_cells, choose_renderer, load_cell
-from vergence.cell import renderer as renderer_module
+from vergence.assembly import run_cell
+from vergence.cell import built_in_cells, load_cell
 from vergence.errors import InputError, RenderingError
 from vergence.places import CELLS
-from vergence.runtime import run_cell
+from vergence.simulation import choose_renderer
+from vergence.simulation import renderer as renderer_module
 
 
 @pytest.fixture

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vergence.cell import Cell, SimulatedDriver, load_cell
+from vergence.cell import Cell, load_cell
 from vergence.errors import InputError
 from vergence.geometry import rpy_to_matrix, se3, se3_inverse
+from vergence.simulation import SimulatedDriver
 
 REST = [0.0, 0.0, 0.0]
 # Smart SiX: θ, d, a, α of Denavit and Hartenberg from joint angles in Comau's convention.

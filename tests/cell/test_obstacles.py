@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.cell.obstacles import Obstacles
+from vergence.cell import load_cell
 from vergence.estimation import TargetShape, predict_visibility
 from vergence.estimation.rig import CameraRig
 from vergence.geometry import se3_inverse, transform_points
+from vergence.simulation import SimulatedDriver
+from vergence.simulation.obstacles import Obstacles
 from vergence.vision.known_object import object_model_of
 
 

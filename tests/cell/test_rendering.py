@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vergence.cell import Cell, SimulatedDriver, load_cell
-from vergence.cell.build import intrinsics
+from vergence.cell import Cell, load_cell
 from vergence.errors import InputError
+from vergence.simulation import SimulatedDriver
+from vergence.simulation.build import intrinsics
 
 MODEL = """<mujoco><worldbody><body name="spot">
   <geom type="{kind}" size="{size}" rgba="1 1 1 1" contype="0" conaffinity="0"/>

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.geometry import se3_inverse, transform_points
-from vergence.robot import Setpoint
+from vergence.signals import Setpoint
+from vergence.simulation import SimulatedDriver
 
 
 def driver_with(**overrides: str) -> SimulatedDriver:

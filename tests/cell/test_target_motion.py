@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from vergence.cell import placement_pose, target_pose
 from vergence.cell.schema import (
     CircleMotion,
     LineMotion,
@@ -12,6 +11,7 @@ from vergence.cell.schema import (
     StepMotion,
     StillMotion,
 )
+from vergence.simulation import placement_pose, target_pose
 
 START = Placement(position_m=(0.3, -0.2, 0.1), rotation_rpy_deg=(10.0, -20.0, 30.0))
 MOTIONS = [

@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.cell.locate import locate_model
-from vergence.cell.urdf import read_urdf
-from vergence.cell.world import World
 from vergence.errors import InputError
-from vergence.runtime import run_cell
+from vergence.robot.urdf import read_urdf
+from vergence.simulation.world import World
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 ROBOT = """<robot name="r">

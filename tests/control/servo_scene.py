@@ -7,10 +7,9 @@ import numpy as np
 
 from vergence.camera import Camera
 from vergence.control import OptimalTrackingLaw
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_inverse, transform_points
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState
+from vergence.robot import Arm
+from vergence.signals import ImagePoints, JointState, Observation, Reference
 
 CAMERA = Camera(640, 480, 1454.5, 1230.8, 319.5, 239.5)
 START = np.deg2rad([-125.6, 42.7, -172.7, 0.0, -50.0, 0.0])

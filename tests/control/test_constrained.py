@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.constraints import (
@@ -17,9 +17,9 @@ from vergence.control.constraints import (
 )
 from vergence.control.image_based import ImageBased
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation
-from vergence.planning import Reference
-from vergence.robot import JointState, yoshikawa_measure
+from vergence.robot import yoshikawa_measure
+from vergence.signals import ImagePoints, JointState, Observation, Reference
+from vergence.simulation import SimulatedDriver
 
 SQUARE = [[0.05, 0.05, 0.0], [-0.05, 0.05, 0.0], [-0.05, -0.05, 0.0], [0.05, -0.05, 0.0]]
 PERIOD = 1 / 30

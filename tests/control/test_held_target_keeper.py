@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.held_target_keeper import HeldTargetKeeper
-from vergence.features import TargetState
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import reverse_arm
+from vergence.signals import TargetState
+from vergence.simulation import SimulatedDriver
 
 PERIOD, MARGIN_PX = 1 / 500, 20.0
 CORNERS = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])

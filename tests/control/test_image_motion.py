@@ -5,8 +5,7 @@ import pytest
 from servo_scene import CAMERA, PERIOD, SQUARE, START, in_view, puma, seen
 
 from vergence.control import ImageMotion
-from vergence.features import ImagePoints
-from vergence.robot import JointState
+from vergence.signals import ImagePoints, JointState
 
 ARM = puma()
 WORLD = in_view(ARM, START, SQUARE)

@@ -8,7 +8,7 @@ import pytest
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import (
     ConstrainedLaw,
     ConstrainedSolver,
@@ -19,10 +19,10 @@ from vergence.control import (
     PathTrackingLaw,
     PlainLaw,
 )
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_inverse, transform_points
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, reverse_arm
+from vergence.robot import Arm, reverse_arm
+from vergence.signals import ImagePoints, JointState, Observation, Reference
+from vergence.simulation import SimulatedDriver
 
 PERIOD, LATENCY = 1 / 30, 2  # s, frames
 VELOCITY = np.array([0.03, -0.02, 0.01])  # m/s

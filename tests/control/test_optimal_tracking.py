@@ -18,9 +18,8 @@ from vergence.control import (
 )
 from vergence.errors import InputError, ShapeError
 from vergence.features import interaction_matrix_points
-from vergence.outcome import OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, manipulability
+from vergence.robot import Arm, manipulability
+from vergence.signals import JointState, OutcomeKind, Reference
 
 ARM = puma()
 AXES = ("x", "y", "z", "rx", "ry", "rz")

@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.image_based import ImageBased
 from vergence.control.plain import PlainLaw
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation
-from vergence.outcome import OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import JointState
 from vergence.robot.positive_definite import invert_spd_any
+from vergence.signals import ImagePoints, JointState, Observation, OutcomeKind, Reference
+from vergence.simulation import SimulatedDriver
 
 SQUARE = [[0.05, 0.05, 0.0], [-0.05, 0.05, 0.0], [-0.05, -0.05, 0.0], [0.05, -0.05, 0.0]]
 PERIOD = 1 / 30

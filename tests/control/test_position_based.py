@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import Guard, InnerLaw, MovingPose, PositionBasedLaw, moved
-from vergence.features import Observation, TargetState
 from vergence.geometry import se3, se3_compose, se3_inverse, se3_log, so3_exp
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, Setpoint
+from vergence.robot import Arm
+from vergence.signals import JointState, Observation, Reference, Setpoint, TargetState
+from vergence.simulation import SimulatedDriver
 
 RATE, OUTER = 500, 26
 LATENCY_S = 1 / OUTER

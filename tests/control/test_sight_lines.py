@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control.constraints import pack_features
 from vergence.control.sight_lines import (
     AXES,
@@ -17,6 +17,7 @@ from vergence.control.sight_lines import (
     sight_rows,
 )
 from vergence.geometry import so3_exp, transform_points
+from vergence.simulation import SimulatedDriver
 
 SHAPES = {
     "ball": (np.zeros(3), 0.2),

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.control import ConstrainedSolver, MovingPose, moved
 from vergence.control.constraints import DEPTH, X_FLOW, X_SPREAD, X
 from vergence.control.target_keeper import TargetKeeper, pose_features
-from vergence.features import TargetState
 from vergence.geometry import se3_compose, se3_exp, se3_inverse, transform_points
+from vergence.signals import TargetState
+from vergence.simulation import SimulatedDriver
 
 CORNERS = 0.05 * np.array([[1.0, 1, 1], [-1, 1, 0], [-1, -1, 1], [1, -1, -1]])
 WANTED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])

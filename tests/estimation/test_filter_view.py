@@ -4,8 +4,8 @@ from estimation_scene import BOX, CAMERA, WALL, moving, project
 
 from vergence.camera import Camera
 from vergence.estimation import view_of
-from vergence.features import ImagePoints
 from vergence.geometry import se3_inverse
+from vergence.signals import ImagePoints
 
 BENT = Camera(640, 480, 500.0, 520.0, 320.0, 240.0, np.array([-0.2, 0.05, 1e-3, -2e-3, 0.01]))
 

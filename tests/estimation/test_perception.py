@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from estimation_scene import CAMERA, look_at, moving, pose_error
 
-from vergence.camera import Camera, Frame
+from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.estimation import (
     CameraRig,
@@ -16,8 +16,8 @@ from vergence.estimation import (
     RpyPoseFilter,
     TargetShape,
 )
-from vergence.features import ImagePoints
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, transform_points
+from vergence.signals import Frame, ImagePoints
 
 SHAPE = TargetShape.box((0.12, 0.12, 0.06))
 WIDE = Camera(640, 480, 600.0, 600.0, 319.5, 239.5, np.array([-0.1, 0.02, 0.0, 0.0, 0.0]))

@@ -7,12 +7,10 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control.path_tracking import PathTrackingLaw
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_distance, se3_inverse, transform_points
 from vergence.planning.problem import PlanningProblem
-from vergence.planning.reference import Reference
 from vergence.planning.trajectory import Trajectory
-from vergence.robot import JointState
+from vergence.signals import ImagePoints, JointState, Observation, Reference
 
 PERIOD = 0.04  # s
 

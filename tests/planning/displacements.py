@@ -5,8 +5,8 @@ from gantry_cell import CAMERA, gantry, marks
 
 from vergence.arrays import FloatArray
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
-from vergence.planning.inverse_kinematics import goal_configurations
 from vergence.planning.problem import PlanningProblem
+from vergence.robot.inverse_kinematics import goal_configurations
 
 
 def facing_pose(random: np.random.Generator, roll: float) -> FloatArray:

@@ -10,7 +10,6 @@ from gantry_cell import gantry, section6
 
 from vergence.arrays import FloatArray
 from vergence.planning.failure import Obstacle
-from vergence.planning.inverse_kinematics import goal_configurations
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
 from vergence.planning.smoothing import (
@@ -27,6 +26,7 @@ from vergence.planning.visibility import (
     clearance_at,
     view_clearances,
 )
+from vergence.robot.inverse_kinematics import goal_configurations
 
 
 def somewhere(random: np.random.Generator) -> FloatArray:

@@ -9,13 +9,11 @@ from gantry_cell import CAMERA, gantry, section6
 
 from vergence.control.path_tracking import PathTrackingLaw, tracking_twist
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation, interaction_matrix_points
-from vergence.outcome import OutcomeKind
+from vergence.features import interaction_matrix_points
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.potential_field import PotentialFieldPlanner
-from vergence.planning.reference import Reference
 from vergence.planning.trajectory import Trajectory
-from vergence.robot import JointState
+from vergence.signals import ImagePoints, JointState, Observation, OutcomeKind, Reference
 
 
 def test_twist_solves_the_least_squares_problem() -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from gantry_cell import gantry, section6
 
-from vergence.planning.inverse_kinematics import goal_configurations
 from vergence.planning.tree import pull_into_view
 from vergence.planning.wrist_search import shortest_way, wrist_path
+from vergence.robot.inverse_kinematics import goal_configurations
 
 
 def test_way_is_as_short_as_a_plain_search_finds_it() -> None:

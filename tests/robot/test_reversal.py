@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.features import interaction_matrix_points
 from vergence.geometry import se3, so3_exp, transform_points
 from vergence.robot import reverse_arm
+from vergence.simulation import SimulatedDriver
 
 
 @pytest.fixture(scope="module", params=["puma560", "lippiello2005", "gantry"])

@@ -6,12 +6,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera, Frame
-from vergence.control import JointCommand
-from vergence.features import ImagePoints, Observation
-from vergence.planning import FixedReference, Reference
-from vergence.robot import Arm, Chain, JointState, Sample, Setpoint
+from vergence.camera import Camera
+from vergence.planning import FixedReference
+from vergence.robot import Arm, Chain
 from vergence.runtime import Loop
+from vergence.signals import (
+    Frame,
+    ImagePoints,
+    JointCommand,
+    JointState,
+    Observation,
+    Reference,
+    Sample,
+    Setpoint,
+)
 
 DESIRED_PX = np.array([[320.0, 240.0], [300.0, 200.0]])
 

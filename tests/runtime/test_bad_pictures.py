@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scripted_cell import Notes
 
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.outcome import OutcomeKind
-from vergence.robot import Sample
+from vergence.assembly import assemble_parts
+from vergence.cell import load_cell
 from vergence.runtime import Loop
-from vergence.runtime.assembly import assemble_parts
+from vergence.signals import OutcomeKind, Sample
+from vergence.simulation import SimulatedDriver
 
 SPOILT_AT = 0.4
 

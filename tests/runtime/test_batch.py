@@ -8,13 +8,13 @@ import pytest
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.cell import IdealCell, IdealDriver
 from vergence.control import OptimalTrackingLaw
+from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
 from vergence.geometry import se3, so3_exp
-from vergence.outcome import Outcome, OutcomeKind
 from vergence.runtime import TickRecord
-from vergence.runtime.batch import BatchTrace, IdealRun, covers, run_batch
 from vergence.runtime.recording import RunInfo
+from vergence.signals import Outcome, OutcomeKind
+from vergence.simulation import IdealCell, IdealDriver
 from vergence.studies.guarantees_runs import arms
 
 CAMERA = Camera(640, 480, 600.0, 580.0, 319.5, 239.5)

@@ -11,12 +11,10 @@ from threading import Timer
 import numpy as np
 import pytest
 
+from vergence.assembly import RunResult
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.outcome import Outcome, OutcomeKind
-from vergence.runtime import RunResult
-from vergence.runtime.batch import IdealRun
-from vergence.runtime.campaign import (
+from vergence.experiments import (
     OWN,
     PRESETS,
     RESULTS,
@@ -37,10 +35,12 @@ from vergence.runtime.campaign import (
     scores,
     start_trials,
 )
+from vergence.experiments.batch import IdealRun
+from vergence.signals import Outcome, OutcomeKind
 
 QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
 ALONE = Crew(workers=1)
-RUN_TRIAL = "vergence.runtime.campaign.run_trial"
+RUN_TRIAL = "vergence.experiments.run_trial"
 
 
 @pytest.fixture(scope="module")

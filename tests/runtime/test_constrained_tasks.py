@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.runtime import run_cell
 
 CONSTRAINED = {"law.kind": "constrained"}
 

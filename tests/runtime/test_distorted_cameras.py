@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.camera import Camera, write_camera
 from vergence.cell import Cell, load_cell
-from vergence.cell.build import intrinsics
 from vergence.errors import InputError
 from vergence.places import CELLS
-from vergence.runtime import run_cell
+from vergence.simulation.build import intrinsics
 
 BARREL = (-0.28, 0.09, 1e-3, -1.5e-3, 0.0)
 STRONG_BARREL = (-1.1, 0.9, 5e-3, -4e-3, 0.0)  # for a long lens: the picture reaches less far

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.runtime import Recorder, Recording, run_cell
+from vergence.runtime import Recorder, Recording
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,9 @@ import pytest
 from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, looped
 
 from vergence.arrays import FloatArray
-from vergence.camera import Frame
 from vergence.errors import InputError
-from vergence.outcome import OutcomeKind
-from vergence.robot import JointState, Sample
 from vergence.runtime.hardware import JointHistory, Metronome, VideoCamera, metronome
+from vergence.signals import Frame, JointState, OutcomeKind, Sample
 
 
 @pytest.fixture

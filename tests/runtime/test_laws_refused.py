@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.assembly import build_law, run_cell
+from vergence.cell import load_cell
 from vergence.control import ConstrainedLaw, ConstrainedSolver, ImageBased, OptimalTracking
 from vergence.errors import InputError
-from vergence.runtime import build_law, run_cell
+from vergence.simulation import SimulatedDriver
 
 SQUARE = str([[x, y, 0.0] for x in (-0.05, 0.05) for y in (-0.05, 0.05)])
 ONE_JOINT = """<mujoco><worldbody><body name="flange" pos="0 0 1">

@@ -7,9 +7,8 @@ import pytest
 from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, ScriptedLaw, flat_arm, looped
 
 from vergence.errors import DriverSilent
-from vergence.outcome import OutcomeKind
-from vergence.robot import Sample
 from vergence.runtime import Patience
+from vergence.signals import OutcomeKind, Sample
 
 
 def changes_within(velocities: np.ndarray, acceleration: float, dt: float) -> bool:

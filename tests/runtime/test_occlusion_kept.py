@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.cell.solids import Solids
+from vergence.assembly import run_cell
+from vergence.cell import load_cell
 from vergence.control.sight_lines import AXES, HALF, MIDDLE, RADIUS
-from vergence.runtime import run_cell
+from vergence.simulation import SimulatedDriver
+from vergence.simulation.solids import Solids
 
 BEAM = (
     '<geom name="beam" type="capsule" size="0.02" fromto="0.21 -0.63 0.6 0.21 0.2 0.6" '

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from vergence.cell import SimulatedDriver, load_cell
-from vergence.runtime.assembly import assemble_parts
+from vergence.assembly import assemble_parts
+from vergence.cell import load_cell
+from vergence.simulation import SimulatedDriver
 
 
 def picked(position_m: str):

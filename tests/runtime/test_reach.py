@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.outcome import OutcomeKind
-from vergence.runtime import run_cell
+from vergence.signals import OutcomeKind
 from vergence.studies.trace import Trace
 
 

@@ -6,15 +6,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vergence.camera import Camera, Frame, FrameTruth
-from vergence.control import JointCommand
+from vergence.camera import Camera
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation, SearchWindows, TargetState
-from vergence.outcome import Outcome, OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import JointState
-from vergence.runtime.driver import Sample
 from vergence.runtime.recording import ArmInfo, Recorder, Recording, RunInfo, TickRecord
+from vergence.signals import (
+    Frame,
+    FrameTruth,
+    ImagePoints,
+    JointCommand,
+    JointState,
+    Observation,
+    Outcome,
+    OutcomeKind,
+    Reference,
+    Sample,
+    SearchWindows,
+    TargetState,
+)
 
 DONE = Outcome(OutcomeKind.COMPLETED, "it followed to the end", 1.25)
 DESIRED_PX = np.array([[10.0, 20.0], [50.0, 30.0]])

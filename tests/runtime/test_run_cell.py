@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import Cell, load_cell
-from vergence.outcome import OutcomeKind
-from vergence.runtime import run_cell
+from vergence.signals import OutcomeKind
 
 
 class Trace:

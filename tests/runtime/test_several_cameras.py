@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.assembly import assemble_parts, run_cell
+from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_distance
-from vergence.robot import JointState
-from vergence.runtime import assemble_parts, run_cell
+from vergence.signals import ImagePoints, JointState, Observation
+from vergence.simulation import SimulatedDriver
 
 PERIOD = 1 / 30
 GOAL = np.deg2rad([-125.6, 42.7, -172.7, 0.0, -50.0, 0.0])  # where the desired pictures were taken

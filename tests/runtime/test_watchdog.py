@@ -5,8 +5,8 @@ import pytest
 from scripted_cell import flat_arm
 
 from vergence.control import Guard
-from vergence.robot import Setpoint
 from vergence.runtime.hardware import Watchdog
+from vergence.signals import Setpoint
 
 DT = 0.002
 ARM = flat_arm(2)

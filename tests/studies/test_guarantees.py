@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vergence.control import guard
-from vergence.robot import Setpoint
+from vergence.signals import Setpoint
 from vergence.studies import guarantees
 from vergence.studies.guarantees_runs import LAWS, arms, attempt
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vergence.assembly import run_cell
 from vergence.cell import Cell, load_cell
-from vergence.outcome import OutcomeKind
-from vergence.runtime import run_cell
+from vergence.signals import OutcomeKind
 from vergence.studies.lippiello2005 import reproduce
 from vergence.studies.lippiello2005_trials import FIXED, PAPER, run
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vergence.cell import SimulatedDriver, load_cell
+from vergence.cell import load_cell
 from vergence.geometry import se3_inverse, so3_log
+from vergence.simulation import SimulatedDriver
 from vergence.vision.two_view import TwoView, estimate_two_view, match_features
 
 

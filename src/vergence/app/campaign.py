@@ -13,7 +13,7 @@ from vergence.app.progress import bar
 from vergence.app.report import REPORT
 
 if TYPE_CHECKING:
-    from vergence.runtime.campaign import CellSource, Trial, TrialResult
+    from vergence.experiments import CellSource, Trial, TrialResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def prepare(
     """
     from vergence.app.output import new_folder
     from vergence.app.run import overrides
-    from vergence.runtime.campaign import CellSource
+    from vergence.experiments import CellSource
 
     source = CellSource.of(cell, overrides(settings), None)
     folder = out or new_folder(f"{source.load().name}-{command}")
@@ -60,7 +60,7 @@ def prepare(
 
 def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
     """Run a campaign with a progress bar; Ctrl-C keeps what is done."""
-    from vergence.runtime.campaign import Crew, WorkersLostError, run_campaign
+    from vergence.experiments import Crew, WorkersLostError, run_campaign
 
     with bar("{task.completed} of {task.total} runs") as progress:
         task = progress.add_task("runs", total=len(trials))
@@ -153,7 +153,7 @@ def reasons_table(results: "Sequence[TrialResult]", name: str) -> str:
         results: of the campaign.
         name: what a run is called in the first column, filled with its labels.
     """
-    from vergence.runtime.campaign import Ending
+    from vergence.experiments import Ending
 
     failed = [result for result in results if result.ending is not Ending.CONVERGED]
     lines = "\n".join(

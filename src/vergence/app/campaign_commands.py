@@ -81,7 +81,7 @@ def register(app: typer.Typer) -> None:
         source, how = prepare(
             "compare", cell, settings or (), out, tolerance_px, workers, scheduler, physics
         )
-        from vergence.runtime.campaign import Draws
+        from vergence.experiments import Draws
 
         named = () if laws is None else _names("--laws", laws)
         draws = Draws(_names("--vary", vary), spread, speed)

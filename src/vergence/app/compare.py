@@ -19,7 +19,7 @@ from vergence.app.output import SUCCESS, emit, say
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.runtime.campaign import CellSource, Draws, Score, TrialResult
+    from vergence.experiments import CellSource, Draws, Score, TrialResult
 
 _REMARK = (
     "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
@@ -47,7 +47,7 @@ def compare(
         how: to run it.
         as_json: whether to answer with one JSON object.
     """
-    from vergence.runtime.campaign import scores, start_trials, usual_laws
+    from vergence.experiments import scores, start_trials, usual_laws
 
     cell = source.load()
     results = run(source, start_trials(cell, laws or usual_laws(cell), starts, seed, draws), how)
@@ -68,7 +68,7 @@ def compare(
 
 def _columns(found: "Sequence[Score]") -> list[Any]:
     """Return the endings worth a column: the usual ones, and others that occurred."""
-    from vergence.runtime.campaign import Ending
+    from vergence.experiments import Ending
 
     usual = set(Ending) - {Ending.OTHER, Ending.REFUSED}
     return [e for e in Ending if e in usual or any(score.count(e) for score in found)]
@@ -85,7 +85,7 @@ def _row(score: "Score", found: "Sequence[Score]") -> list[str]:
 
 
 def _as_json(score: "Score") -> dict[str, Any]:
-    from vergence.runtime.campaign import Ending
+    from vergence.experiments import Ending
 
     counts = {ending.value.replace(" ", "_"): score.count(ending) for ending in Ending}
     medians = {"median_time_s": score.converged_s, "median_path_m": score.path_m}
@@ -113,7 +113,7 @@ def _write_page(
     remark: str,
 ) -> "Path":
     from vergence.app.figures.endings import scores_figure, starts_figure
-    from vergence.runtime.campaign import Aim
+    from vergence.experiments import Aim
 
     cell = source.load()
     aim = Aim.of(cell)

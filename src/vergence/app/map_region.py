@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from vergence.app.figures import Panels
     from vergence.cell import Cell
-    from vergence.runtime.campaign import CellSource, Score, Trial, TrialResult
+    from vergence.experiments import CellSource, Score, Trial, TrialResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ class Region:
     extent_m: float  # half a side of the square of places, or the way in each direction
     steps: int  # places along a side, or directions
     speeds_m_s: tuple[float, ...]  # of the target; places are mapped at the first
-    laws: tuple[str, ...]  # see `vergence.runtime.campaign.law_table`
+    laws: tuple[str, ...]  # see `vergence.experiments.law_table`
 
 
 def map_region(source: "CellSource", region: Region, how: Running, as_json: bool) -> int:
     """Map a region; write picture, data and page into the run folder; return the exit code."""
-    from vergence.runtime.campaign import scores
+    from vergence.experiments import scores
 
     cell = source.load()
     results = run(source, _trials(cell, region), how)
@@ -67,13 +67,13 @@ def _in_words(score: "Score") -> str:
 
 def _counts(score: "Score", gap: str) -> dict[str, int]:
     """Return how many runs came to each ending that occurred, by its name."""
-    from vergence.runtime.campaign import Ending
+    from vergence.experiments import Ending
 
     return {e.value.replace(" ", gap): score.count(e) for e in Ending if score.count(e)}
 
 
 def _trials(cell: "Cell", region: Region) -> "list[Trial]":
-    from vergence.runtime.campaign import heading_trials, place_trials
+    from vergence.experiments import heading_trials, place_trials
 
     extent, steps, speeds = region.extent_m, region.steps, region.speeds_m_s
     trials = []
@@ -89,7 +89,7 @@ def _write_page(
     cell: "Cell", region: Region, results: "Sequence[TrialResult]", how: Running
 ) -> "tuple[Path, Path]":
     from vergence.drawing import save
-    from vergence.runtime.campaign import OWN, scores
+    from vergence.experiments import OWN, scores
 
     panels, caption, name = _picture(cell, region, results)
     picture = how.folder / "map.png"

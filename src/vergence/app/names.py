@@ -5,7 +5,7 @@ from pathlib import Path
 from vergence.app.reproduce import PAPERS
 from vergence.places import RECORDING, built_in_cells
 
-LAWS = (  # the cell's own, and those that `vergence.runtime.campaign` knows
+LAWS = (  # the cell's own, and those that `vergence.experiments` knows
     "own",
     "image_based",
     "image_based_desired",

@@ -13,7 +13,7 @@ from vergence.places import CELL
 
 if TYPE_CHECKING:
     from vergence.arrays import FloatArray
-    from vergence.cell.draft import Draft
+    from vergence.simulation.draft import Draft
 
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
@@ -78,8 +78,8 @@ gain = 3.0
 
 def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
     """Write a cell for an arm into a new folder; return the exit code."""
-    from vergence.cell.draft import draft_cell
     from vergence.cell.locate import locate_model
+    from vergence.simulation.draft import draft_cell
 
     path = locate_model(Path(model), Path.cwd(), "vergence new", "MODEL")
     folder = out or Path(path.stem)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.features import SearchWindows
 from vergence.runtime.recording import CameraTrace
+from vergence.signals import SearchWindows
 
 # Blue, green, red: Okabe and Ito's hues, brightened to stand out from grey textures.
 FOUND = (150, 230, 20)

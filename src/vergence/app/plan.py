@@ -69,9 +69,9 @@ def _planned(
     cell: "Cell", task: "ReachTable", images: bool
 ) -> "PlannedPath | PlanFailure | TwoViewFailure":
     """Look at the object twice and plan."""
-    from vergence.cell import SimulatedDriver
+    from vergence.assembly.reach import look_twice, plan_reach
     from vergence.planning import PlanFailure
-    from vergence.runtime.assembly.reach import look_twice, plan_reach
+    from vergence.simulation import SimulatedDriver
 
     driver = SimulatedDriver(cell, images)
     try:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from vergence.outcome import Outcome
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import Outcome
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say, warn
 from vergence.errors import InputError
-from vergence.outcome import Outcome, OutcomeKind
 from vergence.places import RECORDING
+from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
+    from vergence.assembly import RunResult
     from vergence.cell import Cell
-    from vergence.runtime import Recorder, RunResult
+    from vergence.runtime import Recorder
 
 
 def run(
@@ -62,7 +63,7 @@ def overrides(settings: Sequence[str]) -> dict[str, str]:
 def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "RunResult":
     """Run a cell; whatever happens, the recording is closed."""
     from vergence.app.progress import RunProgress
-    from vergence.runtime import run_cell
+    from vergence.assembly import run_cell
 
     try:
         with RunProgress(cell.duration_s) as progress:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
-from vergence.outcome import Outcome, OutcomeKind
+from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from vergence.app.tracking.follower import ObjectFollower, Step

@@ -2,13 +2,10 @@
 
 from vergence.camera.exposure import picture_tick, picture_times
 from vergence.camera.files import camera_of, read_camera, write_camera
-from vergence.camera.frame import Frame, FrameTruth
 from vergence.camera.pinhole import Camera
 
 __all__ = [
     "Camera",
-    "Frame",
-    "FrameTruth",
     "camera_of",
     "picture_tick",
     "picture_times",

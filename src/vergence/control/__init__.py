@@ -1,7 +1,6 @@
 """Control: the laws, how a camera twist becomes joint rates, and the guard behind them."""
 
 from vergence.control.camera_share import CameraShare
-from vergence.control.command import JointCommand
 from vergence.control.conditioning import (
     CameraDirections,
     Resolvability,
@@ -70,7 +69,6 @@ __all__ = [
     "resolvability",
     "Guard",
     "InnerLaw",
-    "JointCommand",
     "Law",
     "MovingPose",
     "OptimalTrackingLaw",

@@ -1,15 +1,12 @@
 """Any law in the image under hard limits: one quadratic program a picture."""
 
 from vergence.arrays import FloatArray, frozen
-from vergence.control.command import JointCommand
 from vergence.control.constrained_solver import ConstrainedSolver, command_of
 from vergence.control.constraints import pack_features
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import Objective, seen_only
 from vergence.errors import InputError
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import JointState
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class ConstrainedLaw:

@@ -7,13 +7,13 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera import Camera
-from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import Avoidance, ConstrainedRates, constrained_rates
 from vergence.control.constraints import KIND_NAMES, SOFT, ConstraintSettings
 from vergence.control.objective import TwistObjective
 from vergence.control.sight_lines import NO_SOLIDS
 from vergence.errors import InputError, nearest
 from vergence.robot import Arm
+from vergence.signals import JointCommand
 
 
 class ConstrainedSolver:

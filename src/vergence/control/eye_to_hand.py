@@ -3,11 +3,8 @@
 from dataclasses import replace
 
 from vergence.arrays import frozen
-from vergence.control.command import JointCommand
 from vergence.control.law import Law
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import JointState
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class EyeToHandLaw:

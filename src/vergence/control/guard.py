@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.robot import Arm, Setpoint
+from vergence.robot import Arm
+from vergence.signals import Setpoint
 
 _SPARE = 1e-9  # rad or m of room beyond what braking needs; nearer, rounding decides
 

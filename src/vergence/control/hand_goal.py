@@ -4,8 +4,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control.interpolator import MovingPose
-from vergence.features import TargetState
 from vergence.geometry import se3_compose, se3_inverse
+from vergence.signals import TargetState
 
 
 def goal_beside(target: TargetState, T_hand_target: FloatArray) -> MovingPose:

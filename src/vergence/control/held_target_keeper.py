@@ -8,8 +8,8 @@ from vergence.arrays import FloatArray
 from vergence.control.constrained_rates import ConstrainedRates
 from vergence.control.objective import TwistObjective
 from vergence.control.target_keeper import TargetKeeper
-from vergence.features import TargetState
 from vergence.geometry import se3_adjoint, se3_compose, se3_inverse
+from vergence.signals import TargetState
 
 
 class HeldTargetKeeper(TargetKeeper):

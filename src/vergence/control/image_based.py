@@ -10,7 +10,7 @@ from vergence.control.image_motion import FeatureState
 from vergence.control.objective import TwistObjective, least_squares_objective
 from vergence.errors import InputError
 from vergence.features import interaction_matrix_points
-from vergence.planning import Reference
+from vergence.signals import Reference
 
 InteractionModel = Literal["current", "desired", "mean"]
 

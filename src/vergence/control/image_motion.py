@@ -8,9 +8,9 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.features import ImagePoints
 from vergence.geometry import se3_compose, se3_inverse
-from vergence.robot import Arm, JointState, forward_kinematics
+from vergence.robot import Arm, forward_kinematics
+from vergence.signals import ImagePoints, JointState
 
 _LEAST_DEPTH = 0.1  # of the depth believed at first
 

@@ -4,7 +4,7 @@ from typing import Protocol, runtime_checkable
 
 from vergence.arrays import FloatArray
 from vergence.control.law import Law
-from vergence.robot import Setpoint
+from vergence.signals import Setpoint
 
 
 @runtime_checkable

@@ -2,10 +2,7 @@
 
 from typing import Protocol
 
-from vergence.control.command import JointCommand
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import JointState
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class Law(Protocol):

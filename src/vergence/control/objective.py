@@ -8,7 +8,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.control.image_motion import FeatureState
-from vergence.planning import Reference
+from vergence.signals import Reference
 
 
 class TwistObjective(NamedTuple):

@@ -12,8 +12,8 @@ from vergence.control.objective import TwistObjective, least_squares_objective
 from vergence.control.optimal_tracking import AXES, axis_mask, weights_of
 from vergence.control.tracking_kernels import SHARING
 from vergence.features import interaction_matrix_points
-from vergence.planning import Reference
 from vergence.robot.positive_definite import factor_spd, solve_factored, times_six
+from vergence.signals import Reference
 
 _UNUSED_AXIS = 1e6  # times R: an axis outside `axes` costs too much to move
 

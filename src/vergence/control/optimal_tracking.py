@@ -6,8 +6,8 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera
-from vergence.control.command import JointCommand, singular_fault
 from vergence.control.image_motion import ImageMotion
+from vergence.control.singularity import singular_fault
 from vergence.control.tracking_kernels import (
     TrackingGains,
     TrackingSetup,
@@ -16,9 +16,8 @@ from vergence.control.tracking_kernels import (
     unpack_tick,
 )
 from vergence.errors import InputError, nearest
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState
+from vergence.robot import Arm
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 

@@ -7,14 +7,19 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.control.command import JointCommand
 from vergence.control.image_motion import FeatureState, ImageMotion
 from vergence.control.redundancy import resolve_redundant
 from vergence.errors import InputError
-from vergence.features import ImagePoints, Observation, interaction_matrix_points
-from vergence.outcome import OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, jacobian
+from vergence.features import interaction_matrix_points
+from vergence.robot import Arm, jacobian
+from vergence.signals import (
+    ImagePoints,
+    JointCommand,
+    JointState,
+    Observation,
+    OutcomeKind,
+    Reference,
+)
 
 Model = Literal["current", "desired", "mean"]
 FEWEST = 3  # points that leave no direction of the camera open

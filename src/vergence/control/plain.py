@@ -4,14 +4,13 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
-from vergence.control.command import JointCommand, singular_fault
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import Objective, seen_only
 from vergence.control.resolve import resolve_twist
+from vergence.control.singularity import singular_fault
 from vergence.errors import InputError
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, manipulability_measure
+from vergence.robot import Arm, manipulability_measure
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class PlainLaw:

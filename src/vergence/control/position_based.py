@@ -6,16 +6,14 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import ConstrainedRates
 from vergence.control.hand_goal import goal_beside, goal_of_holder
 from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.redundancy import resolve_redundant
 from vergence.control.target_keeper import TargetKeeper, held_back
-from vergence.features import Observation, TargetState
 from vergence.geometry import se3_adjoint, se3_compose, se3_inverse
-from vergence.planning import Reference
-from vergence.robot import Arm, Chain, JointState, Setpoint, forward_kinematics, jacobian
+from vergence.robot import Arm, Chain, forward_kinematics, jacobian
+from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint, TargetState
 
 _ONSET_S = 0.5  # of the motion of redundant joints, so that no joint meets its acceleration limit
 

@@ -7,16 +7,14 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.control.camera_share import CameraShare
-from vergence.control.command import JointCommand
 from vergence.control.constrained_rates import joint_objective
 from vergence.control.constrained_solver import ConstrainedSolver, command_of
 from vergence.control.constraints import pack_features
 from vergence.control.image_motion import ImageMotion
 from vergence.control.objective import TwistObjective, seen_only
 from vergence.control.resolve import slow_down
-from vergence.features import ImagePoints, Observation
-from vergence.planning import Reference
-from vergence.robot import Arm, JointState, reverse_arm
+from vergence.robot import Arm, reverse_arm
+from vergence.signals import ImagePoints, JointCommand, JointState, Observation, Reference
 
 _STALE_S = 0.3  # what a camera saw longer ago no longer counts
 _NO_FEATURES = pack_features(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))

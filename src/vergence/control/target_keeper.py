@@ -9,9 +9,9 @@ from vergence.control.constrained_solver import ConstrainedSolver, Pressure, des
 from vergence.control.constraints import KIND_NAMES
 from vergence.control.interpolator import MovingPose, moved
 from vergence.control.objective import TwistObjective
-from vergence.features import TargetState
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Chain, forward_kinematics
+from vergence.signals import TargetState
 
 _SIGMAS = 2.0  # how far off a corner is allowed for, in standard deviations of its place
 _HELD_BACK = 1e-3  # m/s and rad/s of the wanted twist that is not reached

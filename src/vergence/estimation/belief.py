@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.estimation.consistency import Consistency
-from vergence.features import TargetState
+from vergence.signals import TargetState
 
 
 @dataclass(frozen=True, slots=True)

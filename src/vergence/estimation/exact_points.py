@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from vergence.camera import Frame
-from vergence.features import ImagePoints, Observation
+from vergence.signals import Frame, ImagePoints, Observation
 
 OUT_OF_SIGHT = "out of sight"
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.estimation.motion import predict_covariance, predict_pose
-from vergence.features import TargetState
+from vergence.signals import TargetState
 
 
 def extrapolate(

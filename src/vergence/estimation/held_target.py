@@ -7,12 +7,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.camera import Frame
 from vergence.estimation.measure import CameraPose, Joints
 from vergence.estimation.perception import PosePerception
 from vergence.estimation.visibility import Blocked
-from vergence.features import Observation, TargetState
 from vergence.geometry import se3_compose, se3_inverse, transform_points
+from vergence.signals import Frame, Observation, TargetState
 
 HandPose: TypeAlias = Callable[[Joints], FloatArray]  # joints to T_world_hand (4, 4)
 

@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 from vergence.arrays import FloatArray, IntArray
-from vergence.camera import Frame
 from vergence.estimation.view import View
-from vergence.features import ImagePoints
+from vergence.signals import Frame, ImagePoints
 
 
 class Expected(NamedTuple):

@@ -7,10 +7,9 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
-from vergence.camera import Frame
 from vergence.estimation.looks import Look
 from vergence.estimation.visibility import SightArray
-from vergence.features import ImagePoints, SearchWindows
+from vergence.signals import Frame, ImagePoints, SearchWindows
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)

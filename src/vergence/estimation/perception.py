@@ -6,7 +6,6 @@ from typing import Generic
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.camera import Frame
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.looks import Expected, Look, Picture
@@ -33,8 +32,8 @@ from vergence.estimation.visibility import (
     predict_visibility,
 )
 from vergence.estimation.windows import WindowRule, innovation_spread
-from vergence.features import ImagePoints, Observation
 from vergence.geometry import se3_compose, se3_inverse, transform_points
+from vergence.signals import Frame, ImagePoints, Observation
 
 DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
 JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)

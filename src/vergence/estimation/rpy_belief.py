@@ -7,8 +7,8 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.estimation.consistency import Consistency
-from vergence.features import TargetState
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3
+from vergence.signals import TargetState
 
 
 @njit(cache=True)

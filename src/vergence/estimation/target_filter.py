@@ -10,7 +10,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.errors import InputError
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.view import Seen, View
-from vergence.features import TargetState
+from vergence.signals import TargetState
 
 
 class Verdict(StrEnum):

@@ -1,7 +1,6 @@
 """Plain feature tracking: the inner circle with the last position as prediction."""
 
-from vergence.camera import Frame
-from vergence.features import ImagePoints, Observation
+from vergence.signals import Frame, ImagePoints, Observation
 from vergence.vision import PointTracker
 
 

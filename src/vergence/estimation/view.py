@@ -8,8 +8,8 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Camera
-from vergence.features import ImagePoints
 from vergence.geometry import se3_inverse
+from vergence.signals import ImagePoints
 
 
 class View(NamedTuple):

@@ -2,12 +2,10 @@
 
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.fixed_reference import FixedReference
-from vergence.planning.inverse_kinematics import goal_configurations
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
-from vergence.planning.reference import Reference
 from vergence.planning.separation import proves_no_path
 from vergence.planning.timing import TimeLaw
 from vergence.planning.trajectory import Trajectory
@@ -20,9 +18,7 @@ __all__ = [
     "PlanFailure",
     "PlanningProblem",
     "PotentialFieldPlanner",
-    "Reference",
     "TimeLaw",
     "Trajectory",
-    "goal_configurations",
     "proves_no_path",
 ]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from vergence.outcome import Outcome, OutcomeKind
+from vergence.signals import Outcome, OutcomeKind
 
 
 class Obstacle(StrEnum):

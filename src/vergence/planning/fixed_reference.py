@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vergence.planning.reference import Reference
+from vergence.signals import Reference
 
 
 class FixedReference:

@@ -7,7 +7,6 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.planning.failure import Obstacle, PlanFailure
-from vergence.planning.inverse_kinematics import finite_range, goal_configurations
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
@@ -17,6 +16,7 @@ from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
 from vergence.planning.tree import connect_trees, pull_into_view, shorten
 from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
+from vergence.robot.inverse_kinematics import finite_range, goal_configurations
 
 PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
 WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last

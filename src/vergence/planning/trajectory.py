@@ -7,8 +7,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.planning.path import Path
-from vergence.planning.reference import Reference
 from vergence.planning.timing import TimeLaw, fastest_law, pace
+from vergence.signals import Reference
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

@@ -9,6 +9,7 @@ from vergence.robot.chain import (
     jacobian,
     world_jacobian,
 )
+from vergence.robot.inverse_kinematics import goal_configurations
 from vergence.robot.manipulability import (
     Manipulability,
     determinant_measure,
@@ -22,16 +23,13 @@ from vergence.robot.manipulability import (
     yoshikawa_measure,
 )
 from vergence.robot.reversal import reverse_arm
-from vergence.robot.state import JointState, Sample, Setpoint
 
 __all__ = [
+    "goal_configurations",
     "Arm",
     "Chain",
     "ChainState",
-    "JointState",
     "Manipulability",
-    "Sample",
-    "Setpoint",
     "chain_state",
     "determinant_measure",
     "forward_kinematics",

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from vergence.camera import Camera
-from vergence.robot import Arm, Sample, Setpoint
+from vergence.robot import Arm
+from vergence.signals import Sample, Setpoint
 
 __all__ = ["Driver", "Sample", "Setpoint"]
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from vergence.outcome import Outcome, OutcomeKind
+from vergence.signals import Outcome, OutcomeKind
 
 
 def completed(duration_s: float, time: float) -> Outcome:

@@ -7,17 +7,23 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import picture_tick
-from vergence.control import Guard, InnerLaw, JointCommand, Law
+from vergence.control import Guard, InnerLaw, Law
 from vergence.errors import DriverSilent
-from vergence.features import ImagePoints, Observation
-from vergence.outcome import Outcome, OutcomeKind
-from vergence.planning import Reference
-from vergence.robot import Sample, Setpoint
 from vergence.runtime import endings
 from vergence.runtime.driver import Driver
 from vergence.runtime.interrupt import Interrupt
 from vergence.runtime.recording import Listener, TickRecord
 from vergence.runtime.stages import Perception, Planner
+from vergence.signals import (
+    ImagePoints,
+    JointCommand,
+    Observation,
+    Outcome,
+    OutcomeKind,
+    Reference,
+    Sample,
+    Setpoint,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import FrameTruth
 from vergence.geometry import se3_inverse, so3_log
 from vergence.runtime.recording import TickRecord
+from vergence.signals import FrameTruth
 
 
 class PoseErrors(NamedTuple):

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 
-from vergence.camera import Frame
-from vergence.features import Observation
 from vergence.runtime.stages import Perception
+from vergence.signals import Frame, Observation
 
 
 class SeveralCameras:

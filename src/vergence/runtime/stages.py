@@ -2,9 +2,7 @@
 
 from typing import Protocol
 
-from vergence.camera import Frame
-from vergence.features import Observation
-from vergence.planning import Reference
+from vergence.signals import Frame, Observation, Reference
 
 
 class Perception(Protocol):

@@ -6,10 +6,9 @@ from time import perf_counter
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.features import ImagePoints
-from vergence.outcome import Outcome
 from vergence.runtime.pose_errors import pose_errors
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import ImagePoints, Outcome
 
 
 class Summary:

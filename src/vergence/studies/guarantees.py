@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.cell import IdealCell
 from vergence.control.constraints import SOFT
-from vergence.outcome import OutcomeKind
 from vergence.robot import Arm
 from vergence.runtime import Summary
 from vergence.runtime.recording import TickRecord
+from vergence.signals import OutcomeKind
+from vergence.simulation import IdealCell
 from vergence.studies import guarantees_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
 from vergence.studies.guarantees_random import PAIRS_SEED, success_check, try_pair

@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.camera import Camera, Frame
-from vergence.cell import IdealCell, IdealDriver
-from vergence.cell.ideal_driver import ARM, CAMERA
+from vergence.camera import Camera
 from vergence.control import (
     ConstrainedLaw,
     ConstrainedSolver,
     ImageBased,
-    JointCommand,
     Law,
     OptimalTracking,
     PlainLaw,
@@ -22,13 +19,13 @@ from vergence.control import (
 from vergence.control.image_motion import FeatureState
 from vergence.control.objective import Objective, TwistObjective
 from vergence.estimation import ExactPoints
-from vergence.features import Observation
 from vergence.geometry import se3_inverse, so3_log, transform_points
-from vergence.outcome import OutcomeKind
-from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Reference, Trajectory
-from vergence.robot import JointState
+from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajectory
 from vergence.runtime import Loop, Patience
 from vergence.runtime.stages import Planner
+from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
+from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation.ideal_driver import ARM, CAMERA
 from vergence.studies.ideal_loop import Ending
 from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, estimate_two_view

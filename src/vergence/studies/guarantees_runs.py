@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera, FrameTruth
-from vergence.cell import IdealCell, IdealDriver, load_cell
-from vergence.cell.ideal_driver import ARM, CAMERA
+from vergence.camera import Camera
+from vergence.cell import load_cell
 from vergence.control import Law, OptimalTrackingLaw
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
@@ -21,11 +20,13 @@ from vergence.control.position_based import PositionBasedLaw
 from vergence.control.target_keeper import TargetKeeper
 from vergence.estimation import ExactPoints
 from vergence.geometry import se3, se3_inverse, so3_exp
-from vergence.outcome import Outcome
-from vergence.planning import FixedReference, Reference
-from vergence.robot import Arm, Sample, Setpoint
+from vergence.planning import FixedReference
+from vergence.robot import Arm
 from vergence.runtime import Listener, Loop
 from vergence.runtime.stages import Planner
+from vergence.signals import FrameTruth, Outcome, Reference, Sample, Setpoint
+from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation.ideal_driver import ARM, CAMERA
 from vergence.studies.wrong_beliefs import MovingGoal, WrongDepthPose
 
 CAMERA_MODEL = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
@@ -191,7 +192,7 @@ def arms() -> tuple[Arm, ...]:
     Raises:
         InputError: if the models of the UR5 and the Panda are not installed, with how to do it.
     """
-    from vergence.cell import SimulatedDriver
+    from vergence.simulation import SimulatedDriver
 
     found = []
     for name in CELLS:

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vergence.cell import Cell, SimulatedDriver
+from vergence.assembly.measure import CornerWindows
+from vergence.assembly.pose import target_shape
+from vergence.cell import Cell
 from vergence.estimation import (
     CameraRig,
     PerceptionSettings,
@@ -15,8 +17,7 @@ from vergence.estimation import (
     PosePerception,
     TargetShape,
 )
-from vergence.runtime.assembly.measure import CornerWindows
-from vergence.runtime.assembly.pose import target_shape
+from vergence.simulation import SimulatedDriver
 
 BUDGET = 16
 _TICKS = 40

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.cell import Cell, SimulatedDriver
+from vergence.assembly import run_cell
+from vergence.assembly.pose import follow_pose, target_shape
+from vergence.cell import Cell
 from vergence.cell.schema import PoseMotion
-from vergence.outcome import Outcome
-from vergence.runtime import run_cell
-from vergence.runtime.assembly.pose import follow_pose, target_shape
 from vergence.runtime.pose_errors import angle_between
+from vergence.signals import Outcome
+from vergence.simulation import SimulatedDriver
 from vergence.studies.pose_trace import PoseTrace
 
 # The paper's state, Q and R; trajectory planner without feed-forward or prediction. R = 9 px² is

@@ -10,7 +10,7 @@ from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control.path_tracking import PathTrackingLaw, tracking_twist
 from vergence.control.redundancy import resolve_redundant
-from vergence.features import ImagePoints, Observation, interaction_matrix_points
+from vergence.features import interaction_matrix_points
 from vergence.geometry import se3_compose, se3_inverse, so3_log, transform_points
 from vergence.planning import (
     OptimisedPlanner,
@@ -18,10 +18,10 @@ from vergence.planning import (
     PlanFailure,
     PlanningProblem,
     PotentialFieldPlanner,
-    Reference,
     Trajectory,
 )
-from vergence.robot import Arm, JointState
+from vergence.robot import Arm
+from vergence.signals import ImagePoints, JointState, Observation, Reference
 from vergence.studies.ideal_loop import PERIOD, Ending, IdealLoop, Motion, Steer
 from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view

@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.cell import Cell, SimulatedDriver
+from vergence.assembly import run_cell
+from vergence.assembly.reach import look_twice, plan_reach
+from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import VergenceError
 from vergence.geometry import se3_inverse, so3_log
-from vergence.outcome import Outcome
 from vergence.planning import Path, PlanFailure, PotentialFieldPlanner, Trajectory
-from vergence.runtime import run_cell
-from vergence.runtime.assembly.reach import look_twice, plan_reach
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import Outcome
+from vergence.simulation import SimulatedDriver
 from vergence.studies.reach_scene import Scene
 
 SETTLE_S = 4.0  # after a plan's end

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from vergence.assembly import run_cell
 from vergence.cell import Cell, load_cell
 from vergence.cell.schema import OptimalTrackingTable
-from vergence.outcome import OutcomeKind
-from vergence.runtime import run_cell
+from vergence.signals import OutcomeKind
 from vergence.studies import nelson1995_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
 from vergence.studies.trace import Trace

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.cell import Cell, SimulatedDriver
+from vergence.cell import Cell
 from vergence.cell.schema import OptimalTrackingTable
 from vergence.drawing import COLORS, curve, figure, legend
 from vergence.robot import Arm, joint_limit_penalty, manipulability
+from vergence.simulation import SimulatedDriver
 from vergence.studies.check import Figure
 from vergence.studies.figure_files import save_figures
 from vergence.studies.trial import Trial, Trials

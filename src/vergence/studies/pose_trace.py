@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.outcome import Outcome
 from vergence.runtime.pose_errors import PoseErrors, pose_errors
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import Outcome
 
 
 @dataclass(slots=True)

@@ -7,12 +7,13 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
-from vergence.cell import Cell, SimulatedDriver
+from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
-from vergence.planning import PlanningProblem, goal_configurations
-from vergence.robot import Arm
+from vergence.planning import PlanningProblem
+from vergence.robot import Arm, goal_configurations
+from vergence.simulation import SimulatedDriver
 
 EASY_M, EASY_RAD = 0.3, np.radians(60)  # displacements smaller than both are not asked for
 END_MARGIN_PX, END_MARGIN_JOINT = 15.0, 0.03  # that starts and goals have

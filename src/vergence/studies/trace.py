@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.camera import Frame
-from vergence.features import ImagePoints
-from vergence.outcome import Outcome
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import Frame, ImagePoints, Outcome
 
 
 @dataclass(slots=True)

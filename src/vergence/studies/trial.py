@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.outcome import Outcome
+from vergence.signals import Outcome
 from vergence.studies.trace import Trace
 
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Frame
 from vergence.estimation import ExactPoints
-from vergence.features import Observation, TargetState
-from vergence.planning import Reference
+from vergence.signals import Frame, Observation, Reference, TargetState
 
 
 class WrongDepthPose:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, ImageArray, frozen
-from vergence.features import SearchWindows
+from vergence.signals import SearchWindows
 from vergence.vision.image import grey_image
 from vergence.vision.ssd import RANGE_PX
 from vergence.vision.tracker_state import (

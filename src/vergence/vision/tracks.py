@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.features import SearchWindows
+from vergence.signals import SearchWindows
 
 
 class Tracks(NamedTuple):

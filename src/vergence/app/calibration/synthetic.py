@@ -67,10 +67,10 @@ class Studio:
     def __init__(
         self, name_or_path: str, camera: str | None, charuco: bool, folder: Path, seed: int
     ) -> None:
-        from vergence.cell.renderer import choose_renderer
+        from vergence.simulation.renderer import choose_renderer
 
         choose_renderer(needed=False)
-        from vergence.cell.world import World
+        from vergence.simulation.world import World
 
         cell = load_cell(name_or_path)
         self.name = camera or cell.task.camera
@@ -95,7 +95,7 @@ class Studio:
     @property
     def truth(self) -> Truth:
         """What is to be found."""
-        from vergence.cell.motion import placement_pose
+        from vergence.simulation.motion import placement_pose
 
         T_world_base = placement_pose(self._cell.arms[self.arm])
         mount = T_world_base if self.fixed else self._flange()
@@ -108,8 +108,8 @@ class Studio:
         Raises:
             InputError: if it finds no such place.
         """
-        from vergence.cell.motion import placement_pose
-        from vergence.planning.inverse_kinematics import finite_range, solve_pose
+        from vergence.robot.inverse_kinematics import finite_range, solve_pose
+        from vergence.simulation.motion import placement_pose
 
         low, high = finite_range(self._tip, self._start)
         for _ in range(_TRIES):
@@ -146,8 +146,8 @@ class Studio:
 
     def renderer(self) -> Any:
         """Return what draws pictures of the camera, finer than it takes them."""
-        from vergence.cell.renderer import CameraRenderer, choose_renderer
-        from vergence.cell.world import World
+        from vergence.simulation.renderer import CameraRenderer, choose_renderer
+        from vergence.simulation.world import World
 
         choose_renderer()
         c, s = self.camera, _FINER

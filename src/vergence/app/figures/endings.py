@@ -7,7 +7,7 @@ import numpy as np
 
 from vergence.app.figures.layout import Panels
 from vergence.drawing import INK, SETTINGS, figure
-from vergence.runtime.campaign import Ending, Score, TrialResult
+from vergence.experiments import Ending, Score, TrialResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

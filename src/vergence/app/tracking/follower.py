@@ -8,8 +8,8 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation import Belief, PoseFilter, Verdict, view_of
-from vergence.features import ImagePoints
 from vergence.geometry import so3_log
+from vergence.signals import ImagePoints
 from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
 
 CAMERA = "camera"

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from vergence.app.watch.knobs import knobs, law_choices, turned
-from vergence.cell import Cell, SimulatedDriver, load_cell
+from vergence.assembly import build_law
+from vergence.cell import Cell, load_cell
 from vergence.control import Law
-from vergence.runtime import build_law
+from vergence.simulation import SimulatedDriver
 
 
 class LawDesk:

@@ -14,9 +14,10 @@ from vergence.app.watch.pace import Pace
 from vergence.app.watch.publisher import Publisher
 from vergence.app.watch.scene import Scene, world_state
 from vergence.app.watch.watched_driver import WatchedDriver
+from vergence.assembly import RunResult, run_driver
 from vergence.errors import InputError
-from vergence.outcome import Outcome, OutcomeKind
-from vergence.runtime import Loop, Recorder, RunResult, run_driver
+from vergence.runtime import Loop, Recorder
+from vergence.signals import Outcome, OutcomeKind
 
 Command = Mapping[str, Any]
 

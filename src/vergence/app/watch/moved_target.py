@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.cell import TargetPose
+from vergence.simulation import TargetPose
 
 _TIME_CONSTANT_S = 0.08  # of the target behind the mouse
 _FASTEST_M_S = 0.3  # a hand with a mouse outruns any tracker

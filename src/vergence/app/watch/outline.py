@@ -7,8 +7,8 @@ import numpy as np
 from vergence.app.watch.eye import Eye
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.cell.world import World
 from vergence.geometry import se3_inverse, transform_points
+from vergence.simulation.world import World
 
 _NEAR_M = 1e-3
 _BOX = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T.astype(np.float64)

@@ -21,11 +21,11 @@ from vergence.app.watch.plots import (
 from vergence.app.watch.recorded_world import RecordedWorld
 from vergence.app.watch.shot import Shot
 from vergence.arrays import FloatArray
-from vergence.features import ImagePoints, SearchWindows
 from vergence.geometry import se3_inverse
 from vergence.robot import manipulability_measure
 from vergence.runtime.pose_errors import angle_between
 from vergence.runtime.recording import CameraTrace, Recording
+from vergence.signals import ImagePoints, SearchWindows
 
 _MM = 1e3
 _AT_ONCE_S = 1e-9

@@ -10,15 +10,13 @@ from vergence.app.watch.outline import outline, target_corners
 from vergence.app.watch.plots import Plot, error_key, live_plots, row
 from vergence.app.watch.shot import Shot
 from vergence.arrays import FloatArray
-from vergence.camera import Frame, FrameTruth
-from vergence.cell import Cell, SimulatedDriver
-from vergence.features import ImagePoints
+from vergence.cell import Cell
 from vergence.geometry import se3_inverse, transform_points
-from vergence.outcome import Outcome
-from vergence.planning import Reference
 from vergence.robot import manipulability_measure
 from vergence.runtime.pose_errors import pose_errors
 from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.signals import Frame, FrameTruth, ImagePoints, Outcome, Reference
+from vergence.simulation import SimulatedDriver
 
 _MM = 1e3
 

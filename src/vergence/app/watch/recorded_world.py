@@ -4,10 +4,11 @@ from typing import Self
 
 from vergence.app.watch.scene import world_state
 from vergence.arrays import FloatArray
-from vergence.cell import choose_renderer, load_cell
-from vergence.cell.world import World
+from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.runtime.recording import RunInfo
+from vergence.simulation import choose_renderer
+from vergence.simulation.world import World
 
 _SETTING = "# set: "  # before what was set on the command line, in the text of a cell
 

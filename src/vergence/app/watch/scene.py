@@ -15,7 +15,7 @@ import numpy as np
 from vergence.app.watch.board import Board
 from vergence.app.watch.eye import Eye
 from vergence.arrays import FloatArray
-from vergence.cell.world import World
+from vergence.simulation.world import World
 
 _PERIOD_S = 1 / 30  # between two states, while no browser sets the pace
 _FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its viewers begin

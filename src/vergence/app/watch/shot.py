@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.features import ImagePoints
 from vergence.runtime.recording.numbers import numbers
+from vergence.signals import ImagePoints
 
 _JPEG_QUALITY = 80
 _DECIMALS = 3  # of a pixel: nobody sees more

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 
 from vergence.app.watch.moved_target import MovedTarget
-from vergence.cell import Cell, SimulatedDriver
-from vergence.robot import Sample
+from vergence.cell import Cell
+from vergence.signals import Sample
+from vergence.simulation import SimulatedDriver
 
 
 class WatchedDriver(SimulatedDriver):

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.robot import JointState
+from vergence.signals import JointState
 
 
 class JointHistory:

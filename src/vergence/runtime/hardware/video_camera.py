@@ -9,9 +9,9 @@ from threading import Event, Thread
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.camera import Frame
 from vergence.errors import InputError
 from vergence.runtime.hardware.metronome import Metronome
+from vergence.signals import Frame
 
 _LOG = logging.getLogger(__name__)
 

@@ -4,7 +4,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control import Guard, stoppable_speed
-from vergence.robot import Arm, Setpoint
+from vergence.robot import Arm
+from vergence.signals import Setpoint
 
 
 class Watchdog:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from vergence.outcome import Outcome
 from vergence.runtime.recording.run_info import RunInfo
 from vergence.runtime.recording.tick import TickRecord
+from vergence.signals import Outcome
 
 
 class Listener(Protocol):

@@ -24,8 +24,8 @@ from foxglove.messages import JointState as NamedJoint
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.features import ImagePoints, SearchWindows
 from vergence.geometry import matrix_to_quaternion
+from vergence.signals import ImagePoints, SearchWindows
 
 NANOSECONDS = 1_000_000_000
 

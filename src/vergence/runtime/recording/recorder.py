@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from vergence.outcome import Outcome
+from vergence.runtime.recording.mcap_writer import Tape
 from vergence.runtime.recording.run_info import RunInfo
-from vergence.runtime.recording.tape import Tape
 from vergence.runtime.recording.tick import TickRecord
+from vergence.signals import Outcome
 
 
 class Recorder:

@@ -10,7 +10,6 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
-from vergence.outcome import Outcome, OutcomeKind
 from vergence.places import find_recording
 from vergence.runtime.recording import wire
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
@@ -24,6 +23,7 @@ from vergence.runtime.recording.traces import (
     camera_trace,
     target_trace,
 )
+from vergence.signals import Outcome, OutcomeKind
 
 _PICTURES = "/image"  # how the topics end that are read one by one
 

@@ -10,11 +10,8 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Frame
-from vergence.control import JointCommand
-from vergence.features import ImagePoints, TargetState
-from vergence.robot import JointState
 from vergence.runtime.recording.numbers import numbers
+from vergence.signals import Frame, ImagePoints, JointCommand, JointState, TargetState
 
 _NUMBER = {"type": "number"}
 _NUMBERS = {"type": "array", "items": _NUMBER}

@@ -3,10 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from vergence.control import JointCommand
-from vergence.features import Observation
-from vergence.planning import Reference
-from vergence.robot import Sample
+from vergence.signals import JointCommand, Observation, Reference, Sample
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.features import SearchWindows
+from vergence.signals import SearchWindows
 from vergence.vision.image import grey_image
 from vergence.vision.marks.round import measure_round_marks
 from vergence.vision.tracks import Tracks

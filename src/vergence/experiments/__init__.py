@@ -1,0 +1,41 @@
+"""Many runs of a cell: laws from random starts, regions of targets, on all cores or a cluster."""
+
+from vergence.experiments.campaign import run_campaign
+from vergence.experiments.executor import Crew, WorkersLostError
+from vergence.experiments.goal import Aim
+from vergence.experiments.presets import OWN, PRESETS, law_table, usual_laws
+from vergence.experiments.region import heading_trials, place_trials
+from vergence.experiments.results_file import RESULTS, Ledger
+from vergence.experiments.run_trial import run_trial, run_trials
+from vergence.experiments.sampling import Draws
+from vergence.experiments.score import Score, scores
+from vergence.experiments.source import CellSource
+from vergence.experiments.starts import start_trials
+from vergence.experiments.trial import Ending, Trial, TrialResult
+from vergence.experiments.truth_trace import TrialTrace
+
+__all__ = [
+    "Aim",
+    "CellSource",
+    "Crew",
+    "Draws",
+    "Ending",
+    "Ledger",
+    "OWN",
+    "PRESETS",
+    "RESULTS",
+    "Score",
+    "Trial",
+    "TrialResult",
+    "TrialTrace",
+    "WorkersLostError",
+    "heading_trials",
+    "law_table",
+    "place_trials",
+    "run_campaign",
+    "run_trial",
+    "run_trials",
+    "scores",
+    "start_trials",
+    "usual_laws",
+]

@@ -1,0 +1,46 @@
+"""A run on an arm that moves exactly as it is told, before exact projections."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control import Law
+from vergence.estimation import ExactPoints
+from vergence.planning import FixedReference
+from vergence.runtime.loop import Loop, Patience
+from vergence.runtime.recording import Listener
+from vergence.signals import Outcome, Reference
+from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation.ideal_driver import ARM, CAMERA
+
+
+@dataclass(frozen=True, slots=True)
+class IdealRun:
+    """One run: by itself in the loop, or among many in `run_batch`, with the same result."""
+
+    cell: IdealCell
+    law: Law  # of its own: a law remembers
+    wanted_px: FloatArray  # (M, 2) where the features are to be
+    duration_s: float
+    noise_px: float = 0.0  # standard deviation on each coordinate
+    patience: Patience = field(default_factory=Patience)
+
+    def noise(self) -> np.random.Generator:
+        """Return what draws the noise."""
+        return np.random.default_rng([self.cell.seed, 3])
+
+    def in_loop(self, listeners: Sequence[Listener] = ()) -> Outcome:
+        """Make the run in the loop; return how it ended."""
+        loop = Loop(
+            IdealDriver(self.cell),
+            ARM,
+            ExactPoints(CAMERA, self.noise_px, self.noise()),
+            FixedReference(Reference(0.0, self.wanted_px)),
+            self.law,
+            outer_rate_hz=self.cell.rate_hz,
+            listeners=listeners,
+            patience=self.patience,
+        )
+        return loop.run(self.duration_s)

@@ -1,0 +1,134 @@
+"""Who runs the trials: this process, processes of this machine, or a cluster."""
+
+import logging
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from vergence.cell import Cell
+from vergence.errors import InputError, VergenceError
+from vergence.experiments.kinematic import is_quick
+from vergence.experiments.run_trial import run_trials
+from vergence.experiments.source import CellSource
+from vergence.experiments.trial import Trial, TrialResult
+
+_CONNECT_S = 10
+_CHUNK = 256  # quick trials handed out at once: about a second of one core
+_SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
+
+
+class WorkersLostError(VergenceError):
+    """Nobody is left to do some trials, or nobody survives them."""
+
+    def __init__(self, trials: Sequence[Trial], what: str) -> None:
+        first, more = trials[0].key, len(trials) - 1
+        runs = f"run {first} and {more} more" if more else f"run {first}"
+        super().__init__(f"{runs}: {what}")
+
+
+@dataclass(frozen=True, slots=True)
+class Crew:
+    """How many processes of this machine, or which scheduler's workers."""
+
+    workers: int | None = None  # every core's if None; 1 is this process
+    scheduler: str | None = None  # address of a Dask scheduler, such as tcp://10.0.0.1:8786
+
+    def run(
+        self,
+        source: CellSource,
+        trials: Sequence[Trial],
+        tolerance_px: float,
+        physics: bool = False,
+    ) -> Iterator[TrialResult]:
+        """Yield results as they come, in any order.
+
+        Trials of a worker that dies are given to another. Without a scheduler quick trials run in
+        this process, on as many cores: a thousand of them take less than processes to start.
+
+        Raises:
+            InputError: if there is no scheduler at the address.
+            WorkersLostError: if every worker dies that is given the same trials.
+        """
+        count = self.workers or os.cpu_count() or 1
+        quick, slow = _by_pace(source, trials, physics)
+        if self.scheduler is None:
+            for some in quick:
+                yield from run_trials(source, some, tolerance_px, physics, count)
+            quick = []
+        tasks = [*quick, *slow]
+        if self.scheduler is None and min(count, len(tasks)) <= 1:
+            for some in tasks:
+                yield from run_trials(source, some, tolerance_px, physics)
+        else:
+            yield from self._distribute(source, tasks, tolerance_px, physics, count)
+
+    def _distribute(
+        self,
+        source: CellSource,
+        tasks: Sequence[Sequence[Trial]],
+        tolerance_px: float,
+        physics: bool,
+        count: int,
+    ) -> Iterator[TrialResult]:
+        distributed: Any = import_module("distributed")
+        with self._client(min(count, len(tasks))) as client:
+            given = {
+                client.submit(run_trials, source, task, tolerance_px, physics, pure=False): task
+                for task in tasks
+            }
+            for future in distributed.as_completed(given):
+                try:
+                    yield from future.result()
+                except distributed.scheduler.KilledWorker as error:
+                    count = error.allowed_failures + 1
+                    what = f"every worker that took it was killed, {count} in all; out of memory?"
+                    raise WorkersLostError(given[future], what) from None
+                except distributed.client.FutureCancelledError:
+                    raise WorkersLostError(given[future], "the scheduler is gone") from None
+
+    @contextmanager
+    def _client(self, count: int) -> Iterator[Any]:
+        distributed: Any = import_module("distributed")
+        if self.scheduler is not None:
+            try:
+                client = distributed.Client(self.scheduler, timeout=_CONNECT_S)
+            except (OSError, TimeoutError, ValueError) as error:
+                given = f"{self.scheduler} ({error})"
+                raise InputError("--scheduler", "", given, _SCHEDULER) from None
+            with client:
+                yield client
+            return
+        with (
+            distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",  # any free port
+                silence_logs=logging.ERROR,
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+
+
+def _by_pace(
+    source: CellSource, trials: Sequence[Trial], physics: bool
+) -> tuple[list[tuple[Trial, ...]], list[tuple[Trial, ...]]]:
+    """Return trials for the batch kernel, by the chunk, and all others, one at a time."""
+    cell = source.load()
+    quick: list[Trial] = []
+    slow: list[Trial] = []
+    for trial in trials:
+        (slow if physics or not _is_quick(cell, trial) else quick).append(trial)
+    chunks = [tuple(quick[i : i + _CHUNK]) for i in range(0, len(quick), _CHUNK)]
+    return chunks, [(trial,) for trial in slow]
+
+
+def _is_quick(cell: Cell, trial: Trial) -> bool:
+    try:
+        return is_quick(cell.replace(**trial.changes))
+    except InputError:  # becomes its result
+        return False

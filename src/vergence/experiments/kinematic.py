@@ -1,0 +1,103 @@
+"""Cells that need no physics: an arm that moves as it is told, and nothing else that moves it."""
+
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.assembly import assemble_parts
+from vergence.cell import Cell
+from vergence.cell.joint_positions import joint_positions
+from vergence.cell.schema import OptimalTrackingTable
+from vergence.experiments.batch import IdealRun
+from vergence.geometry import transform_points
+from vergence.runtime.loop import Patience
+from vergence.signals import Outcome
+from vergence.simulation import IdealCell, SimulatedDriver, target_poses
+from vergence.simulation.ideal_driver import Sees
+
+
+def is_ideal(cell: Cell) -> bool:
+    """Tell whether a cell is one arm that tracks known features with the one camera it carries."""
+    camera = cell.cameras[cell.task.camera]
+    return (
+        cell.task.kind == "track"
+        and len(cell.arms) == len(cell.cameras) == 1
+        and camera.arm == cell.task.arm
+        and not camera.blind_s
+        and cell.target.features is not None
+        and cell.target.carried_by is None
+        and cell.arms[cell.task.arm].motion is None
+    )
+
+
+def is_quick(cell: Cell) -> bool:
+    """Tell whether the batch kernel is likely to know its law."""
+    law = cell.law
+    return is_ideal(cell) and isinstance(law, OptimalTrackingTable) and law.flow_smoothing_s is None
+
+
+class IdealBench:
+    """Makes ideal runs of cells; those with the same models share one compiled world."""
+
+    def __init__(self) -> None:
+        self._key = ""
+        self._driver: SimulatedDriver | None = None
+
+    def run_of(self, cell: Cell) -> IdealRun:
+        """Return the run of a cell that `is_ideal`.
+
+        Raises:
+            InputError: if the cell cannot be run as it is written.
+        """
+        driver = self._driver_of(cell)
+        arm, camera = cell.task.arm, cell.task.camera
+        poses = target_poses(cell.target, cell.target.motion, cell.seed)
+        given = cell.arms[arm].start_deg
+        start = joint_positions(cell, f"arms.{arm}.start_deg", given, driver.arms[arm])
+        driver.world.move_target(poses(np.zeros(1))[0])
+        driver.world.place_arm(arm, start)
+        parts = assemble_parts(cell, driver, images=False)
+        assert not isinstance(parts, Outcome)
+        wanted = parts.planner.reference(0.0).points_px
+        assert wanted is not None
+        table = cell.cameras[camera]
+        ideal = IdealCell(
+            driver.world.arm_to_camera(camera),
+            driver.cameras[camera],
+            start,
+            poses,
+            driver.features,
+            rate_hz=table.rate_hz,
+            inner_rate_hz=cell.inner_rate_hz,
+            latency_frames=table.latency_frames,
+            seed=cell.seed,
+            sees=_eyesight(driver, arm, camera),
+        )
+        patience = Patience(cell.task.image_timeout_s, cell.task.target_timeout_s)
+        return IdealRun(ideal, parts.law, wanted, cell.duration_s, patience=patience)
+
+    def _driver_of(self, cell: Cell) -> SimulatedDriver:
+        key = cell.model_dump_json(exclude=_apart_from(cell))
+        if self._driver is None or key != self._key:
+            self._driver, self._key = SimulatedDriver(cell, images=False), key
+        return self._driver
+
+
+def _eyesight(driver: SimulatedDriver, arm: str, camera: str) -> Sees:
+    """Return what tells which features no surface hides."""
+    world, features = driver.world, driver.features
+
+    def sees(q: FloatArray, T_world_target: FloatArray) -> BoolArray:
+        world.move_target(T_world_target)
+        world.place_arm(arm, q)
+        return world.sees(camera, transform_points(T_world_target, features))
+
+    return sees
+
+
+def _apart_from(cell: Cell) -> dict[str, Any]:
+    """Return what of a cell is not in its world, or is set in it at each run's start."""
+    arms = {name: {"start_deg"} for name in cell.arms}
+    rest = dict.fromkeys(("law", "laws", "task", "duration_s", "seed"), True)
+    return {"arms": arms, "target": {"motion"}, **rest}

@@ -1,0 +1,139 @@
+"""Trials, in whatever process."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vergence.assembly.run_cell import run_cell
+from vergence.camera import picture_times
+from vergence.cell import Cell
+from vergence.errors import InputError
+from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
+from vergence.experiments.evaluation import Sight, trial_result
+from vergence.experiments.kinematic import IdealBench, is_ideal
+from vergence.experiments.source import CellSource
+from vergence.experiments.trial import Ending, Trial, TrialResult
+from vergence.experiments.truth_trace import TrialTrace
+from vergence.signals import Outcome, OutcomeKind
+from vergence.simulation.ideal_driver import CAMERA
+
+
+def run_trials(
+    source: CellSource,
+    trials: Sequence[Trial],
+    tolerance_px: float,
+    physics: bool = False,
+    threads: int | None = 1,
+) -> list[TrialResult]:
+    """Run trials on exact projections; the same arguments give the same results anywhere.
+
+    Where the cell is one arm with one camera it moves exactly as it is told: in the batch kernel
+    if that knows the law, else in the loop. Any other cell runs in simulated physics.
+
+    Args:
+        source: of the cell.
+        trials: what to change in it, each time.
+        tolerance_px: up to which error of the farthest feature a run has converged.
+        physics: whether to simulate physics for every cell.
+        threads: cores for the batch kernel; every core if None.
+
+    Raises:
+        KeyboardInterrupt: if the user stopped it.
+    """
+    cell, bench = source.load(), IdealBench()
+    results: dict[str, TrialResult] = {}
+    waiting: list[tuple[Trial, IdealRun]] = []
+    for trial in trials:
+        try:
+            changed = cell.replace(**trial.changes)
+            if physics or not is_ideal(changed):
+                results[trial.key] = _in_physics(changed, trial, tolerance_px)
+                continue
+            run = bench.run_of(changed)
+        except InputError as error:
+            results[trial.key] = _refused(trial, str(error))
+            continue
+        if covers(run):
+            waiting.append((trial, run))
+        else:
+            results[trial.key] = _in_loop(run, trial, tolerance_px)
+    traces = run_batch([run for _, run in waiting], threads)
+    for (trial, run), trace in zip(waiting, traces, strict=True):
+        made = _in_loop(run, trial, tolerance_px) if _hidden(run, trace) else None
+        results[trial.key] = made or _of_batch(run, trace, trial, tolerance_px)
+    return [results[trial.key] for trial in trials]
+
+
+def run_trial(
+    source: CellSource, trial: Trial, tolerance_px: float, physics: bool = False
+) -> TrialResult:
+    """Run one trial; see `run_trials`."""
+    return run_trials(source, [trial], tolerance_px, physics)[0]
+
+
+def _in_physics(cell: Cell, trial: Trial, tolerance_px: float) -> TrialResult:
+    trace = TrialTrace(cell.task.camera)
+    outcome = run_cell(cell, [trace], images=False).outcome
+    return trace.result(trial, _not_stopped(outcome), tolerance_px)
+
+
+def _in_loop(run: IdealRun, trial: Trial, tolerance_px: float) -> TrialResult:
+    trace = TrialTrace(CAMERA, run.cell.camera)
+    outcome = run.in_loop([trace])
+    return trace.result(trial, _not_stopped(outcome), tolerance_px)
+
+
+def _of_batch(run: IdealRun, trace: BatchTrace, trial: Trial, tolerance_px: float) -> TrialResult:
+    camera, count = run.cell.camera, len(trace.times)
+    inside = camera.contains(trace.points_px.reshape(-1, 2))
+    sight = Sight(
+        trace.times,
+        trace.points_px,
+        inside.reshape(count, -1),
+        np.broadcast_to(run.wanted_px, trace.points_px.shape),
+        trace.camera_m,
+        trace.target_m,
+    )
+    return trial_result(trial, trace.outcome, sight, camera, tolerance_px)
+
+
+def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
+    """Tell whether on the way something hid a feature for as long as the loop is patient.
+
+    The kernel knows of no surfaces; such a run is made again, in the loop.
+    """
+    cell = run.cell
+    assert cell.sees is not None
+    step = max(1, int(run.patience.target_s * cell.rate_hz))
+    times = picture_times(len(trace.position), cell.inner_rate_hz, cell.rate_hz)
+    poses = cell.target(times[::step])
+    return any(
+        not cell.sees(q, T).all() for q, T in zip(trace.position[::step], poses, strict=True)
+    )
+
+
+def _not_stopped(outcome: Outcome) -> Outcome:
+    if outcome.kind is OutcomeKind.STOPPED:  # no result of the trial, but Ctrl-C
+        raise KeyboardInterrupt
+    return outcome
+
+
+def _refused(trial: Trial, reason: str) -> TrialResult:
+    nowhere = (0.0, 0.0, 0.0)
+    return TrialResult(
+        trial.key,
+        trial.labels,
+        Ending.REFUSED,
+        reason,
+        0.0,
+        None,
+        None,
+        None,
+        0.0,
+        0.0,
+        False,
+        nowhere,
+        nowhere,
+        nowhere[:2],
+        nowhere[:2],
+    )

@@ -1,0 +1,40 @@
+"""Trials that hold laws against each other."""
+
+from collections.abc import Sequence
+
+from vergence.cell import Cell
+from vergence.experiments.goal import Aim, merged
+from vergence.experiments.presets import law_table
+from vergence.experiments.sampling import Draws
+from vergence.experiments.trial import Trial
+
+
+def start_trials(
+    cell: Cell, laws: Sequence[str], count: int, seed: int, draws: Draws | None = None
+) -> list[Trial]:
+    """Return the trials that hold laws against each other: each law from the same draws.
+
+    All aim at the picture, or the pose, that the cell as it is written aims at.
+
+    Args:
+        cell: the cell.
+        laws: names, see `law_table`.
+        count: how many draws.
+        seed: of them.
+        draws: what is drawn; the arm's starts if None.
+
+    Raises:
+        InputError: if there is no such law, or nothing to begin with.
+    """
+    tables = {name: law_table(cell, name) for name in laws}
+    aim = Aim.of(cell)
+    drawn = (draws or Draws()).changes(cell, aim, count, seed)
+    return [
+        Trial(
+            f"{law}/{number}",
+            merged(aim.tables, {"law": table}, changes),
+            {"law": law, "start": number},
+        )
+        for law, table in tables.items()
+        for number, changes in enumerate(drawn)
+    ]

@@ -1,0 +1,185 @@
+"""What is written of a run, and where in the file."""
+
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.camera import Camera
+from vergence.geometry import se3_inverse, transform_points
+from vergence.places import CELL, RECORDING
+from vergence.runtime.recording import messages, streams
+from vergence.runtime.recording.mcap_file import McapFile
+from vergence.runtime.recording.numbers import finite
+from vergence.runtime.recording.run_info import RunInfo
+from vergence.runtime.recording.tick import TickRecord
+from vergence.signals import Frame, ImagePoints, Outcome
+
+SUMMARY = "summary.json"
+
+_FLUSH_PERIOD = 1.0  # s of the run that a killed process may lose
+
+
+class Tape:
+    """The open recording of one run.
+
+    Numbers go to JSON streams of our own (`streams`), pictures, marks, joints, poses and events
+    to Foxglove's types (`messages`). Every second of the run the file is brought up to date, so
+    that it can be read up to there whatever happens to the process.
+    """
+
+    def __init__(self, folder: Path, info: RunInfo, image_every: int, jpeg_quality: int) -> None:
+        self._folder = folder
+        self._info = info
+        self._image_every = image_every
+        self._jpeg_quality = jpeg_quality
+        self._pictures = dict.fromkeys(info.cameras, 0)
+        self._flushed = 0.0
+        self.now = 0.0  # s, of the last thing recorded
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / SUMMARY).unlink(missing_ok=True)  # of an earlier run
+        (folder / CELL).write_text(info.text, encoding="utf-8")
+        self._file = McapFile(folder / RECORDING)
+        self._introduce()
+        _warm_up()
+
+    def tick(self, record: TickRecord) -> None:
+        """Record one turn of the loop."""
+        self.now = record.time
+        for arm in record.sample.joints:
+            self._record_arm(record, arm)
+        for frame, view in _paired(record):
+            if frame is not None:
+                self._record_picture(frame)
+            self._record_points(record, frame, view)
+        self._record_target(record)
+        if record.time - self._flushed >= _FLUSH_PERIOD:
+            self._file.flush()
+            self._flushed = record.time
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Record something that happened once."""
+        self.now = max(self.now, time)
+        self._file.typed("/events", self.now, messages.log(time, name, text))
+
+    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
+        """Record the end and close the file."""
+        kind, reason, values = outcome.kind.value, outcome.reason, finite(summary)
+        words = {"kind": kind, "reason": reason, "time": repr(outcome.time)}
+        self._file.metadata("outcome", {**words, "summary": json.dumps(values)})
+        self._file.close()
+        end = {"kind": kind, "reason": reason, "time": outcome.time}
+        result = {"cell": self._info.cell, "outcome": end, "summary": values}
+        (self._folder / SUMMARY).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+
+    def _introduce(self) -> None:
+        info = json.dumps(self._info.as_json())
+        words = {"version": version("vergence"), "info": info, "text": self._info.text}
+        self._file.metadata("vergence", words)
+        for name, camera in self._info.cameras.items():
+            topic = f"/camera/{name}/calibration"
+            self._file.typed(topic, 0.0, messages.calibration(name, camera))
+        self._file.flush()
+
+    def _record_arm(self, record: TickRecord, arm: str) -> None:
+        state = record.sample.joints[arm]
+        row = streams.arm_message(record.time, state, record.commands.get(arm))
+        self._file.numbers(f"/arm/{arm}/state", self.now, streams.ARM_SCHEMA, row)
+        names = self._info.arms[arm].names
+        joints = messages.joints(state.time, names, state.position, state.velocity)
+        self._file.typed(f"/arm/{arm}/joints", self.now, joints)
+
+    def _record_points(
+        self, record: TickRecord, frame: Frame | None, view: ImagePoints | None
+    ) -> None:
+        camera, time = _source(frame, view)
+        desired, wanted = self._wanted(record, camera)
+        if desired is None and wanted is not None:
+            desired = _shown(wanted, frame, view, self._info.cameras[camera])
+        row = streams.features_message(record.time, frame, view, desired, wanted)
+        self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, row)
+        truth = frame.truth if frame is not None else None
+        marks = messages.annotations(time, view, desired, truth.points_px if truth else None)
+        self._file.typed(f"/camera/{camera}/annotations", self.now, marks)
+        if truth is not None:
+            poses = {camera: truth.T_world_camera}
+            if camera == self._info.task_camera:  # another may look at a tool
+                poses["target"] = truth.T_world_target
+            self._file.typed("/tf", self.now, messages.transforms(time, poses))
+
+    def _wanted(
+        self, record: TickRecord, camera: str
+    ) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return the wanted points and the wanted pose of the target that this camera is about."""
+        if record.reference is None:
+            return None, None
+        if camera != self._info.task_camera:
+            return record.reference.elsewhere_px.get(camera), None
+        return record.reference.points_px, record.reference.T_camera_target
+
+    def _record_picture(self, frame: Frame) -> None:
+        count = self._pictures.get(frame.camera, 0)
+        self._pictures[frame.camera] = count + 1
+        if frame.image is None or not self._image_every or count % self._image_every:
+            return
+        picture = messages.image(frame.camera, frame.time, _jpeg(frame.image, self._jpeg_quality))
+        self._file.typed(f"/camera/{frame.camera}/image", self.now, picture)
+
+    def _record_target(self, record: TickRecord) -> None:
+        target = record.observation.target if record.observation else None
+        if target is None:
+            return
+        row = streams.target_message(target)
+        self._file.numbers("/target", self.now, streams.TARGET_SCHEMA, row)
+        poses = {"target estimate": target.T_world_target}
+        self._file.typed("/tf", self.now, messages.transforms(target.time, poses))
+
+
+def _shown(
+    T_camera_target: FloatArray, frame: Frame | None, view: ImagePoints | None, camera: Camera
+) -> FloatArray | None:
+    """Return where the points that were looked for would be at a wanted pose, (M, 2) px.
+
+    Where they are on the target is only known of a simulated picture.
+    """
+    truth = frame.truth if frame is not None else None
+    if truth is None or view is None:
+        return None
+    rays = np.column_stack((camera.normalize(truth.points_px), np.ones(len(truth.depth_m))))
+    T_target_camera = se3_inverse(truth.T_world_target) @ truth.T_world_camera
+    T = np.ascontiguousarray(T_camera_target @ T_target_camera)
+    places: FloatArray = camera.project(transform_points(T, rays * truth.depth_m[:, None]))
+    return np.where(view.asked[:, None], places, np.nan)
+
+
+def _paired(record: TickRecord) -> list[tuple[Frame | None, ImagePoints | None]]:
+    """Return each picture with what was measured in it; either may be missing."""
+    views = record.observation.views if record.observation else ()
+    measured = {(view.camera, view.time): view for view in views}
+    pairs: list[tuple[Frame | None, ImagePoints | None]] = [
+        (frame, measured.pop((frame.camera, frame.time), None)) for frame in record.sample.frames
+    ]
+    return pairs + [(None, view) for view in measured.values()]
+
+
+def _source(frame: Frame | None, view: ImagePoints | None) -> tuple[str, float]:
+    """Return the camera and the time of exposure."""
+    taken = frame if frame is not None else view
+    assert taken is not None
+    return taken.camera, taken.time
+
+
+def _warm_up() -> None:
+    """Load and compile what the first tick would otherwise wait for."""
+    messages.transforms(0.0, {"": np.eye(4)})
+    _jpeg(np.zeros((8, 8), dtype=np.uint8), 50)
+
+
+def _jpeg(image: ImageArray, quality: int) -> bytes:
+    import cv2
+
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return data.tobytes()

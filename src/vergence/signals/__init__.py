@@ -1,0 +1,24 @@
+"""What flows along the loop, and nothing else: frames, observations, references, commands."""
+
+from vergence.signals.command import JointCommand
+from vergence.signals.frame import Frame, FrameTruth
+from vergence.signals.joints import JointState, Sample, Setpoint
+from vergence.signals.observation import ImagePoints, Observation, SearchWindows, TargetState
+from vergence.signals.outcome import Outcome, OutcomeKind
+from vergence.signals.reference import Reference
+
+__all__ = [
+    "Frame",
+    "FrameTruth",
+    "ImagePoints",
+    "JointCommand",
+    "JointState",
+    "Observation",
+    "Outcome",
+    "OutcomeKind",
+    "Reference",
+    "Sample",
+    "SearchWindows",
+    "Setpoint",
+    "TargetState",
+]

@@ -1,0 +1,22 @@
+"""What a law asks of an arm."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vergence.arrays import FloatArray
+from vergence.signals.outcome import OutcomeKind
+
+
+@dataclass(frozen=True, slots=True)
+class JointCommand:
+    """Joint rates for the next outer period, and how the law came to them."""
+
+    velocity: FloatArray  # (n,) rad/s or m/s
+    # (6,) the camera twist these rates were made from, m/s and rad/s; of a fixed camera that looks
+    # at the hand, its twist as seen from there.
+    v_camera: FloatArray
+    manipulability: float = float("nan")  # w'(q) of [Nelson1995] eq. (26), SI units
+    penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
+    active: tuple[str, ...] = field(default=())  # constraints that shaped the command
+    fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
+    given_up: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much

@@ -1,0 +1,37 @@
+"""Where an arm is, and where it should be."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vergence.arrays import FloatArray, frozen
+from vergence.signals.frame import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """Joint positions and velocities at one instant."""
+
+    time: float  # s
+    position: FloatArray  # (n,) rad, m for sliding joints
+    velocity: FloatArray  # (n,) rad/s or m/s
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", frozen(self.position, (None,), "position"))
+        object.__setattr__(self, "velocity", frozen(self.velocity, (None,), "velocity"))
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """Where an arm's joints should be now, and how fast they should move."""
+
+    position: FloatArray  # (n,) rad or m
+    velocity: FloatArray  # (n,) rad/s or m/s
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a cell has to say at one instant."""
+
+    time: float  # s since the start of the run
+    joints: Mapping[str, JointState]  # of every arm, by name
+    frames: tuple[Frame, ...]  # the pictures that arrived since the last sample, oldest first

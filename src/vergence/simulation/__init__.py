@@ -1,0 +1,25 @@
+"""The cell in simulation: world, rendering, simulated and kinematic drivers, target motions."""
+
+from vergence.simulation.ideal_driver import IdealCell, IdealDriver
+from vergence.simulation.motion import (
+    TargetPose,
+    TargetPoses,
+    placement_pose,
+    target_pose,
+    target_poses,
+)
+from vergence.simulation.renderer import CameraRenderer, choose_renderer
+from vergence.simulation.simulated_driver import SimulatedDriver
+
+__all__ = [
+    "CameraRenderer",
+    "IdealCell",
+    "IdealDriver",
+    "SimulatedDriver",
+    "TargetPose",
+    "TargetPoses",
+    "choose_renderer",
+    "placement_pose",
+    "target_pose",
+    "target_poses",
+]

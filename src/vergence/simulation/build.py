@@ -1,0 +1,176 @@
+"""From a cell file to MuJoCo's description: arms with servos, cameras with lenses, the target."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from vergence.camera import Camera
+from vergence.cell.cell import Cell
+from vergence.cell.locate import locate_model
+from vergence.cell.schema import ArmTable, CameraTable, Placement
+from vergence.errors import InputError, nearest
+from vergence.geometry import matrix_to_quaternion
+from vergence.robot.urdf import read_urdf
+from vergence.simulation.motion import placement_pose
+
+FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
+_ROOM = Path(__file__).with_name("scene.xml")
+
+
+def assemble(cell: Cell) -> Any:
+    """Return the MjSpec of a cell; everything of arm A is named "A/…", of the target "target/…"."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = 1.0 / cell.inner_rate_hz
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.visual.quality.offsamples = 0
+    spec.visual.map.znear = 0.01
+    spec.stat.extent = 1.0
+    spec.visual.headlight.active = 0
+    rendered = [_rendered(cell, name) for name in cell.cameras]
+    spec.visual.global_.offwidth = max(camera.width for camera in rendered)
+    spec.visual.global_.offheight = max(camera.height for camera in rendered)
+    room = cell.scene.model or _ROOM
+    spec.attach(_read(cell, "scene.model", room), frame=spec.worldbody.add_frame(), prefix="scene/")
+    for light in spec.lights:
+        light.diffuse = light.diffuse * cell.scene.light
+        light.ambient = light.ambient * cell.scene.light
+    for name, arm in cell.arms.items():
+        _add_arm(spec, cell, name, arm)
+    for name, camera in cell.cameras.items():
+        _add_camera(spec, cell, name, camera)
+    _add_target(spec, cell)
+    if cell.tool is not None:
+        model = _read(cell, "task.tool.model", cell.tool.model)
+        spec.attach(
+            model, frame=_held(spec, cell, "tool", model, cell.tool, cell.task.arm), prefix="tool/"
+        )
+    return spec
+
+
+def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, arm: str) -> Any:
+    """Return the frame in an arm's last body to attach a model to, its weight compensated."""
+    for body in model.bodies:
+        body.gravcomp = 1.0
+    holder = spec.body(f"{arm}/{cell.arms[arm].body}").add_body(name=name)
+    _place(holder, placement)
+    return holder.add_frame()
+
+
+def _add_target(spec: Any, cell: Cell) -> None:
+    """Attach the target to the arm that carries it, else to a body that is moved about."""
+    model = _read(cell, "target.model", cell.target.model)
+    arm = cell.target.carried_by
+    if arm is None:
+        frame = spec.worldbody.add_body(name="target", mocap=True).add_frame()
+    else:
+        frame = _held(spec, cell, "target", model, cell.target, arm)
+    spec.attach(model, frame=frame, prefix="target/")
+
+
+def _read(cell: Cell, key: str, model: Path, last_body: str | None = None) -> Any:
+    path = locate_model(model, cell.path.parent, str(cell.path), key)
+    if not path.is_file():
+        raise InputError(str(cell.path), key, path, "an MJCF or URDF file that exists")
+    if path.suffix.lower() == ".urdf":
+        return read_urdf(path, last_body)
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise InputError(str(cell.path), key, f"{path}: {error}", "a model MuJoCo reads") from None
+
+
+def _place(element: Any, placement: Placement, camera: bool = False) -> None:
+    T = placement_pose(placement)
+    element.pos = T[:3, 3]
+    R = T[:3, :3] @ FROM_MUJOCO_CAMERA if camera else T[:3, :3]
+    element.quat = matrix_to_quaternion(np.ascontiguousarray(R))
+
+
+def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
+    """Attach an arm and give every joint towards its last body a position servo.
+
+    The arm's weight is compensated, as a robot's own controller does.
+    """
+    model = _read(cell, f"arms.{name}.model", table.model, table.body)
+    for key in list(model.keys):
+        model.delete(key)
+    bodies = {body.name: body for body in model.bodies}
+    if table.body not in bodies:
+        allowed = nearest(table.body, (b for b in bodies if b and b != "world"))
+        raise InputError(str(cell.path), f"arms.{name}.body", table.body, allowed)
+    joints = named_joints(bodies[table.body])
+    for actuator in list(model.actuators):
+        if actuator.target in joints:
+            model.delete(actuator)
+    for body in model.bodies:
+        body.gravcomp = 1.0
+    frame = spec.worldbody.add_frame()
+    _place(frame, table)
+    spec.attach(model, frame=frame, prefix=f"{name}/")
+    for joint in joints:
+        servo = spec.add_actuator(
+            name=f"{name}/{joint}",
+            target=f"{name}/{joint}",
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        )
+        servo.set_to_position(kp=1.0, kv=1.0)
+
+
+def named_joints(last_body: Any) -> list[str]:
+    """Return the names of the joints that move a body, base first; those without get one."""
+    joints: list[Any] = []
+    body = last_body
+    while body is not None and body.name != "world":
+        joints[:0] = body.joints
+        body = body.parent
+    for number, joint in enumerate(joints, start=1):
+        joint.name = joint.name or f"joint{number}"
+    return [joint.name for joint in joints]
+
+
+def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
+    camera = _rendered(cell, name)
+    body = spec.worldbody
+    if table.arm is not None:
+        wanted = table.body or cell.arms[table.arm].body
+        body = spec.body(f"{table.arm}/{wanted}")
+        if body is None:
+            known = (b.name.removeprefix(f"{table.arm}/") for b in spec.bodies)
+            raise InputError(str(cell.path), f"cameras.{name}.body", wanted, nearest(wanted, known))
+    element = body.add_camera(name=name)
+    _place(element, table, camera=True)
+    element.resolution = [camera.width, camera.height]
+    # MuJoCo wants a sensor of some size: one metre a pixel keeps its numbers equal to ours.
+    element.sensor_size = [camera.width, camera.height]
+    element.focal_pixel = [camera.fx, camera.fy]
+    # Its principal offset counts leftwards and upwards: seen by where a rendered disc falls.
+    element.principal_pixel = [
+        (camera.width - 1) / 2 - camera.cx,
+        (camera.height - 1) / 2 - camera.cy,
+    ]
+
+
+def intrinsics(table: CameraTable) -> Camera:
+    """Return the camera that a table describes."""
+    width, height = table.resolution
+    if table.focal_px is not None:
+        fx, fy = table.focal_px
+    else:
+        assert table.focal_mm is not None
+        assert table.pixel_um is not None
+        fx, fy = (table.focal_mm * 1e3 / size for size in table.pixel_um)
+    cx, cy = table.principal_px or ((width - 1) / 2, (height - 1) / 2)
+    distortion = np.zeros(5)
+    distortion[: len(table.distortion)] = table.distortion
+    return Camera(width, height, fx, fy, cx, cy, distortion)
+
+
+def _rendered(cell: Cell, name: str) -> Camera:
+    """Return the camera that MuJoCo draws for one of a cell; its pictures are distorted after."""
+    try:
+        return intrinsics(cell.cameras[name]).undistorted()
+    except InputError as error:
+        key = f"cameras.{name}.{error.key}"
+        raise InputError(str(cell.path), key, error.given, error.allowed) from None

@@ -1,0 +1,118 @@
+"""A cell without physics and without images: for thousands of runs."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.camera import Camera, picture_tick
+from vergence.geometry import se3_inverse, transform_points
+from vergence.robot import Arm
+from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
+from vergence.simulation.motion import TargetPoses
+
+ARM, CAMERA = "arm", "camera"
+
+# From joint positions (n,) and T_world_target (4, 4) to the features that nothing hides, (M,).
+Sees = Callable[[FloatArray, FloatArray], BoolArray]
+
+
+@dataclass(frozen=True, slots=True)
+class IdealCell:
+    """One arm that carries one camera, and a target in free space."""
+
+    arm: Arm  # up to the camera
+    camera: Camera
+    start: FloatArray  # (n,) joint positions
+    target: TargetPoses  # poses at times
+    features: FloatArray  # (M, 3) in the target's frame, m
+    rate_hz: float = 30.0  # of the camera
+    inner_rate_hz: float = 120.0  # at which set-points come
+    latency_frames: int = 0
+    dropped: float = 0.0  # share of the pictures that never arrive
+    seed: int = 0  # of what is dropped
+    sees: Sees | None = None  # what nothing hides; everything if None
+
+
+class IdealDriver:
+    """Moves the joints exactly as told and projects the features exactly.
+
+    It is a driver like any other, so the loop, the guard and the laws that run in it are those that
+    move a real arm.
+    """
+
+    def __init__(self, cell: IdealCell) -> None:
+        self._cell = cell
+        self._rng = np.random.default_rng(cell.seed)
+        self._tick = self._exposed = 0
+        self._position, self._velocity = np.array(cell.start), np.zeros(len(cell.start))
+        self._queue: deque[tuple[int, Frame]] = deque()
+        self._expose()
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arm."""
+        return {ARM: self._cell.arm}
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The camera."""
+        return {CAMERA: self._cell.camera}
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """How often `step` is to be called."""
+        return self._cell.inner_rate_hz
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._tick / self.inner_rate_hz
+
+    def read(self) -> Sample:
+        """Return joints now and the pictures that have arrived since the last call."""
+        frames = []
+        while self._queue and self._queue[0][0] <= self._tick:
+            frames.append(self._queue.popleft()[1])
+        joints = JointState(self.time, self._position, self._velocity)
+        return Sample(self.time, {ARM: joints}, tuple(frames))
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Put the joints where they should be."""
+        self._position = setpoints[ARM].position
+        self._velocity = setpoints[ARM].velocity
+        self._tick += 1
+        if self._tick >= self._tick_of(self._exposed):
+            self._expose()
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def frame(self) -> Frame:
+        """Return what the camera sees now."""
+        return Frame(CAMERA, self.time, None, {ARM: self._position}, self._truth())
+
+    def _expose(self) -> None:
+        arrival = self._tick_of(self._exposed + self._cell.latency_frames)
+        self._exposed += 1
+        if self._rng.random() >= self._cell.dropped:
+            self._queue.append((arrival, self.frame()))
+
+    def _tick_of(self, picture: int) -> int:
+        return picture_tick(picture, self._cell.inner_rate_hz, self._cell.rate_hz)
+
+    def _truth(self) -> FrameTruth:
+        cell = self._cell
+        T_world_camera = cell.arm.forward_kinematics(self._position)
+        T_world_target = cell.target(np.array([self.time]))[0]
+        points = transform_points(se3_inverse(T_world_camera) @ T_world_target, cell.features)
+        depth = points[:, 2].copy()
+        in_front = depth > 1e-3
+        points_px = np.full((len(points), 2), np.nan)
+        points_px[in_front] = cell.camera.project(points[in_front])
+        visible = in_front & cell.camera.in_view(points)
+        if cell.sees is not None and visible.any():
+            visible &= cell.sees(self._position, T_world_target)
+        return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)

@@ -1,0 +1,210 @@
+"""The cell in simulation, behind the same border as a real one."""
+
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera, picture_tick
+from vergence.cell.cell import Cell
+from vergence.geometry import se3_inverse, transform_points
+from vergence.robot import Arm
+from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
+from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
+from vergence.simulation.motion import target_pose
+from vergence.simulation.renderer import CameraRenderer, choose_renderer
+
+
+class SimulatedDriver:
+    """Renders the cameras and moves the arms of a cell, in lock-step with the loop.
+
+    Pictures are exposed at the camera's rate and arrive its latency later. With `images` off they
+    carry no image, only the truth, for perception that is exact by construction.
+    """
+
+    def __init__(self, cell: Cell, images: bool = True) -> None:
+        choose_renderer(needed=images)
+        from vergence.simulation.world import World
+
+        self.cell = cell
+        self.world = World(cell)
+        self._pose = target_pose(cell.target, cell.target.motion, cell.seed)
+        features = cell.target.features
+        self._features = np.array(features if features else np.empty((0, 3)), dtype=np.float64)
+        self._tick = 0
+        self._exposed = dict.fromkeys(cell.cameras, 0)
+        self._queue: deque[tuple[int, Frame]] = deque()  # tick of arrival, frame
+        self._renderers = {}
+        if images:
+            self._renderers = {
+                name: CameraRenderer(
+                    self.world.model,
+                    name,
+                    self.world.cameras[name],
+                    table.noise_grey,
+                    np.random.default_rng([cell.seed, 2, number]),
+                )
+                for number, (name, table) in enumerate(cell.cameras.items())
+                if name in cell.watched
+            }
+        self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
+        self.world.move_target(self._pose(0.0))
+        self.world.update()
+        self._expose()
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return self.world.arms
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The cameras by name."""
+        return self.world.cameras
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """The rate of the physics and of the servos."""
+        return self.cell.inner_rate_hz
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._tick / self.cell.inner_rate_hz
+
+    @property
+    def features(self) -> FloatArray:
+        """The features in the target's frame, (M, 3), m."""
+        return self._features
+
+    def look_for(self, features: FloatArray) -> None:
+        """Make points (M, 3) in the target's frame its features; the pictures start afresh."""
+        self._features = np.array(features, dtype=np.float64)
+        self._queue.clear()
+        self._exposed = dict.fromkeys(self._exposed, 0)
+        self._expose()
+
+    def first_frame(self, camera: str) -> Frame:
+        """Return what a camera sees at the start, without its latency."""
+        return self._frame(camera)
+
+    def frame_at(self, camera: str, arm: str, position: FloatArray) -> Frame:
+        """Return what a camera would see if an arm's joints stood at a position, (n,).
+
+        It stands for a picture taken beforehand, by driving there.
+        """
+        now = self.world.joint_position(arm)
+        self.world.place_arm(arm, position)
+        frame = self._frame(camera)
+        self.world.place_arm(arm, now)
+        return frame
+
+    def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
+        """Make image points the target's features: where their rays meet it, (M, 3).
+
+        So the truth is known of features that were picked in the image. A ray that misses the
+        target gives NaN.
+        """
+        T_world_camera = self.world.camera_pose(camera)
+        T_target_world = se3_inverse(self.world.target_pose())
+        points = np.full((len(points_px), 3), np.nan)
+        for j, (x, y) in enumerate(self.cameras[camera].normalize(points_px)):
+            ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
+            ray /= np.linalg.norm(ray)
+            distance, body = self.world.ray(T_world_camera[:3, 3].copy(), ray)
+            if self.world.belongs_to_target(body):
+                met = T_world_camera[:3, 3] + distance * ray
+                points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
+        self.look_for(points)
+        return points
+
+    def read(self) -> Sample:
+        """Return joints now and the pictures that have arrived since the last call."""
+        arrived = []
+        waiting: deque[tuple[int, Frame]] = deque()
+        for arrival, frame in self._queue:
+            if arrival <= self._tick:
+                arrived.append(frame)
+            else:
+                waiting.append((arrival, frame))
+        self._queue = waiting
+        joints = {
+            name: JointState(
+                self.time, self.world.joint_position(name), self.world.joint_velocity(name)
+            )
+            for name in self.arms
+        }
+        return Sample(self.time, joints, tuple(sorted(arrived, key=lambda frame: frame.time)))
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Advance the world by one inner period.
+
+        Arms with a motion of their own follow that, whatever their set-points.
+        """
+        for name, setpoint in setpoints.items():
+            if name not in self._trajectories:
+                self.world.command(name, setpoint.position, setpoint.velocity)
+        for name, trajectory in self._trajectories.items():
+            self.world.command(name, *trajectory.at(self._tick))
+        self._tick += 1
+        self.world.move_target(self._pose(self.time))
+        self.world.step()
+        self._expose()
+
+    def close(self) -> None:
+        """Free the graphics contexts."""
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def _own_motion(self, name: str) -> JointTrajectory:
+        carries = self.cell.target.carried_by == name
+        arm = self.world.arm_to_target() if carries else self.world.arm_to_body(name)
+        return arm_trajectory(self.cell, name, arm, self.world.joint_position(name))
+
+    def _expose(self) -> None:
+        fresh = False
+        for name, table in self.cell.cameras.items():
+            due = self._tick_of(self._exposed[name], table.rate_hz)
+            if self._tick < due:
+                continue
+            if not fresh:
+                self.world.update()
+                fresh = True
+            arrival = self._tick_of(self._exposed[name] + table.latency_frames, table.rate_hz)
+            self._exposed[name] += 1
+            self._queue.append((arrival, self._frame(name)))
+
+    def _tick_of(self, picture: int, rate_hz: float) -> int:
+        return picture_tick(picture, self.inner_rate_hz, rate_hz)
+
+    def _frame(self, camera: str) -> Frame:
+        blind = any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
+        renderer = self._renderers.get(camera)
+        image = None if renderer is None else renderer.take(self.world.data, blind)
+        joints = {name: self.world.joint_position(name) for name in self.arms}
+        return Frame(camera, self.time, image, joints, self._truth(camera, blind))
+
+    def _truth(self, camera: str, blind: bool) -> FrameTruth:
+        T_world_target, features = self._subject(camera)
+        T_world_camera = self.world.camera_pose(camera)
+        T_camera_target = se3_inverse(T_world_camera) @ T_world_target
+        points = transform_points(T_camera_target, features)
+        intrinsics = self.cameras[camera]
+        depth = points[:, 2].copy()
+        in_front = depth > 1e-3
+        points_px = np.full((len(points), 2), np.nan)
+        points_px[in_front] = intrinsics.project(points[in_front])
+        visible = intrinsics.in_view(points) & in_front & np.bool_(not blind)
+        in_sight = np.flatnonzero(visible)
+        if len(in_sight):
+            points_world = transform_points(T_world_target, features[in_sight])
+            visible[in_sight] = self.world.sees(camera, points_world)
+        return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
+
+    def _subject(self, camera: str) -> tuple[FloatArray, FloatArray]:
+        """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""
+        tool = self.cell.tool
+        if tool is None or tool.camera != camera:
+            return self.world.target_pose(), self._features
+        return self.world.tool_pose(), np.array(tool.features)

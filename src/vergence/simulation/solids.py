@@ -1,0 +1,75 @@
+"""What stands about in a cell, as a constrained law keeps it out of its camera's lines of sight."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE, RADIUS
+
+if TYPE_CHECKING:
+    from vergence.simulation.world import World
+
+
+class Solids:
+    """Fixtures and other arms as rounded boxes, where they are now.
+
+    The target is left out, since how it hides itself follows from its own pose, and so is the arm
+    that carries the camera. Floors hide nothing that stands on them. A mesh is taken for the box
+    around it, a cylinder for one with rounded ends.
+
+    Args:
+        world: of the cell.
+        arm: that carries the camera.
+    """
+
+    def __init__(self, world: "World", arm: str) -> None:
+        self._data = world.data
+        own = world.bodies_of(arm)
+        self._geoms = np.array(
+            [
+                geom
+                for geom, body in enumerate(world.model.geom_bodyid)
+                if not (world.belongs_to_target(int(body)) or int(body) in own)
+                and _hides(world.model, geom)
+            ],
+            dtype=np.int64,
+        )
+        self._solids = np.zeros((len(self._geoms), COLUMNS))
+        self._offset = np.zeros((len(self._geoms), 3))  # of the box from the geom's own frame
+        for row, geom in enumerate(self._geoms):
+            half, radius, self._offset[row] = _rounded_box(world.model, geom)
+            self._solids[row, HALF : HALF + 3], self._solids[row, RADIUS] = half, radius
+
+    def __call__(self) -> FloatArray:
+        """Return the solids now, (K, 16); see `vergence.control.sight_lines`."""
+        axes = self._data.geom_xmat[self._geoms]
+        self._solids[:, AXES : AXES + 9] = axes
+        turned = (axes.reshape(-1, 3, 3) @ self._offset[:, :, None])[:, :, 0]
+        self._solids[:, MIDDLE : MIDDLE + 3] = self._data.geom_xpos[self._geoms] + turned
+        return self._solids
+
+
+def _hides(model: Any, geom: int) -> bool:
+    import mujoco
+
+    flat = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    kind = mujoco.mjtGeom(int(model.geom_type[geom]))
+    return kind not in flat and bool(model.geom_rgba[geom, 3] > 0)
+
+
+def _rounded_box(model: Any, geom: int) -> tuple[FloatArray, float, FloatArray]:
+    """Return half the sides of a geom's core, the radius around it, and its middle."""
+    from mujoco import mjtGeom
+
+    size, middle = model.geom_size[geom], np.zeros(3)
+    match mjtGeom(int(model.geom_type[geom])):
+        case mjtGeom.mjGEOM_SPHERE:
+            return np.zeros(3), float(size[0]), middle
+        case mjtGeom.mjGEOM_CAPSULE | mjtGeom.mjGEOM_CYLINDER:
+            return np.array([0.0, 0.0, size[1]]), float(size[0]), middle
+        case mjtGeom.mjGEOM_BOX:
+            return size.copy(), 0.0, middle
+        case _:
+            around = model.geom_aabb[geom]
+            return around[3:].copy(), 0.0, around[:3].copy()
