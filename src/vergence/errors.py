@@ -1,7 +1,9 @@
 """The error tree: a mistake of the caller raises one of these; expected failures are outcomes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+
+_MOST_ECHOED = 200  # characters of what was given that a message repeats
 
 
 class VergenceError(Exception):
@@ -29,8 +31,24 @@ class InputError(VergenceError, ValueError):
 
     def __init__(self, source: str, key: str, given: object, allowed: str) -> None:
         self.source, self.key, self.given, self.allowed = source, key, given, allowed
-        where = f"{source}: {key}" if key else source
-        super().__init__(f"{where}: given {given!s}; allowed: {allowed}")
+        where = f"{source}: {echo(key)}" if key else source
+        super().__init__(f"{where}: given {echo(given)}; allowed: {allowed}")
+
+
+class KeyConflict(InputError):
+    """Two keys of a file that say the same in different ways.
+
+    Args:
+        source: the file.
+        key: the first that has to go.
+        other: with which it cannot be combined.
+        delete: the names of all that have to go.
+    """
+
+    def __init__(self, source: str, key: str, other: str, delete: Sequence[str]) -> None:
+        listing = " and ".join(filter(None, (", ".join(delete[:-1]), delete[-1])))
+        super().__init__(source, key, "a second value", f"{other} alone")
+        self.args = (f"{source}: {key} cannot be combined with {other}; delete {listing}",)
 
 
 class RenderingError(VergenceError):
@@ -39,6 +57,17 @@ class RenderingError(VergenceError):
 
 class DriverSilent(VergenceError):
     """Raised by a driver whose hardware does not answer; the loop ends the run and says why."""
+
+
+def echo(given: object) -> str:
+    """Return what was given on one line of at most 200 printable characters."""
+    try:
+        text = str(given)
+    except ValueError:  # Python writes no whole number of more than 4300 digits
+        text = "a number of thousands of digits"
+    shown = "".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_ECHOED])
+    line = " ".join(shown.split())
+    return line if len(line) <= _MOST_ECHOED else line[: _MOST_ECHOED - 1] + "…"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -79,7 +79,7 @@ def test_a_cell_takes_its_lens_from_a_camera_file(tmp_path: Path) -> None:
 def test_a_camera_file_and_a_lens_of_its_own_contradict_each_other(tmp_path: Path) -> None:
     camera = Camera(800, 600, 901.5, 899.0, 410.0, 290.0)
     path = calibrated_cell(tmp_path, camera, "principal_px = [400, 300]")
-    with pytest.raises(InputError, match="no lens beside calibration") as caught:
+    with pytest.raises(InputError, match=r"cameras\.\w+\.calibration; delete") as caught:
         load_cell(path)
     assert caught.value.key == "cameras.stand.principal_px"
 

@@ -1,4 +1,4 @@
-"""Files that describe a camera: our own tables, OpenCV's, and ROS's camera_info."""
+"""Files that describe a camera: our own tables, and those of ROS, OpenCV, Kalibr and ViSP."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,44 +8,63 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera.distortion import COEFFICIENTS
+from vergence.camera.file_formats import own_table
 from vergence.camera.pinhole import Camera
+from vergence.camera.sensor_window import LARGEST_PX, WINDOW_KEYS, read_window
 from vergence.errors import InputError
-from vergence.tables import numbers, read_table, require_known
+from vergence.tables import KINDS, numbers, read_tables, require_known
 
 _KEYS = ("width", "height", "fx", "fy", "cx", "cy", "distortion")
 _PINHOLE = ("fx", "fy", "cx", "cy")
-# What others call it: a file of camera_info, the message itself in ROS 1 and 2, OpenCV's samples.
-_SIZES = {"width": ("image_width", "width"), "height": ("image_height", "height")}
-_MATRICES = ("camera_matrix", "K", "k", "cameraMatrix")
-_DISTORTIONS = ("distortion_coefficients", "D", "d", "distCoeffs", "dist_coeffs")
-_MODELS = ("plumb_bob", "rational_polynomial")
 
 
 def read_camera(path: Path, width: int | None = None, height: int | None = None) -> Camera:
-    """Read a camera file: TOML, JSON or YAML.
+    """Read a camera file: TOML, JSON, YAML or XML.
 
-    Our own keys are width, height, fx, fy, cx, cy and distortion (k1, k2, p1, p2, k3); a file of
-    OpenCV or of ROS's camera_info has image_width, image_height, camera_matrix and
-    distortion_coefficients, or the keys of the message. Further coefficients, as of the rational
-    model, may stand there if they are zero.
+    Our own keys are width, height, fx, fy, cx, cy and distortion (k1, k2, p1, p2, k3). Read are
+    also files and messages of ROS's camera_info, whose roi and binning change the matrix, OpenCV's
+    matrices, one camera of Kalibr or EuRoC, and ViSP's XML. Further coefficients, as of the
+    rational model, may stand there if they are zero.
 
     Args:
-        path: the file.
-        width: of the pictures it must suit, px; the file has to say it if absent.
-        height: of the pictures.
+        path: the file. Of several YAML documents all have to describe the same camera.
+        width: of the images it must suit, px; the file has to say it if absent.
+        height: of the images.
 
     Raises:
-        InputError: if it cannot be read or does not suit such pictures.
+        InputError: if it cannot be read or does not suit such images.
     """
     source = str(path)
-    table = read_table(path, "a camera")
-    if any(key in table for key in _MATRICES):
-        table = _from_others(table, source)
-    require_known(table, _KEYS, source)
-    size = [
-        _side(table, key, wanted, source) for key, wanted in (("width", width), ("height", height))
-    ]
-    return camera_of(table, size[0], size[1], source)
+    tables = read_tables(path, "a camera", (*KINDS, ".xml"))
+    cameras = [_camera(own_table(table, source), width, height, source) for table in tables]
+    if any(not _same(camera, cameras[0]) for camera in cameras[1:]):
+        raise InputError(source, "", f"{len(cameras)} documents that differ", "one camera")
+    return cameras[0]
+
+
+def _same(one: Camera, other: Camera) -> bool:
+    size = (one.width, one.height) == (other.width, other.height)
+    matrix = np.array_equal(one.matrix, other.matrix)
+    return size and matrix and np.array_equal(one.distortion, other.distortion)
+
+
+def _camera(table: Mapping[str, Any], width: int | None, height: int | None, source: str) -> Camera:
+    window = read_window(table, source)
+    lens = {key: value for key, value in table.items() if key not in WINDOW_KEYS}
+    require_known(lens, _KEYS, source)
+    shown_x = window.width or (width and width * window.binning_x)
+    shown_y = window.height or (height and height * window.binning_y)
+    sensor = camera_of(
+        lens,
+        _side(lens, "width", shown_x, window.x + window.width, source),
+        _side(lens, "height", shown_y, window.y + window.height, source),
+        source,
+    )
+    camera = window.camera(sensor, source)
+    for key, have, images in (("width", camera.width, width), ("height", camera.height, height)):
+        if images is not None and have != images:
+            raise InputError(source, key, have, f"{images}, as the images have it")
+    return camera
 
 
 def camera_of(
@@ -55,25 +74,25 @@ def camera_of(
 
     Args:
         table: the values.
-        width: of the pictures, px.
-        height: of the pictures.
+        width: of the images, px.
+        height: of the images.
         source: where it stands, for messages.
         prefix: of the keys in messages.
 
     Raises:
-        InputError: if a value does not suit the pictures.
+        InputError: if a value does not suit the images.
     """
     named = {prefix + key: value for key, value in table.items()}
     given = {key: float(numbers(named, prefix + key, (), source)) for key in _PINHOLE}
     for key in ("fx", "fy"):
         if not 0.1 * width <= given[key] <= 100.0 * width:
-            allowed = f"a focal length in pixels; the pictures are {width} x {height}"
+            allowed = f"a focal length in pixels; the images are {width} x {height}"
             raise InputError(source, prefix + key, given[key], allowed)
     if not 0.5 <= given["fx"] / given["fy"] <= 2.0:
         raise InputError(source, prefix + "fy", given["fy"], f"similar to fx, {given['fx']:g}")
     for key, side in (("cx", width), ("cy", height)):
         if not 0.0 <= given[key] <= side - 1:
-            allowed = f"0 … {side - 1}: the pictures are {width} x {height}"
+            allowed = f"0 … {side - 1}: the images are {width} x {height}"
             raise InputError(source, prefix + key, given[key], allowed)
     camera = Camera(width, height, **given, distortion=_distortion(named, source, prefix))
     try:
@@ -102,42 +121,27 @@ def write_camera(camera: Camera, path: Path, name: str = "camera") -> None:
     )
 
 
-def _side(table: Mapping[str, Any], key: str, wanted: int | None, source: str) -> int:
+def _side(table: Mapping[str, Any], key: str, shown: int | None, least: int, source: str) -> int:
+    """Return a side of the sensor, px.
+
+    Args:
+        table: may have it.
+        key: width or height.
+        shown: what the images show of it, if that is known.
+        least: where their window ends. Some drivers write the window's size for the sensor's.
+        source: for messages.
+    """
     if key not in table:
-        if wanted is None:
-            raise InputError(source, key, "nothing", "the pictures' size in pixels")
-        return wanted
+        if shown is None:
+            raise InputError(source, key, "nothing", "the images' size in pixels")
+        return max(shown, least)
     have = float(numbers(table, key, (), source))
-    if wanted is not None and have != wanted:
-        raise InputError(source, key, f"{have:g}", f"{wanted}, as the pictures have it")
-    if not (have >= 1 and have == int(have)):
-        raise InputError(source, key, have, "a whole number of pixels")
-    return int(have)
-
-
-def _from_others(table: Mapping[str, Any], source: str) -> dict[str, Any]:
-    name, values = _array(table, _MATRICES)
-    flat = numbers({name: values}, name, (9,), source)
-    own: dict[str, Any] = {"fx": flat[0], "fy": flat[4], "cx": flat[2], "cy": flat[5]}
-    for ours, names in _SIZES.items():
-        for theirs in names:
-            if theirs in table:
-                own[ours] = table[theirs]
-    model = table.get("distortion_model") or "plumb_bob"
-    if model not in _MODELS:
-        raise InputError(source, "distortion_model", model, " or ".join(_MODELS))
-    if any(key in table for key in _DISTORTIONS):
-        name, values = _array(table, _DISTORTIONS)
-        own["distortion"] = values
-    return own
-
-
-def _array(table: Mapping[str, Any], names: tuple[str, ...]) -> tuple[str, Any]:
-    """Return which of the names is there, and its numbers in a row, matrix or not."""
-    name = next(name for name in names if name in table)
-    value = table[name]
-    data = value.get("data", ()) if isinstance(value, Mapping) else value
-    return name, np.ravel(data)
+    if not (1 <= have <= LARGEST_PX and have == int(have)):
+        raise InputError(source, key, f"{have:g}", "a whole number of pixels")
+    if have < least and have != shown:
+        allowed = f"{least} or more, where roi ends, or roi's own size"
+        raise InputError(source, key, f"{have:g}", allowed)
+    return max(int(have), least)
 
 
 def _distortion(table: Mapping[str, Any], source: str, prefix: str) -> FloatArray:
@@ -146,7 +150,10 @@ def _distortion(table: Mapping[str, Any], source: str, prefix: str) -> FloatArra
         return distortion
     values = numbers(table, key, (None,), source)
     if np.any(values[len(distortion) :]):
-        allowed = f"{', '.join(COEFFICIENTS)}, or fewer, with nothing but zeros behind them"
+        allowed = (
+            f"{', '.join(COEFFICIENTS)}, or fewer, with nothing but zeros behind them: k4, k5, k6 "
+            "of the rational model are not supported"
+        )
         raise InputError(source, key, f"{len(values)} values", allowed)
     values = values[: len(distortion)]
     distortion[: len(values)] = values

@@ -23,7 +23,7 @@ from vergence.cell.schema import (
     ToolTable,
     TrackTable,
 )
-from vergence.errors import InputError, nearest
+from vergence.errors import InputError, KeyConflict, nearest
 from vergence.places import find_cell
 
 
@@ -167,9 +167,10 @@ def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, A
     from vergence.camera import read_camera
 
     own = {key: value for key, value in table.items() if key != "calibration"}
-    for key in ("resolution", "focal_mm", "pixel_um", "focal_px", "principal_px", "distortion"):
-        if key in own:
-            raise InputError(str(path), place + key, own[key], "no lens beside calibration")
+    lens = ("resolution", "focal_mm", "pixel_um", "focal_px", "principal_px", "distortion")
+    doubled = [key for key in lens if key in own]
+    if doubled:
+        raise KeyConflict(str(path), place + doubled[0], place + "calibration", doubled)
     camera = read_camera(path.parent / table["calibration"])
     return own | {
         "resolution": (camera.width, camera.height),
