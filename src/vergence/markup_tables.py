@@ -10,13 +10,24 @@ import yaml
 
 _DEEPEST_XML = 16
 _LONGEST_SCALAR = 2000
+_MOST_NODES = 20_000  # takes about a second
 
 
 class _Loader(yaml.SafeLoader):  # type: ignore[misc]
-    """PyYAML's safe loader, also for OpenCV's matrices; it refuses merges and repeated keys.
+    """PyYAML's safe loader, bounded, and able to read OpenCV's matrices.
 
-    A few merges of aliases make a mapping of any size.
+    It refuses repeated keys, and merges: a few merges of aliases make a mapping of any size.
     """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._nodes = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        self._nodes += 1
+        if self._nodes > _MOST_NODES:
+            raise yaml.MarkedYAMLError(problem=f"more than {_MOST_NODES} values")
+        return super().compose_node(parent, index)
 
     def construct_scalar(self, node: yaml.ScalarNode) -> Any:
         if len(node.value) > _LONGEST_SCALAR:  # a number in base 60 takes quadratic time
