@@ -5,12 +5,14 @@ import numpy as np
 from vergence.arrays import ImageArray
 
 SMALLEST_PX = 24  # the patch that is aligned
+_BRIGHTEST = 300.0  # somewhat above 255, as after sharpening
 
 
 def grey_image(image: object) -> tuple[ImageArray | None, str]:
     """Return an image as contiguous grey levels, or None and the reason why it cannot be used.
 
-    Grey levels that are no bytes are rounded and clipped to 0 … 255.
+    Grey levels that are no bytes are rounded and clipped to 0 … 255; an image of 12 bits, or of
+    floats from 0 to 1, would be white or black that way, and is refused.
     """
     array = np.asarray(image)
     if image is None or array.size == 0:
@@ -26,4 +28,7 @@ def grey_image(image: object) -> tuple[ImageArray | None, str]:
         return None, f"image without grey levels: {array.dtype}"
     if not np.isfinite(array).all():
         return None, "image not finite"
+    brightest = float(array.max())
+    if brightest > _BRIGHTEST or (array.dtype.kind == "f" and 0.0 < brightest <= 1.0):
+        return None, f"image with levels up to {brightest:g}: scale them to 0 … 255"
     return np.clip(np.rint(array), 0, 255).astype(np.uint8), ""

@@ -1,4 +1,4 @@
-"""Pictures from a folder or a video."""
+"""Images from a folder or a video."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,15 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import ImageArray
+from vergence.camera.grey_levels import grey_levels, grey_values, white_level
+from vergence.camera.image_file import image_files, read_image_file, require_size
 from vergence.errors import InputError
 
-IMAGES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff", ".webp")
 VIDEOS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
 DEFAULT_RATE_HZ = 25.0
+_SAMPLED = 8  # images of a folder that tell how deep all are
 
 
 class Picture(NamedTuple):
-    """One picture of the footage."""
+    """One image of the footage."""
 
     name: str  # its file, or the video's with a number
     time: float  # s since the first
@@ -25,52 +27,48 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Footage:
-    """A folder of images in order of their names, or a video."""
+    """A folder of images in the natural order of their names, or a video."""
 
     path: Path
     files: tuple[Path, ...]  # empty for a video
-    count: int  # pictures; 0 if a video does not tell
+    count: int  # images; 0 if a video does not tell
     rate_hz: float
+    stamped: bool = False  # whether a video's own time stamps count, not the rate
 
     def pictures(self) -> Iterator[Picture]:
-        """Yield the pictures, all of one size.
+        """Yield the images, all of one size, their grey levels by one scale.
+
+        The scale is that of the brightest of some images throughout the folder. An image that is
+        brighter still raises it from there on.
 
         Raises:
-            InputError: if one cannot be read, is not finite, or differs in size from the first.
+            InputError: if one cannot be read, is too large, or differs in size or depth from the
+                first.
         """
-        size = None
-        for number, (name, raw) in enumerate(self._raw()):
-            image = _grey(raw, name)
-            size = size or image.shape
-            if image.shape != size:
-                given = f"{image.shape[1]} x {image.shape[0]} pixels"
-                allowed = f"{size[1]} x {size[0]}, as the first picture"
-                raise InputError(name, "", given, allowed)
-            yield Picture(name, number / self.rate_hz, image)
+        first, white = None, self._white()
+        for name, time, raw in self._raw():
+            values = grey_values(raw, name)
+            first = values if first is None else first
+            _require_like(values, first, name)
+            white = white_level(values, white)
+            yield Picture(name, time, grey_levels(values, white))
 
-    def _raw(self) -> Iterator[tuple[str, np.ndarray]]:
-        import cv2
+    def _white(self) -> float:
+        """Return the white level of some images of a folder; 0 for a video."""
+        white, step = 0.0, max(1, len(self.files) // _SAMPLED)
+        for file in self.files[::step]:
+            values = grey_values(read_image_file(file), str(file))
+            if values.dtype == np.uint8:
+                return white
+            white = white_level(values, white)
+        return white
 
-        if self.files:
-            for file in self.files:
-                raw = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-                if raw is None:
-                    raise InputError(str(file), "", "a file that cannot be read", "an image")
-                yield str(file), np.asarray(raw)
-            return
-        video = cv2.VideoCapture(str(self.path))
-        try:
-            number = 0
-            while True:
-                there, raw = video.read()
-                if not there:
-                    break
-                yield f"{self.path}#{number}", np.asarray(raw)
-                number += 1
-        finally:
-            video.release()
-        if not number:
-            raise InputError(str(self.path), "", "no picture that can be read", "a video")
+    def _raw(self) -> Iterator[tuple[str, float, np.ndarray]]:
+        """Yield name, time and pixels of each image."""
+        if not self.files:
+            yield from _video(self.path, self.rate_hz, self.stamped)
+        for number, file in enumerate(self.files):
+            yield str(file), number / self.rate_hz, read_image_file(file)
 
 
 def open_footage(path: str | Path, rate_hz: float | None = None) -> Footage:
@@ -78,18 +76,16 @@ def open_footage(path: str | Path, rate_hz: float | None = None) -> Footage:
 
     Args:
         path: the folder or file.
-        rate_hz: pictures a second; by default the video's own, or 25 for a folder.
+        rate_hz: images a second; by default a video's own time stamps, or 25 for a folder.
 
     Raises:
-        InputError: if it is not there, holds no pictures, or the rate is no rate.
+        InputError: if it is not there, holds no images, or the rate is no rate.
     """
     where = Path(path)
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise InputError("vergence track", "--rate", rate_hz, "pictures a second, above zero")
+        raise InputError("vergence track", "--rate", rate_hz, "images a second, above zero")
     if where.is_dir():
-        files = tuple(sorted(f for f in where.iterdir() if f.suffix.lower() in IMAGES))
-        if not files:
-            raise InputError(str(path), "", "a folder without images", ", ".join(IMAGES))
+        files = image_files(where)
         return Footage(where, files, len(files), rate_hz or DEFAULT_RATE_HZ)
     if not where.is_file():
         raise InputError(str(path), "", "no such folder or file", "a folder of images or a video")
@@ -108,29 +104,50 @@ def _open_video(path: Path, rate_hz: float | None) -> Footage:
             raise InputError(str(path), "", "a file that cannot be read", "a video")
         own = float(video.get(cv2.CAP_PROP_FPS))
         count = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+        width, height = (
+            int(video.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        )
     finally:
         video.release()
+    require_size(width, height, str(path))
     usable = own if np.isfinite(own) and 0.1 <= own <= 2000.0 else DEFAULT_RATE_HZ
-    return Footage(path, (), max(count, 0), rate_hz or usable)
+    return Footage(path, (), max(count, 0), rate_hz or usable, stamped=rate_hz is None)
 
 
-def _grey(raw: np.ndarray, name: str) -> ImageArray:
-    """Return a picture as 8-bit grey; deeper ones are scaled by their type's range."""
+def _video(path: Path, rate_hz: float, stamped: bool) -> Iterator[tuple[str, float, np.ndarray]]:
+    """Yield name, time and pixels of each image of a video.
+
+    A time stamp that is not later than the one before gives way to the rate.
+    """
     import cv2
 
-    if raw.dtype.kind == "f":
-        if not np.isfinite(raw).all():
-            raise InputError(name, "", "values that are not finite", "a picture of numbers")
-        top = 1.0 if raw.max() <= 1.0 else 255.0
-        raw = np.clip(raw * (255.0 / top), 0.0, 255.0).astype(np.uint8)
-    elif raw.dtype == np.uint16:
-        raw = (raw >> 8).astype(np.uint8)
-    elif raw.dtype != np.uint8:
-        raise InputError(name, "", f"values of kind {raw.dtype}", "8 or 16 bits, or floats")
-    if raw.ndim == 3:
-        codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
-        if raw.shape[2] not in codes:
-            raise InputError(name, "", f"{raw.shape[2]} channels", "grey or colour")
-        raw = np.asarray(cv2.cvtColor(raw, codes[raw.shape[2]]))
-    image: ImageArray = np.ascontiguousarray(raw)
-    return image
+    video = cv2.VideoCapture(str(path))
+    number, time, start = 0, 0.0, 0.0
+    try:
+        while True:
+            there, raw = video.read()
+            if not there:
+                break
+            stamp = 1e-3 * float(video.get(cv2.CAP_PROP_POS_MSEC))
+            start = start if number else stamp
+            if not stamped:
+                time = number / rate_hz
+            elif number:
+                later = np.isfinite(stamp) and stamp - start > time
+                time = stamp - start if later else time + 1.0 / rate_hz
+            yield f"{path}#{number}", time, np.asarray(raw)
+            number += 1
+    finally:
+        video.release()
+    if not number:
+        raise InputError(str(path), "", "no image that can be read", "a video")
+
+
+def _require_like(values: np.ndarray, first: np.ndarray, name: str) -> None:
+    """Raise InputError if an image differs in size or depth from the first."""
+    if values.shape != first.shape:
+        given = f"{values.shape[1]} x {values.shape[0]} pixels"
+        allowed = f"{first.shape[1]} x {first.shape[0]}, as the first image"
+        raise InputError(name, "", given, allowed)
+    if values.dtype != first.dtype:
+        raise InputError(name, "", f"{values.dtype} values", f"{first.dtype}, as the first image")
