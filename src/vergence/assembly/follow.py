@@ -19,7 +19,7 @@ def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images:
     Raises:
         InputError: if the cell cannot be run as it is written.
     """
-    model = target_shape(cell, driver)
+    model = target_shape(cell, driver.world)
     driver.look_for(model.corners)
     _require_sight(cell, driver)
     planner = FixedReference(Reference(0.0, T_camera_target=_wanted_pose(task, driver)))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.assembly.calibration_error import calibration_error, small_motion
 from vergence.assembly.measure import CornerWindows, ExactWindows, with_noise, with_outliers
 from vergence.cell import Cell
 from vergence.cell.schema import PerceptionTable
@@ -28,12 +29,13 @@ from vergence.estimation import (
     blocked_from_hand,
     seen_from_hand,
 )
-from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp
+from vergence.geometry import se3, se3_compose, se3_inverse
 from vergence.robot import forward_kinematics
 from vergence.signals import Frame, Observation
 from vergence.simulation import SimulatedDriver
 
 if TYPE_CHECKING:
+    from vergence.simulation.cell_model import CellModel
     from vergence.vision.known_object import ObjectModel
 
 _LEAST_M, _LEAST_RAD = 1e-3, 2e-3  # no start is known better
@@ -53,7 +55,7 @@ class FollowedPose(Protocol):
         ...
 
 
-def target_shape(cell: Cell, driver: SimulatedDriver) -> "ObjectModel":
+def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
     """Return the target's geometry; its features are the file's, else its sharp corners.
 
     Raises:
@@ -63,7 +65,7 @@ def target_shape(cell: Cell, driver: SimulatedDriver) -> "ObjectModel":
 
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
-    return object_model_of(driver.world.model, "target")
+    return object_model_of(model.model, "target")
 
 
 def follow_pose(
@@ -147,14 +149,7 @@ def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
 
     It is off by each camera's calibration error, as a calibrated camera's is.
     """
-    off = {
-        name: _small_motion(
-            np.random.default_rng([cell.seed, 6, number]),
-            table.calibration_error_m,
-            table.calibration_error_deg,
-        )
-        for number, (name, table) in enumerate(cell.cameras.items())
-    }
+    off = {name: calibration_error(cell, name) for name in cell.cameras}
     fixed = {
         n: driver.world.camera_pose(n) @ off[n] for n, t in cell.cameras.items() if t.arm is None
     }
@@ -199,17 +194,9 @@ def _start_covariance(table: PerceptionTable) -> FloatArray:
 def _rough_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:
     """Return the target's pose at the start as well as it is known, (4, 4)."""
     table = cell.perception
-    off = _small_motion(
+    off = small_motion(
         np.random.default_rng([cell.seed, 4]), table.start_error_m, table.start_error_deg
     )
     truth = driver.world.target_pose()
     T: FloatArray = se3(off[:3, :3] @ truth[:3, :3], truth[:3, 3] + off[:3, 3])
-    return T
-
-
-def _small_motion(rng: np.random.Generator, distance_m: float, angle_deg: float) -> FloatArray:
-    """Return a motion (4, 4) of the given size in random directions."""
-    shift, turn = rng.normal(size=3), rng.normal(size=3)
-    R = so3_exp(np.deg2rad(angle_deg) * turn / np.linalg.norm(turn))
-    T: FloatArray = se3(R, distance_m * shift / np.linalg.norm(shift))
     return T

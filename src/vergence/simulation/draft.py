@@ -14,7 +14,7 @@ from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
 from vergence.robot.urdf import read_urdf
 from vergence.simulation.build import named_joints
-from vergence.simulation.world import hidden
+from vergence.simulation.cell_model import hidden
 
 _POSTURES = 4000  # drawn at random
 _TRIED = 200  # of the best, until one sees the board

@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
-    from vergence.simulation.world import World
+    from vergence.simulation.cell_model import CellModel
 
 _TARGET_GROUP = 5  # MuJoCo's last group of geometry
 
@@ -21,15 +21,15 @@ class Obstacles:
     estimated, and how it hides itself follows from that estimate.
 
     Args:
-        world: of the cell; its geometry is copied, its state is not looked at.
+        model: of the cell; its geometry is copied, its state is not looked at.
     """
 
-    def __init__(self, world: "World") -> None:
+    def __init__(self, model: "CellModel") -> None:
         import mujoco
 
-        self._world = world
-        self._model = copy(world.model)
-        of_target = [world.belongs_to_target(int(body)) for body in self._model.geom_bodyid]
+        self._cell_model = model
+        self._model = copy(model.model)
+        of_target = [model.belongs_to_target(int(body)) for body in self._model.geom_bodyid]
         group = np.minimum(self._model.geom_group, _TARGET_GROUP - 1)
         self._model.geom_group[:] = np.where(of_target, _TARGET_GROUP, group)
         self._groups = np.array([1] * _TARGET_GROUP + [0], dtype=np.uint8)
@@ -40,12 +40,12 @@ class Obstacles:
         import mujoco
 
         for arm, position in joints.items():
-            self._data.qpos[self._world.joint_addresses(arm)] = position
+            self._data.qpos[self._cell_model.joint_addresses(arm)] = position
         mujoco.mj_kinematics(self._model, self._data)
 
     def blocked(self, eye: FloatArray, points: FloatArray) -> BoolArray:
         """Tell which points (N, 3) are hidden from an eye (3,), (N,); world frame, m."""
-        from vergence.simulation.world import hidden
+        from vergence.simulation.cell_model import hidden
 
         eye = np.ascontiguousarray(eye, dtype=np.float64)
         return hidden(self._model, self._data, eye, points, self._groups)

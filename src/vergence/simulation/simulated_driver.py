@@ -106,16 +106,7 @@ class SimulatedDriver:
         So the truth is known of features that were picked in the image. A ray that misses the
         target gives NaN.
         """
-        T_world_camera = self.world.camera_pose(camera)
-        T_target_world = se3_inverse(self.world.target_pose())
-        points = np.full((len(points_px), 3), np.nan)
-        for j, (x, y) in enumerate(self.cameras[camera].normalize(points_px)):
-            ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
-            ray /= np.linalg.norm(ray)
-            distance, body = self.world.ray(T_world_camera[:3, 3].copy(), ray)
-            if self.world.belongs_to_target(body):
-                met = T_world_camera[:3, 3] + distance * ray
-                points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
+        points = self.world.anchor(camera, points_px)
         self.look_for(points)
         return points
 

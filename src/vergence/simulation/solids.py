@@ -8,7 +8,7 @@ from vergence.arrays import FloatArray
 from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE, RADIUS
 
 if TYPE_CHECKING:
-    from vergence.simulation.world import World
+    from vergence.simulation.cell_model import CellModel
 
 
 class Solids:
@@ -19,26 +19,26 @@ class Solids:
     around it, a cylinder for one with rounded ends.
 
     Args:
-        world: of the cell.
+        model: of the cell; the arms are where it has them.
         arm: that carries the camera.
     """
 
-    def __init__(self, world: "World", arm: str) -> None:
-        self._data = world.data
-        own = world.bodies_of(arm)
+    def __init__(self, model: "CellModel", arm: str) -> None:
+        self._data = model.data
+        own = model.bodies_of(arm)
         self._geoms = np.array(
             [
                 geom
-                for geom, body in enumerate(world.model.geom_bodyid)
-                if not (world.belongs_to_target(int(body)) or int(body) in own)
-                and _hides(world.model, geom)
+                for geom, body in enumerate(model.model.geom_bodyid)
+                if not (model.belongs_to_target(int(body)) or int(body) in own)
+                and _hides(model.model, geom)
             ],
             dtype=np.int64,
         )
         self._solids = np.zeros((len(self._geoms), COLUMNS))
         self._offset = np.zeros((len(self._geoms), 3))  # of the box from the geom's own frame
         for row, geom in enumerate(self._geoms):
-            half, radius, self._offset[row] = _rounded_box(world.model, geom)
+            half, radius, self._offset[row] = _rounded_box(model.model, geom)
             self._solids[row, HALF : HALF + 3], self._solids[row, RADIUS] = half, radius
 
     def __call__(self) -> FloatArray:

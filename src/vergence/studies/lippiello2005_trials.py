@@ -125,7 +125,7 @@ def past_singular_pitch(cell: Cell, images: bool) -> FloatArray:
 
 
 def _watch(cell: Cell, driver: SimulatedDriver, images: bool, duration_s: float) -> FloatArray:
-    model = target_shape(cell, driver)
+    model = target_shape(cell, driver.world)
     driver.look_for(model.corners)
     perception = follow_pose(cell, driver, model, images)
     errors = []

@@ -33,7 +33,7 @@ def constrained_law(site: Site, table: ConstrainedTable) -> Law:
         return constrained_image_law(site, table, objective, solver)
     solver = _solver(site, table, 1.0 / site.driver.inner_rate_hz, _POSE_DEPTHS)
     keeper_of = HeldTargetKeeper if site.is_fixed else TargetKeeper
-    corners = target_shape(site.cell, site.driver).corners
+    corners = target_shape(site.cell, site.driver.world).corners
     return pose_law(site, table, keeper_of(solver, corners))
 
 

@@ -1,0 +1,179 @@
+"""What a law may know of a cell and its driver."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from vergence.arrays import FloatArray, frozen
+from vergence.assembly.calibration_error import calibration_error
+from vergence.camera import Camera
+from vergence.cell import Cell
+from vergence.errors import InputError
+from vergence.geometry import se3_compose, se3_inverse, transform_points
+from vergence.robot import Arm, reverse_arm
+from vergence.runtime.driver import Driver
+from vergence.simulation.cell_model import CellModel
+from vergence.simulation.solids import Solids
+
+
+@dataclass(frozen=True, slots=True)
+class LawContext:
+    """A cell, its models, and what its driver said at the start; no ground truth.
+
+    Poses are those that the cell file states, at the joint positions that the driver reports.
+    """
+
+    cell: Cell
+    model: CellModel  # arms at their start, the target at its placement
+    cameras: Mapping[str, Camera]  # by name
+    inner_rate_hz: float
+    joints: Mapping[str, FloatArray]  # positions at the start by arm name, (n,), rad or m
+    points_px: Mapping[str, FloatArray]  # (M, 2) features in the first image, by camera name
+
+    @classmethod
+    def of(
+        cls,
+        cell: Cell,
+        driver: Driver,
+        points_px: Mapping[str, FloatArray] | None = None,
+        joints: Mapping[str, FloatArray] | None = None,
+    ) -> Self:
+        """Return the context of a cell and a driver.
+
+        Args:
+            cell: the cell.
+            driver: of its arms and cameras.
+            points_px: the features in the first image of each camera, (M, 2), where the task tracks
+                features.
+            joints: positions at the start by arm name, (n,); read from the driver if None.
+
+        Raises:
+            InputError: if the models of the cell cannot be read.
+        """
+        model = CellModel(cell)
+        if joints is None:
+            joints = {name: state.position for name, state in driver.read().joints.items()}
+        model.place(joints)
+        return cls(cell, model, driver.cameras, driver.inner_rate_hz, joints, points_px or {})
+
+    @property
+    def camera_name(self) -> str:
+        """The task's camera."""
+        return self.cell.task.camera
+
+    def camera(self, name: str | None = None) -> Camera:
+        """Return the intrinsics of a camera; of the task's if None."""
+        return self.cameras[name or self.camera_name]
+
+    def period_s(self, name: str | None = None) -> float:
+        """Return the time between two images of a camera, s; of the task's if None."""
+        return 1.0 / self.cell.cameras[name or self.camera_name].rate_hz
+
+    @property
+    def inner_period_s(self) -> float:
+        """Time between two set-points, s."""
+        return 1.0 / self.inner_rate_hz
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the task's camera is fixed in the world and looks at what the arm holds."""
+        return self.cell.cameras[self.camera_name].arm is None
+
+    @property
+    def start(self) -> FloatArray:
+        """Joint positions at the start, (n,), in the order of `arm`."""
+        q = self.joints[self.cell.task.arm]
+        return q[::-1] if self.is_fixed else q
+
+    @property
+    def arm(self) -> Arm:
+        """The arm with the task's camera as its tip.
+
+        For a fixed camera it is the arm that holds the target, reversed: from the target to the
+        camera, see `vergence.robot.reverse_arm`.
+        """
+        if not self.is_fixed:
+            return self.arm_to_camera(self.camera_name)
+        return reverse_arm(self.arm_to_target, self._fixed_pose(self.camera_name))
+
+    @property
+    def arm_to_target(self) -> Arm:
+        """The arm that holds the target, with the target as its tip."""
+        return self.model.arm_to_target()
+
+    def arm_to_camera(self, name: str) -> Arm:
+        """Return the arm that carries a camera, with the camera as its tip."""
+        arm = self.model.arm_to_camera(name)
+        return _moved_tip(arm, calibration_error(self.cell, name))
+
+    def T_world_camera(self, name: str | None = None) -> FloatArray | None:
+        """Return the pose (4, 4) of a fixed camera; None of one that an arm carries.
+
+        Args:
+            name: of the camera; the task's if None.
+        """
+        name = name or self.camera_name
+        return None if self.cell.cameras[name].arm is not None else self._fixed_pose(name)
+
+    def depth_m(self, camera: str, given: float | None) -> FloatArray:
+        """Return the believed depth of a camera's features at the start, (M,), m.
+
+        Args:
+            camera: its name.
+            given: one depth for all; if None, that of known features, or of the places on the
+                target's surface that the first image shows, with the target at its placement.
+
+        Raises:
+            InputError: if no depth is given and the placement implies none.
+        """
+        count = len(self.points_px[camera])
+        if given is not None:
+            return np.full(count, given)
+        features, T_world_features = self._features(camera)
+        T_world_camera = self.model.camera_pose(camera) @ calibration_error(self.cell, camera)
+        T_camera_features = se3_compose(se3_inverse(T_world_camera), T_world_features)
+        depth: FloatArray = transform_points(T_camera_features, features)[:, 2]
+        if not (depth > 0).all():  # false for NaN too
+            given_text = "no depth, and the target's placement implies none"
+            raise InputError("law", "depth_m", given_text, "a depth in metres")
+        return depth
+
+    def target_corners(self) -> FloatArray:
+        """Return the corners of the target's model in its frame, (K, 3), m.
+
+        Raises:
+            InputError: if it has none and the file names no features.
+        """
+        from vergence.assembly.pose import target_shape
+
+        return target_shape(self.cell, self.model).corners
+
+    @property
+    def solids(self) -> Callable[[], FloatArray]:
+        """What may come between the camera and the target, see `vergence.simulation.solids`."""
+        return Solids(self.model, self.cell.task.arm)
+
+    def _fixed_pose(self, name: str) -> FloatArray:
+        T: FloatArray = self.model.camera_pose(name) @ calibration_error(self.cell, name)
+        return T
+
+    def _features(self, camera: str) -> tuple[FloatArray, FloatArray]:
+        """Return what a camera looks at: points (M, 3) in a frame, and its pose (4, 4)."""
+        tool = self.cell.tool
+        if tool is not None and tool.camera == camera:
+            return np.array(tool.features), self.model.tool_pose()
+        known = self.cell.target.features
+        if known is not None:
+            return np.array(known), self.model.target_pose()
+        return self.model.anchor(camera, self.points_px[camera]), self.model.target_pose()
+
+
+def _moved_tip(arm: Arm, T: FloatArray) -> Arm:
+    """Return an arm whose tip is moved by T (4, 4) in its own frame."""
+    rotation, position = np.array(arm.chain.rotation), np.array(arm.chain.position)
+    position[-1] += rotation[-1] @ T[:3, 3]
+    rotation[-1] = rotation[-1] @ T[:3, :3]
+    chain = arm.chain._replace(rotation=frozen(rotation), position=frozen(position))
+    return replace(arm, chain=chain)

@@ -1,0 +1,253 @@
+"""The cell as its file and its models describe it: geometry, arms, cameras, the target."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
+from vergence.cell.cell import Cell
+from vergence.cell.joint_positions import joint_positions
+from vergence.errors import InputError
+from vergence.geometry import matrix_to_quaternion, se3_inverse
+from vergence.robot import Arm
+from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics
+from vergence.simulation.motion import placement_pose
+
+_SKIN_M = 0.003  # how deep under a surface a feature may lie and still be seen
+
+
+class CellModel:
+    """The compiled model of a cell, and where everything in it is.
+
+    It knows what the file and the models say: placements, joint positions that it is told, and
+    nothing of what is truly there.
+
+    Attributes:
+        model: MuJoCo's model; everything of arm A is named "A/…", of the target "target/…".
+        data: its state.
+        cameras: intrinsics by camera name.
+        arms: by name, each up to the first camera it carries, else up to its last body.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        spec = assemble(cell)
+        try:
+            self.model: Any = spec.compile()
+        except ValueError as error:
+            raise InputError(
+                str(cell.path), "", str(error), "models that MuJoCo compiles"
+            ) from None
+        self.data: Any = mujoco.MjData(self.model)
+        self.cameras = {name: intrinsics(table) for name, table in cell.cameras.items()}
+        self.arms = {name: self._arm(name) for name in cell.arms}
+        self._to_camera: dict[str, Arm] = {}  # made when asked for
+        self._joints = {name: self._joint_ids(name) for name in cell.arms}
+        self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
+        self._target = int(self.model.body("target").id)
+        self._rail = int(self.model.body("target").mocapid[0])  # -1 if an arm carries it
+        self._target_bodies = _descendants(self.model, self._target)
+        self._camera_ids = {name: self.model.camera(name).id for name in cell.cameras}
+        self._place_at_start()
+
+    def joint_position(self, arm: str) -> FloatArray:
+        """Return an arm's joint positions (n,), rad or m."""
+        return frozen(self.data.qpos[self._qpos[arm]])
+
+    def joint_addresses(self, arm: str) -> IntArray:
+        """Return where an arm's joints stand in MuJoCo's qpos, (n,)."""
+        addresses: IntArray = self._qpos[arm]
+        return addresses
+
+    def camera_pose(self, camera: str) -> FloatArray:
+        """Return T_world_camera (4, 4) in OpenCV's convention."""
+        number = self._camera_ids[camera]
+        T = np.eye(4)
+        T[:3, :3] = self.data.cam_xmat[number].reshape(3, 3) @ FROM_MUJOCO_CAMERA
+        T[:3, 3] = self.data.cam_xpos[number]
+        return T
+
+    def arm_to_camera(self, camera: str) -> Arm:
+        """Return the arm that carries a camera, with the camera as its tip."""
+        name = self.cell.cameras[camera].arm
+        if name is None:
+            raise InputError(
+                "cell", f"cameras.{camera}", "a fixed camera", "one that an arm carries"
+            )
+        if camera not in self._to_camera:
+            self._to_camera[camera] = self._arm(name, camera)
+        return self._to_camera[camera]
+
+    def target_pose(self) -> FloatArray:
+        """Return T_world_target (4, 4), as of the last `update`."""
+        return self._body_pose(self._target)
+
+    def tool_pose(self) -> FloatArray:
+        """Return T_world_tool (4, 4) of what the task's arm holds, as of the last `update`."""
+        return self._body_pose(int(self.model.body("tool").id))
+
+    def move_target(self, T_world_target: FloatArray) -> None:
+        """Put the target somewhere; it takes effect with the next step or `update`.
+
+        A target that an arm carries stays in its hand.
+        """
+        if not self.target_is_free:
+            return
+        self.data.mocap_pos[self._rail] = T_world_target[:3, 3]
+        self.data.mocap_quat[self._rail] = matrix_to_quaternion(
+            np.ascontiguousarray(T_world_target[:3, :3])
+        )
+
+    @property
+    def target_is_free(self) -> bool:
+        """Whether `move_target` moves it: no arm carries it."""
+        return self._rail >= 0
+
+    def place_arm(self, arm: str, position: FloatArray) -> None:
+        """Put an arm's joints somewhere (n,), against all physics, and update every pose."""
+        self.data.qpos[self._qpos[arm]] = position
+        self.update()
+
+    def place(self, joints: Mapping[str, FloatArray]) -> None:
+        """Put arms where their joints say, arm name to positions (n,), and update every pose."""
+        for arm, position in joints.items():
+            self.data.qpos[self._qpos[arm]] = position
+        self.update()
+
+    def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
+        """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.
+
+        A ray that misses the target gives NaN.
+        """
+        T_world_camera = self.camera_pose(camera)
+        T_target_world = se3_inverse(self.target_pose())
+        points = np.full((len(points_px), 3), np.nan)
+        for j, (x, y) in enumerate(self.cameras[camera].normalize(points_px)):
+            ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
+            ray /= np.linalg.norm(ray)
+            distance, body = self.ray(T_world_camera[:3, 3].copy(), ray)
+            if self.belongs_to_target(body):
+                met = T_world_camera[:3, 3] + distance * ray
+                points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
+        return points
+
+    def update(self) -> None:
+        """Bring every pose up to date with the joint positions and the target."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
+
+    def ray(self, origin: FloatArray, direction: FloatArray) -> tuple[float, int]:
+        """Return how far a ray goes and the body it meets; (-1, -1) if it meets none."""
+        geom = np.array([-1], dtype=np.int32)
+        distance = mujoco.mj_ray(
+            self.model, self.data, origin, direction, None, True, -1, geom, None
+        )
+        return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
+
+    def sees(self, camera: str, points: FloatArray) -> BoolArray:
+        """Tell which points (N, 3) in the world no surface hides from a camera, (N,)."""
+        eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
+        return ~hidden(self.model, self.data, eye, points)
+
+    def in_the_way(self, camera: str, points: FloatArray) -> tuple[str, ...]:
+        """Return the names of the bodies that hide points (N, 3) in the world from a camera."""
+        eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
+        geoms = hiding(self.model, self.data, eye, points)
+        bodies = {int(self.model.geom_bodyid[geom]) for geom in geoms if geom >= 0}
+        return tuple(sorted(self.model.body(body).name for body in bodies))
+
+    def belongs_to_target(self, body: int) -> bool:
+        """Whether a body is the target or a part of it."""
+        return body in self._target_bodies
+
+    def bodies_of(self, arm: str) -> frozenset[int]:
+        """Return the bodies of an arm."""
+        return frozenset(
+            body
+            for body in range(self.model.nbody)
+            if self.model.body(self.model.body_rootid[body]).name.startswith(f"{arm}/")
+        )
+
+    def arm_to_body(self, name: str) -> Arm:
+        """Return an arm with its last body as its tip."""
+        return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")
+
+    def arm_to_target(self) -> Arm:
+        """Return the arm that carries the target, with the target as its tip."""
+        assert self.cell.target.carried_by is not None
+        return self._arm_to(self.cell.target.carried_by, "target", "body")
+
+    def _body_pose(self, body: int) -> FloatArray:
+        T = np.eye(4)
+        T[:3, :3] = self.data.xmat[body].reshape(3, 3)
+        T[:3, 3] = self.data.xpos[body]
+        return T
+
+    def _arm(self, name: str, camera: str | None = None) -> Arm:
+        carried = [c for c, t in self.cell.cameras.items() if t.arm == name]
+        if not carried:
+            return self.arm_to_body(name)
+        return self._arm_to(name, camera or carried[0], "camera")
+
+    def _arm_to(self, name: str, tip: str, kind: str) -> Arm:
+        table = self.cell.arms[name]
+        rates, accelerations = table.rate_max_deg_s, table.acceleration_max_deg_s2
+        try:
+            arm = Arm.from_mujoco(
+                self.model, tip, np.deg2rad(rates), np.deg2rad(accelerations), kind
+            )
+        except InputError as error:
+            units = {"rate_max": "rate_max_deg_s", "acceleration_max": "acceleration_max_deg_s2"}
+            key, given = f"arms.{name}.model", f"{error.key} {error.given}"
+            if error.key in units:
+                key, given = f"arms.{name}.{units[error.key]}", str(error.given)
+            raise InputError(str(self.cell.path), key, given, error.allowed) from None
+        names = tuple(joint.removeprefix(f"{name}/") for joint in arm.names)
+        return Arm(names, arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)
+
+    def _joint_ids(self, arm: str) -> Any:
+        return np.array([self.model.joint(f"{arm}/{j}").id for j in self.arms[arm].names])
+
+    def _place_at_start(self) -> None:
+        for name in self.cell.arms:
+            key = f"arms.{name}.start_deg"
+            given = self.cell.arms[name].start_deg
+            self.data.qpos[self._qpos[name]] = joint_positions(
+                self.cell, key, given, self.arms[name]
+            )
+        self.move_target(placement_pose(self.cell.target))
+        self.update()
+
+
+def hidden(
+    model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None
+) -> BoolArray:
+    """Tell which points (N, 3) a surface hides from an eye, (N,)."""
+    result: BoolArray = hiding(model, data, eye, points, groups) >= 0
+    return result
+
+
+def hiding(model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None) -> Any:
+    """Return which geometry hides each of the points (N, 3) from an eye, (N,); -1 for none.
+
+    A point counts as seen up to a few millimetres inside a surface, so that corners do.
+    """
+    rays = points - eye
+    distance = np.linalg.norm(rays, axis=1)
+    directions = np.ascontiguousarray(rays / distance[:, None]).ravel()
+    met, geoms = np.empty(len(rays)), np.empty(len(rays), dtype=np.int32)
+    reach = float(distance.max(initial=0.0)) + 1.0
+    mujoco.mj_multiRay(
+        model, data, eye, directions, groups, True, -1, geoms, met, None, len(rays), reach
+    )
+    return np.where(met < distance - _SKIN_M, geoms, -1)
+
+
+def _descendants(model: Any, root: int) -> frozenset[int]:
+    found = {root}
+    for body in range(root + 1, model.nbody):  # parents come before their children
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return frozenset(found)
