@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence.control import Guard, guarded_step, guarded_steps, stoppable_speed
+from vergence.errors import ShapeError
 from vergence.robot import Arm, Chain
 
 ROUNDING = 1e-9
@@ -100,9 +101,50 @@ def test_starting_at_a_limit_it_can_leave_but_not_pass() -> None:
     assert setpoint.position[1] < 0.95
 
 
-def test_a_start_beyond_a_limit_is_taken_back_to_it() -> None:
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("wanted", [-2.0, 0.0, 2.0, np.nan])
+@pytest.mark.parametrize("outside", [1e-7, 1e-3, 0.5])
+def test_a_start_beyond_a_limit_is_brought_back_within_rate_and_acceleration(
+    side: float, wanted: float, outside: float
+) -> None:
+    arm, dt = arm_with([-1.0], [1.0], [2.0], [8.0]), 2e-3
+    start = np.array([side * (1.0 + outside)])
+    guard = Guard(arm, start, dt)
+    before, velocity = start, np.zeros(1)
+    for _ in range(1000):
+        setpoint = guard.step(np.array([wanted]))
+        assert (side * setpoint.position <= np.maximum(side * before, 1.0)).all()
+        assert abs(setpoint.velocity) <= 2.0
+        assert abs(setpoint.velocity - velocity) <= 8.0 * dt * (1 + ROUNDING)
+        np.testing.assert_allclose(setpoint.position, before + dt * setpoint.velocity, atol=1e-12)
+        before, velocity = setpoint.position, setpoint.velocity
+    assert abs(setpoint.position) <= 1.0
+
+
+def test_a_start_that_is_no_position_is_refused() -> None:
     arm = arm_with([-1.0], [1.0], [2.0], [8.0])
-    assert Guard(arm, np.array([1.5]), 2e-3).step(np.zeros(1)).position[0] == 1.0
+    with pytest.raises(ValueError, match="not finite"):
+        Guard(arm, np.array([np.nan]), 2e-3)
+    with pytest.raises(ShapeError, match="start"):
+        Guard(arm, np.zeros(2), 2e-3)
+
+
+@pytest.mark.parametrize("wanted", [np.zeros(0), np.zeros(5), np.zeros(7), np.zeros((6, 1)), 0.0])
+def test_rates_of_another_length_make_no_set_point(wanted) -> None:
+    n = 6
+    guard = Guard(arm_with([-1.0] * n, [1.0] * n, [2.0] * n, [8.0] * n), np.zeros(n), 2e-3)
+    with pytest.raises(ShapeError, match="wanted rates"):
+        guard.step(wanted)
+    np.testing.assert_array_equal(guard.position, 0.0)
+
+
+def test_it_approaches_a_position_and_rests_there() -> None:
+    arm, goal = arm_with([-1.0, -1.0], [1.0, 1.0], [2.0, 2.0], [8.0, 8.0]), np.array([0.7, -1e-4])
+    guard = Guard(arm, np.zeros(2), 2e-3)
+    for _ in range(500):
+        guard.approach(goal)
+    np.testing.assert_allclose(guard.position, goal, atol=1e-12)
+    assert not guard.moving
 
 
 def test_a_rate_that_is_not_a_number_brakes() -> None:

@@ -186,9 +186,25 @@ def test_ctrl_c_waits_for_the_tick_that_is_under_way(tick: int) -> None:
     assert changes_within(velocities, 8.0, 2e-3)  # no set-point was lost
 
 
-def test_a_second_ctrl_c_does_not_wait() -> None:
+def test_a_second_ctrl_c_does_not_keep_the_arm_from_being_braked() -> None:
     driver = Pressed()
-    driver.presses = (300, 301)
+    driver.presses = (300, 301, 302)
+    assert looped(driver).run(5.0).kind is OutcomeKind.STOPPED
+    np.testing.assert_array_equal(driver.velocities()[-1], 0.0)
+    assert changes_within(driver.velocities(), 8.0, 2e-3)
+
+
+def test_a_late_ctrl_c_frees_a_user_whose_driver_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr("vergence.runtime.interrupt.monotonic", lambda: now[0])
+
+    class Hanging(Pressed):
+        def step(self, setpoints) -> None:
+            now[0] += 1.5
+            super().step(setpoints)
+
+    driver = Hanging()
+    driver.presses = (300, 301, 302)
     with pytest.raises(KeyboardInterrupt):
         looped(driver).run(5.0)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from vergence.assembly import Parts, assemble_parts
 from vergence.cell import Cell
+from vergence.runtime.listeners import Listeners
 from vergence.runtime.loop import Loop, Patience
 from vergence.runtime.recording import Listener, RunInfo
 from vergence.runtime.summary import Summary
@@ -66,8 +67,7 @@ def run_driver(
     everyone = (summary, *listeners)
     path = str(cell.path)
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path)
-    for listener in everyone:
-        listener.begin(info)
+    Listeners(everyone).begin(info)
     if isinstance(parts, Outcome):
         outcome = parts
     else:
@@ -77,8 +77,7 @@ def run_driver(
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
     values = dict(summary.values)
     values["duration_s"] = outcome.time
-    for listener in everyone:
-        listener.close(outcome, values)
+    Listeners(everyone).close(outcome, values)
     return RunResult(outcome, values)
 
 

@@ -12,7 +12,13 @@ from vergence.control.conditioning import (
 from vergence.control.constrained import ConstrainedLaw
 from vergence.control.constrained_solver import ConstrainedSolver
 from vergence.control.eye_to_hand import EyeToHandLaw
-from vergence.control.guard import Guard, guarded_step, guarded_steps, stoppable_speed
+from vergence.control.guard import (
+    Guard,
+    closing_rates,
+    guarded_step,
+    guarded_steps,
+    stoppable_speed,
+)
 from vergence.control.held_target_keeper import HeldTargetKeeper
 from vergence.control.image_based import ImageBased
 from vergence.control.image_motion import FeatureState, ImageMotion
@@ -77,6 +83,7 @@ __all__ = [
     "TrackingGains",
     "TrackingSetup",
     "TrackingTick",
+    "closing_rates",
     "guarded_step",
     "guarded_steps",
     "hand_rates",

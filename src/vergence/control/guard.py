@@ -1,11 +1,12 @@
-"""The last word before the joints: no set-point passes a position, rate or acceleration limit."""
+"""Final safety stage: set-points that keep every position, rate and acceleration limit."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.errors import ShapeError
 from vergence.robot import Arm
 from vergence.signals import Setpoint
 
@@ -55,9 +56,17 @@ def guarded_step(
 def guarded_joint(
     position: float, velocity: float, wanted: float, limits: FloatArray, dt: float
 ) -> tuple[float, float, bool]:
-    """Do one joint's part of `guarded_step`; limits (4,)."""
+    """Do one joint's part of `guarded_step`; limits (4,).
+
+    A joint that started outside its range is brought back to it, at a speed from which it can stop
+    there.
+    """
     a = limits[3]
     v = reachable_rate(wanted, limits[2])
+    if position > limits[1]:
+        v = min(v, -min(closing_speed(position - limits[1], a, dt), limits[2]))
+    elif position < limits[0]:
+        v = max(v, min(closing_speed(limits[0] - position, a, dt), limits[2]))
     v = min(max(v, velocity - a * dt), velocity + a * dt)
     fastest_up = stoppable_speed(limits[1] - position, a, dt)
     fastest_down = stoppable_speed(position - limits[0], a, dt)
@@ -65,7 +74,8 @@ def guarded_joint(
         -v > fastest_down and fastest_down < a * dt
     )
     v = min(max(v, -fastest_down), fastest_up)
-    return min(max(position + v * dt, limits[0]), limits[1]), v, at_limit
+    low, high = min(limits[0], position), max(limits[1], position)  # never farther outside
+    return min(max(position + v * dt, low), high), v, at_limit
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,20 +149,46 @@ def stoppable_speed(room: float, a: float, dt: float) -> float:
     return speed
 
 
+@njit(cache=True, error_model="numpy")
+def closing_speed(gap: float, a: float, dt: float) -> float:
+    """Return the speed at which to close a gap, so that braking with a stops at its end."""
+    speed: float = min(gap / dt, max(stoppable_speed(gap, a, dt), a * dt / 8.0))
+    return speed
+
+
+@njit(cache=True, error_model="numpy")
+def closing_rates(gap: FloatArray, limits: FloatArray, dt: float) -> FloatArray:
+    """Return the rates (n,) that close the gaps (n,) as fast as the limits (4, n) allow."""
+    rates = np.empty(len(gap))
+    for i in range(len(gap)):
+        speed = min(closing_speed(abs(gap[i]), limits[3, i], dt), limits[2, i])
+        rates[i] = np.copysign(speed, gap[i])
+    return rates
+
+
 class Guard:
     """Set-points of one arm, stepped at the inner rate and kept inside all its limits.
 
+    From a start outside a position limit the joint is brought back to it at a limited rate.
+
     Args:
         arm: the arm with its limits.
-        start: joint positions at the start, (n,).
+        start: joint positions at the start, (n,), finite.
         dt: inner period, s.
+
+    Raises:
+        ShapeError: if the start is not of the arm's length.
+        ValueError: if it is not finite.
     """
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float) -> None:
         self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
         self._dt = dt
-        self._position = np.clip(start, arm.q_min, arm.q_max)
-        self._velocity = np.zeros(arm.joint_count)
+        self._position: FloatArray = frozen(start, (arm.joint_count,), "start").copy()
+        if not np.isfinite(self._position).all():
+            raise ValueError(f"the start {start} is not finite")
+        self._velocity: FloatArray = np.zeros(arm.joint_count)
+        self._wanted = np.zeros(arm.joint_count)  # writeable and contiguous, as the kernel expects
         self.joint_count = arm.joint_count
         self.at_limit: BoolArray = np.zeros(arm.joint_count, dtype=np.bool_)
 
@@ -172,8 +208,21 @@ class Guard:
         return bool(np.any(np.abs(self._velocity) > 1e-9))
 
     def step(self, wanted: FloatArray) -> Setpoint:
-        """Return the next set-point on the way to the wanted rates (n,)."""
+        """Return the next set-point on the way to the wanted rates (n,).
+
+        Raises:
+            ShapeError: if they are not of the arm's length; no set-point is made.
+        """
+        if np.shape(wanted) != self._wanted.shape:
+            raise ShapeError("wanted rates", np.shape(wanted), self._wanted.shape)
+        self._wanted[:] = wanted
         self._position, self._velocity, self.at_limit = guarded_step(
-            self._position, self._velocity, wanted, self._limits, self._dt
+            self._position, self._velocity, self._wanted, self._limits, self._dt
         )
         return self.setpoint
+
+    def approach(self, position: FloatArray) -> Setpoint:
+        """Return the next set-point on the way to a position (n,), where it comes to rest."""
+        if np.shape(position) != self._wanted.shape:
+            raise ShapeError("position", np.shape(position), self._wanted.shape)
+        return self.step(closing_rates(position - self._position, self._limits, self._dt))

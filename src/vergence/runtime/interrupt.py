@@ -1,25 +1,38 @@
-"""Ctrl-C, taken at a moment when nothing is half done."""
+"""Signals that end a run, taken at a moment when nothing is half done."""
 
 import signal
+from time import monotonic
 from types import FrameType, TracebackType
 from typing import Any, Self
 
+_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+_BRAKING_S = 2.0  # a second Ctrl-C within this time is the first one's echo
+
 
 class Interrupt:
-    """While entered, the first Ctrl-C is only noted; a second one interrupts as ever.
+    """While entered, only notes SIGINT (Ctrl-C), SIGTERM and SIGHUP, so that the loop can brake.
 
-    Outside of the main thread, where Python hands out no signals, nothing is ever noted.
+    A Ctrl-C two seconds or more after the first signal interrupts as ever, for the case that the
+    driver hangs. Signals that the process ignores stay ignored. Outside of the main thread, where
+    Python delivers no signals, nothing is ever noted.
     """
 
     def __init__(self) -> None:
-        self.asked = False  # whether Ctrl-C was pressed
-        self._before: Any = None
+        self.asked = False  # whether the run is to end
+        self.reason = "stopped by the user"
+        self._since = 0.0
+        self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        try:
-            self._before = signal.signal(signal.SIGINT, self._note)
-        except ValueError:  # not the main thread
-            self._before = None
+        for number in _SIGNALS:
+            if signal.getsignal(number) is signal.SIG_IGN:
+                continue
+            try:
+                self._before[number] = signal.signal(number, self._note)
+            except ValueError:  # not the main thread
+                break
         return self
 
     def __exit__(
@@ -28,10 +41,14 @@ class Interrupt:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        while self._before:
+            signal.signal(*self._before.popitem())
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        if self.asked:
+        if number == signal.SIGINT and self.asked and monotonic() - self._since > _BRAKING_S:
             raise KeyboardInterrupt
+        if not self.asked:
+            self._since = monotonic()
+            if number != signal.SIGINT:
+                self.reason = f"stopped by {signal.Signals(number).name}"
         self.asked = True

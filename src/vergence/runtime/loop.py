@@ -1,7 +1,8 @@
 """The one loop: driver, perception, planning, control, and back to the driver."""
 
+import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from vergence.errors import DriverSilent
 from vergence.runtime import endings
 from vergence.runtime.driver import Driver
 from vergence.runtime.interrupt import Interrupt
+from vergence.runtime.listeners import Listeners
 from vergence.runtime.recording import Listener, TickRecord
 from vergence.runtime.stages import Perception, Planner
+from vergence.runtime.stopping import brake, raised
 from vergence.signals import (
     ImagePoints,
     JointCommand,
@@ -24,6 +27,8 @@ from vergence.signals import (
     Sample,
     Setpoint,
 )
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +72,8 @@ class Loop:
         self._driver, self._arm = driver, arm
         self._perception, self._planner, self._law = perception, planner, law
         self._outer_rate_hz = outer_rate_hz
-        self._listeners = listeners
+        self._listeners = Listeners(listeners)
+        self._part = "driver"  # the one at work, to be named if it raises
         self._patience = patience or Patience()
         dt = 1.0 / driver.inner_rate_hz
         self._first = driver.read()
@@ -84,18 +90,21 @@ class Loop:
         self._last_command: JointCommand | None = None
 
     def run(self, duration_s: float) -> Outcome:
-        """Run until the time is over, the task has failed, or Ctrl-C; then stop the arm.
+        """Run until the time is over, the task has failed, or a signal; then stop the arm.
 
-        An arm whose driver is silent cannot be stopped from here: its own watchdog does that.
+        Whatever a part raises, the arm is braked and the outcome says so; the traceback goes to the
+        log. An arm whose driver is silent cannot be stopped from here: its own watchdog does that.
         """
-        try:
-            with self._interrupt:
-                outcome = self._run_or_stop(duration_s)
-                self._brake()
-        except DriverSilent as silence:
-            outcome = Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
+        with self._interrupt:
+            try:
+                outcome = self._outcome(duration_s)
+            except BaseException:
+                brake(self._driver, self._guards)
+                raise
+            if outcome.kind is not OutcomeKind.DRIVER_SILENT:
+                outcome = self._braked(outcome)
         if not outcome.succeeded:
-            self._tell(outcome.time, outcome.kind.value, outcome.reason)
+            self._listeners.event(outcome.time, outcome.kind.value, outcome.reason)
         return outcome
 
     @property
@@ -114,11 +123,25 @@ class Loop:
         """
         self._law, self._last_command = law, None
 
-    def _run_or_stop(self, duration_s: float) -> Outcome:
+    def _outcome(self, duration_s: float) -> Outcome:
         try:
             return self._run(duration_s)
         except KeyboardInterrupt:
             return self._stopped()
+        except DriverSilent as silence:
+            return Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
+        except Exception as error:
+            _LOG.exception("the %s raised", self._part)
+            return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
+
+    def _braked(self, outcome: Outcome) -> Outcome:
+        """Brake every arm; a driver that falls silent meanwhile is the outcome instead."""
+        failure = brake(self._driver, self._guards)
+        if not failure:
+            return outcome
+        if outcome.succeeded or outcome.kind is OutcomeKind.STOPPED:
+            return Outcome(OutcomeKind.DRIVER_SILENT, failure, self._now)
+        return replace(outcome, reason=f"{outcome.reason}; not braked from here: {failure}")
 
     def _run(self, duration_s: float) -> Outcome:
         outer_tick, sample = 0, self._first
@@ -127,18 +150,20 @@ class Loop:
                 return self._stopped()
             if sample.time >= duration_s:
                 return endings.completed(duration_s, sample.time)
+            self._part = "perception"
             observation = self._perception.observe(sample.frames)
             command, outcome = self._decide(sample, observation)
             if outcome is not None:
                 return outcome
             outer_tick += 1
             next_tick = picture_tick(outer_tick, self._driver.inner_rate_hz, self._outer_rate_hz)
+            self._part = "driver"
             if limited := self._move(self._rates(command), next_tick):
                 return endings.joint_limit(limited, self._now)
             sample = self._driver.read()
 
     def _stopped(self) -> Outcome:
-        return Outcome(OutcomeKind.STOPPED, "stopped by the user", self._now)
+        return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)
 
     @property
     def _now(self) -> float:
@@ -156,6 +181,7 @@ class Loop:
             return self._last_command, None
         self._last_picture = time
         self._report_losses(time, observation)
+        self._part = "planner"
         reference = self._planner.reference(observation.time)
         if not _shows_target(observation):
             self._last_command = None
@@ -164,6 +190,7 @@ class Loop:
                 return None, endings.target_lost(_reasons(observation), time)
             return None, None
         self._last_seen = time
+        self._part = "law"
         command = self._law.command(observation, reference, sample.joints[self._arm])
         self._last_command = command
         self._record(sample, observation, reference, command)
@@ -199,14 +226,6 @@ class Loop:
         names = self._driver.arms[self._arm].names
         return [name for name, at_limit in zip(names, stuck, strict=True) if at_limit]
 
-    def _brake(self) -> None:
-        """Bring every arm to rest within its acceleration limits."""
-        while any(guard.moving for guard in self._guards.values()):
-            self._driver.step(
-                {n: guard.step(np.zeros(guard.joint_count)) for n, guard in self._guards.items()}
-            )
-            self._inner_tick += 1
-
     def _record(
         self,
         sample: Sample,
@@ -215,16 +234,14 @@ class Loop:
         command: JointCommand | None,
     ) -> None:
         commands = {} if command is None else {self._arm: command}
-        record = TickRecord(sample.time, sample, observation, reference, commands)
-        for listener in self._listeners:
-            listener.tick(record)
+        self._listeners.tick(TickRecord(sample.time, sample, observation, reference, commands))
 
     def _report_losses(self, time: float, observation: Observation) -> None:
         lost = not _shows_target(observation)
         if lost != self._target_lost:
             self._target_lost = lost
             text = endings.why_lost(_reasons(observation)) if lost else "it is back"
-            self._tell(time, "target out of sight" if lost else "target in sight", text)
+            self._listeners.event(time, "target out of sight" if lost else "target in sight", text)
         if observation.target is None and not lost:
             for view in {view.camera: view for view in observation.views}.values():
                 self._report_features(time, view)
@@ -234,14 +251,12 @@ class Loop:
         lost = set(np.flatnonzero(~view.found).tolist())
         for feature in sorted(lost - before):
             text = f"feature {feature} in {view.camera}: {view.reasons[feature]}"
-            self._tell(time, "feature lost", text)
+            self._listeners.event(time, "feature lost", text)
         for feature in sorted(before - lost):
-            self._tell(time, "feature found", f"feature {feature} in {view.camera} is back")
+            self._listeners.event(
+                time, "feature found", f"feature {feature} in {view.camera} is back"
+            )
         self._lost[view.camera] = lost
-
-    def _tell(self, time: float, name: str, text: str) -> None:
-        for listener in self._listeners:
-            listener.event(time, name, text)
 
 
 def _shows_target(observation: Observation) -> bool:

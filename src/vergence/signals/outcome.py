@@ -13,6 +13,7 @@ class OutcomeKind(StrEnum):
     SINGULARITY = "singularity"
     IMAGE_LATE = "image late"
     DRIVER_SILENT = "driver silent"
+    PART_RAISED = "part raised"
     INFEASIBLE = "infeasible"
     STOPPED = "stopped"
 

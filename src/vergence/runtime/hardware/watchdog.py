@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control import Guard, stoppable_speed
+from vergence.control import Guard, closing_rates
 from vergence.robot import Arm
 from vergence.signals import Setpoint
 
@@ -25,7 +25,7 @@ class Watchdog:
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float, patience_s: float = 0.1) -> None:
         self._guard = Guard(arm, start, dt)
-        self._acceleration = arm.acceleration_max
+        self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
         self._dt, self._patience_s = dt, patience_s
         self._wanted: Setpoint | None = None
         self._silent_s = 0.0
@@ -37,17 +37,20 @@ class Watchdog:
         return not self._guard.moving
 
     def hear(self, setpoint: Setpoint, age_s: float = 0.0) -> None:
-        """Take a set-point; one that is not finite counts for nothing.
+        """Take a set-point; one that is not finite or not of the arm's length counts for nothing.
 
         Args:
             setpoint: where the arm should be, and how fast it should move there.
             age_s: how long ago it was meant for; beyond the patience it counts for nothing either.
         """
-        numbers = np.concatenate((setpoint.position, setpoint.velocity))
-        if age_s > self._patience_s or not np.isfinite(numbers).all():
+        position, velocity = (
+            np.asarray(part, dtype=np.float64) for part in (setpoint.position, setpoint.velocity)
+        )
+        if position.shape != self._limits[0].shape or velocity.shape != position.shape:
             return
-        moved = setpoint.position + age_s * setpoint.velocity
-        self._wanted = Setpoint(moved, setpoint.velocity)
+        if not age_s <= self._patience_s or not np.isfinite(position + velocity).all():
+            return
+        self._wanted = Setpoint(position + age_s * velocity, velocity)
         self._silent_s = 0.0
 
     def step(self) -> Setpoint:
@@ -65,14 +68,5 @@ class Watchdog:
 
     def _rates(self, wanted: Setpoint) -> FloatArray:
         """Return rates that keep the arm on the set-point, or bring it there as it can brake."""
-        behind = wanted.position - self._dt * wanted.velocity - self._guard.position
-        catching_up = [
-            np.copysign(self._closing_speed(abs(gap), a), gap)
-            for gap, a in zip(behind.tolist(), self._acceleration.tolist(), strict=True)
-        ]
-        return np.asarray(wanted.velocity + catching_up)
-
-    def _closing_speed(self, gap: float, a: float) -> float:
-        """Return how fast to close a gap; at once if the acceleration of one period does it."""
-        stoppable = stoppable_speed(gap, a, self._dt)
-        return min(gap / self._dt, max(stoppable, a * self._dt / 8.0))
+        gap = wanted.position - self._dt * wanted.velocity - self._guard.position
+        return wanted.velocity + closing_rates(gap, self._limits, self._dt)

@@ -66,14 +66,17 @@ class Tape:
         self._file.typed("/events", self.now, messages.log(time, name, text))
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
-        """Record the end and close the file."""
+        """Record the end and close the file; the summary also says it where the file is cut."""
         kind, reason, values = outcome.kind.value, outcome.reason, finite(summary)
-        words = {"kind": kind, "reason": reason, "time": repr(outcome.time)}
-        self._file.metadata("outcome", {**words, "summary": json.dumps(values)})
-        self._file.close()
         end = {"kind": kind, "reason": reason, "time": outcome.time}
         result = {"cell": self._info.cell, "outcome": end, "summary": values}
-        (self._folder / SUMMARY).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(result, indent=2) + "\n"
+        try:
+            words = {"kind": kind, "reason": reason, "time": repr(outcome.time)}
+            self._file.metadata("outcome", {**words, "summary": json.dumps(values)})
+            self._file.close()
+        finally:
+            (self._folder / SUMMARY).write_text(text, encoding="utf-8")
 
     def _introduce(self) -> None:
         info = json.dumps(self._info.as_json())

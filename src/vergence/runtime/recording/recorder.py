@@ -51,6 +51,6 @@ class Recorder:
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Record the end and close the file; a second call does nothing."""
-        if self._tape is not None:
-            self._tape.close(outcome, summary)
-            self._tape = None
+        tape, self._tape = self._tape, None
+        if tape is not None:
+            tape.close(outcome, summary)

@@ -1,0 +1,55 @@
+"""Several listeners as one, of which none can end a run."""
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+
+from vergence.runtime.recording import Listener, RunInfo, TickRecord
+from vergence.signals import Outcome
+
+_LOG = logging.getLogger(__name__)
+
+
+class Listeners:
+    """Tells every listener what happens; one that raises is dropped, and the others are told so.
+
+    The loop goes on when a disk is full or a page is gone. A listener that was dropped is still
+    closed, so that it can finish what it has.
+
+    Args:
+        listeners: in the order in which they are told.
+    """
+
+    def __init__(self, listeners: Sequence[Listener]) -> None:
+        self._all = tuple(listeners)
+        self._active = list(listeners)
+
+    def begin(self, info: RunInfo) -> None:
+        """Tell what is about to run; nothing moves yet, so whatever is raised escapes."""
+        for listener in self._all:
+            listener.begin(info)
+
+    def tick(self, record: TickRecord) -> None:
+        """Tell of one turn of the loop."""
+        self._tell(record.time, lambda listener: listener.tick(record))
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Tell of something that happened once."""
+        self._tell(time, lambda listener: listener.event(time, name, text))
+
+    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
+        """Tell of the end; every listener is told, whatever another one raises."""
+        for listener in self._all:
+            try:
+                listener.close(outcome, summary)
+            except Exception as error:
+                _LOG.exception("%s could not be closed: %s", type(listener).__name__, error)
+
+    def _tell(self, time: float, tell: Callable[[Listener], None]) -> None:
+        for listener in tuple(self._active):
+            try:
+                tell(listener)
+            except Exception as error:
+                _LOG.exception("%s is dropped", type(listener).__name__)
+                self._active.remove(listener)
+                text = f"{type(listener).__name__} raised {type(error).__name__}: {error}"
+                self.event(time, "listener dropped", text)
