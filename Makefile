@@ -12,7 +12,7 @@ PYTEST_ARGS ?=
 export MUJOCO_GL ?= egl
 
 .PHONY: help setup test-images test-browser demo test docs bench peers format clean
-.PHONY: check lint lint-format lint-rules lint-types
+.PHONY: check lint lint-format lint-rules lint-types lint-page fuzz
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
@@ -48,7 +48,7 @@ demo: setup
 test: setup test-images test-browser
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
-lint: lint-format lint-rules lint-types
+lint: lint-format lint-rules lint-types lint-page
 
 lint-format: $(INSTALLED)
 	$(BIN)/ruff format --check .
@@ -58,6 +58,9 @@ lint-rules: $(INSTALLED)
 
 lint-types: $(INSTALLED)
 	$(BIN)/mypy
+
+lint-page: $(INSTALLED)
+	@scripts/check-page $(VENV)/typescript
 
 docs: $(INSTALLED)
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/_build

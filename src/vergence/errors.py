@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 _MOST_ECHOED = 200  # characters of what was given that a message repeats
+_MOST_NAMES = 40  # of those that are known, likewise
 
 
 class VergenceError(Exception):
@@ -31,7 +32,7 @@ class InputError(VergenceError, ValueError):
 
     def __init__(self, source: str, key: str, given: object, allowed: str) -> None:
         self.source, self.key, self.given, self.allowed = source, key, given, allowed
-        where = f"{source}: {echo(key)}" if key else source
+        where = f"{echo(source)}: {echo(key)}" if key else echo(source)
         super().__init__(f"{where}: given {echo(given)}; allowed: {allowed}")
 
 
@@ -48,7 +49,7 @@ class KeyConflict(InputError):
     def __init__(self, source: str, key: str, other: str, delete: Sequence[str]) -> None:
         listing = " and ".join(filter(None, (", ".join(delete[:-1]), delete[-1])))
         super().__init__(source, key, "a second value", f"{other} alone")
-        self.args = (f"{source}: {key} cannot be combined with {other}; delete {listing}",)
+        self.args = (f"{echo(source)}: {key} cannot be combined with {other}; delete {listing}",)
 
 
 class RenderingError(VergenceError):
@@ -65,6 +66,8 @@ def echo(given: object) -> str:
         text = str(given)
     except ValueError:  # Python writes no whole number of more than 4300 digits
         text = "a number of thousands of digits"
+    except RecursionError:
+        text = "values nested too deep"
     shown = "".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_ECHOED])
     line = " ".join(shown.split())
     return line if len(line) <= _MOST_ECHOED else line[: _MOST_ECHOED - 1] + "…"
@@ -73,6 +76,8 @@ def echo(given: object) -> str:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Tell which names there are, the one probably meant first."""
     names = sorted(known)
-    listing = ", ".join(names) if names else "none"
-    close = get_close_matches(name, names, n=1)
-    return f"{listing} (did you mean {close[0]}?)" if close else listing
+    listing = ", ".join(echo(each) for each in names[:_MOST_NAMES]) if names else "none"
+    if len(names) > _MOST_NAMES:
+        listing += f" and {len(names) - _MOST_NAMES} more"
+    close = get_close_matches(name[:_MOST_ECHOED], names, n=1)
+    return f"{listing} (did you mean {echo(close[0])}?)" if close else listing

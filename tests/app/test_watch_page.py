@@ -17,7 +17,7 @@ STILL = "target.motion={kind = 'still'}"
 ROWS = "watch.plots.rows.length"
 TIME = "watch.plots.rows.at(-1)?.[0] ?? -1"
 ERROR = "watch.plots.rows.at(-1)?.[1][0]"
-VIEW = "watch.pictures.views.get('wrist')"
+VIEW = "watch.images.views.get('wrist')"
 # Where the tracked point is in the window, and the target in the view in space.
 POINT = (
     f"(() => {{ const v = {VIEW}, b = v.canvas.getBoundingClientRect();"
@@ -159,7 +159,7 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
     turn("3.5")
     browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.5" in t)
     turn("-1")
-    browser.wait(log, lambda text: "law refused" in text and "law.gain" in text)
+    browser.wait(log, lambda text: "refused" in text and "law.gain" in text)
     before = browser.value(TIME)
     browser.wait(TIME, lambda time: time > before + 0.5)  # and the old one goes on
     assert "law changed" in browser.value(log)
@@ -171,7 +171,7 @@ def test_the_arm_follows_the_target_that_the_mouse_drags_in_a_picture(
 ) -> None:
     settled(browser)
     joints = browser.value("watch.plots.rows.at(-1)[2]")
-    browser.middle(".picture canvas")
+    browser.middle(".image canvas")
     start = tuple(browser.value(POINT))
     browser.drag(start, (start[0] + 60, start[1]))
     browser.wait(

@@ -11,14 +11,18 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from vergence.app.watch.board import Board, Reader
-from vergence.app.watch.eye import Eye
-from vergence.app.watch.grip import Grip
+from vergence.app.watch.camera_view import CameraView
+from vergence.app.watch.commands import Command, Pause, parse
+from vergence.app.watch.drag import Drag
+from vergence.app.watch.inbox import Inbox
 from vergence.app.watch.knobs import KNOBS, LAWS, knobs, law_choices
 from vergence.app.watch.moved_target import MovedTarget
 from vergence.app.watch.pace import Pace
+from vergence.app.watch.protocol import Request
+from vergence.app.watch.rate_limit import RateLimit
 from vergence.app.watch.server import Server, listen
-from vergence.app.watch.shot import Shot
+from vergence.app.watch.view_state import Reader, ViewState
+from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.cell import built_in_cells, load_cell
 from vergence.cell.schema import Table
 from vergence.errors import InputError
@@ -31,20 +35,20 @@ def own_motion(time: float) -> Any:
     return se3(np.eye(3), np.array([0.1 * time, 0.0, 0.2]))
 
 
-class TestGrip:
-    GRIP = Grip(se3(TURNED, np.array([1.0, 2.0, 3.0])), 0.8, (0.1, -0.05), np.array([0.0, 0.1, 0]))
+class TestDrag:
+    DRAG = Drag(se3(TURNED, np.array([1.0, 2.0, 3.0])), 0.8, (0.1, -0.05), np.array([0.0, 0.1, 0]))
 
     def test_a_mouse_that_rests_moves_nothing(self) -> None:
-        np.testing.assert_allclose(self.GRIP.shift(0.1, -0.05, False), [0.0, 0.1, 0.0])
+        np.testing.assert_allclose(self.DRAG.shift(0.1, -0.05, False), [0.0, 0.1, 0.0])
 
     def test_the_thing_stays_under_the_mouse(self) -> None:
-        shift = self.GRIP.shift(0.3, 0.1, False) - [0.0, 0.1, 0.0]
+        shift = self.DRAG.shift(0.3, 0.1, False) - [0.0, 0.1, 0.0]
         before = 0.8 * np.array([0.1, -0.05, 1.0])
         after = before + TURNED.T @ shift
         np.testing.assert_allclose(after / after[2], [0.3, 0.1, 1.0])
 
     def test_along_the_axis_up_is_away(self) -> None:
-        shift = self.GRIP.shift(0.3, -0.15, True) - [0.0, 0.1, 0.0]
+        shift = self.DRAG.shift(0.3, -0.15, True) - [0.0, 0.1, 0.0]
         np.testing.assert_allclose(TURNED.T @ shift, [0.0, 0.0, 0.08], atol=1e-12)
 
 
@@ -129,50 +133,50 @@ class TestKnobs:
         assert load_cell(name, {"law": first}).law == cell.law
 
 
-class TestBoard:
+class TestViewState:
     def test_news_are_read_once(self) -> None:
-        board, reader = Board(), Reader()
-        board.begin({"cell": "c"})
-        board.tick([0.0, [1.0]], [Shot("wrist", 0.0, None)])
-        board.event(0.0, "something", "happened")
-        news = board.news(reader)
+        view_state, reader = ViewState(), Reader()
+        view_state.begin({"cell": "c"})
+        view_state.tick([0.0, [1.0]], [CameraView("wrist", 0.0, None)])
+        view_state.event(0.0, "something", "happened")
+        news = view_state.news(reader)
         assert news is not None
         assert news.about == {"cell": "c"}
-        assert (len(news.rows), len(news.events), len(news.shots)) == (1, 1, 1)
-        assert board.news(reader) is None
-        board.tick([0.1, [2.0]], [])
-        news = board.news(reader)
+        assert (len(news.rows), len(news.events), len(news.views)) == (1, 1, 1)
+        assert view_state.news(reader) is None
+        view_state.tick([0.1, [2.0]], [])
+        news = view_state.news(reader)
         assert news is not None
-        assert (news.about, news.rows, news.shots) == (None, [[0.1, [2.0]]], [])
+        assert (news.about, news.rows, news.views) == (None, [[0.1, [2.0]]], [])
 
     def test_of_a_long_run_the_last_is_kept_and_told_once(self) -> None:
-        board, reader = Board(), Reader()
-        board.begin({"cell": "c"})
+        view_state, reader = ViewState(), Reader()
+        view_state.begin({"cell": "c"})
         told = []
         for number in range(9000):
-            board.tick([number], [])
+            view_state.tick([number], [])
             if number % 100 == 99:
-                news = board.news(reader)
+                news = view_state.news(reader)
                 assert news is not None
                 told += [row[0] for row in news.rows]
         assert told == list(range(9000))
-        late = board.news(Reader())
+        late = view_state.news(Reader())
         assert late is not None
         assert 1800 <= len(late.rows) <= 3600
         assert late.rows[-1] == [8999]
 
     def test_a_new_run_starts_afresh_for_everyone(self) -> None:
-        board, reader = Board(), Reader()
-        board.begin({"cell": "c"})
-        board.tick([0.0, [1.0]], [])
-        board.news(reader)
-        board.begin({"cell": "c"})
-        news = board.news(reader)
+        view_state, reader = ViewState(), Reader()
+        view_state.begin({"cell": "c"})
+        view_state.tick([0.0, [1.0]], [])
+        view_state.news(reader)
+        view_state.begin({"cell": "c"})
+        news = view_state.news(reader)
         assert news is not None
         assert (news.about, news.rows) == ({"cell": "c"}, [])
 
 
-def test_the_eye_is_where_mujoco_has_its_camera() -> None:
+def test_the_viewer_camera_is_where_mujoco_has_its_camera() -> None:
     import mujoco
 
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
@@ -184,22 +188,80 @@ def test_the_eye_is_where_mujoco_has_its_camera() -> None:
     mujoco.mjv_updateScene(
         model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene
     )
-    seen = [np.array(eye.pos) for eye in scene.camera]
-    eye = Eye.around(camera.lookat, 2.5, 37.0, -21.0, 45.0)
-    np.testing.assert_allclose(eye.T_world_camera[:3, 3], np.mean(seen, axis=0), atol=1e-6)
-    np.testing.assert_allclose(eye.T_world_camera[:3, 2], scene.camera[0].forward, atol=1e-6)
-    np.testing.assert_allclose(eye.T_world_camera[:3, 1], -scene.camera[0].up, atol=1e-6)
+    seen = [np.array(viewer_camera.pos) for viewer_camera in scene.camera]
+    viewer_camera = ViewerCamera.around(camera.lookat, 2.5, 37.0, -21.0, 45.0)
+    np.testing.assert_allclose(
+        viewer_camera.T_world_camera[:3, 3], np.mean(seen, axis=0), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        viewer_camera.T_world_camera[:3, 2], scene.camera[0].forward, atol=1e-6
+    )
+    np.testing.assert_allclose(viewer_camera.T_world_camera[:3, 1], -scene.camera[0].up, atol=1e-6)
+
+
+class TestCommands:
+    @pytest.mark.parametrize(
+        "message",
+        [
+            "not JSON",
+            "[]",
+            "{}",
+            '{"do": "fly"}',
+            '{"do": "speed", "value": 1e400}',
+            '{"do": "speed", "value": NaN}',
+            '{"do": "speed", "value": 0}',
+            '{"do": "speed", "value": "1"}, {"do": "reset"}',
+            '{"do": "seek", "value": -1}',
+            '{"do": "seek", "value": ' + 4000 * "9" + "}",
+            '{"do": "grab", "view": "wrist", "u": null, "v": 0}',
+            '{"do": "move", "view": "", "u": 1e300, "v": 0, "along": false}',
+            '{"do": "knob", "key": "gain", "value": [1]}',
+            '{"do": "pause", "more": 1}',
+            '{"do":' + 1000 * "[",
+            b"\xff\xfe",
+        ],
+    )
+    def test_what_is_no_command_is_refused_in_one_short_line(self, message: str | bytes) -> None:
+        with pytest.raises(InputError) as refused:
+            parse(message)
+        assert len(str(refused.value)) < 600
+        assert "\n" not in str(refused.value)
+
+    def test_what_waits_is_bounded_and_the_rest_is_refused(self) -> None:
+        inbox, answers = Inbox(), list[str]()
+        for _ in range(1000):
+            inbox.ask(Request(Pause(do="pause"), answers.append))
+        assert 700 < len(answers) < 1000
+
+    def test_what_fails_is_told_to_its_sender_and_no_further(self) -> None:
+        def fail(command: Command) -> None:
+            raise RuntimeError("no")
+
+        inbox, answers = Inbox(), list[str]()
+        inbox.ask(Request(Pause(do="pause"), answers.append))
+        inbox.obey(fail, timeout_s=0.0)
+        assert answers == ["This failed inside vergence (RuntimeError)."]
+
+    def test_messages_faster_than_allowed_have_to_wait(self) -> None:
+        now = 0.0
+        limit = RateLimit(10.0, 5, lambda: now)
+        assert [limit.take() for _ in range(7)] == pytest.approx([0, 0, 0, 0, 0, 0.1, 0.2])
+        now = 100.0
+        assert limit.take() == 0.0
 
 
 class TestServer:
-    asked: list[Any]
+    asked: list[Request]
+
+    def ask(self, request: Request) -> None:
+        self.asked.append(request)
 
     @pytest.fixture
     def server(self) -> Iterator[Server]:
-        board = Board()
-        board.begin({"cell": "made-up"})
+        view_state = ViewState()
+        view_state.begin({"cell": "made-up"})
         self.asked = []
-        server = Server(listen("127.0.0.1", 0), board, self.asked.append, None)
+        server = Server(listen("127.0.0.1", 0), view_state, self.ask, None)
         yield server
         server.close()
 
@@ -228,17 +290,38 @@ class TestServer:
         ):
             pass
 
+    @pytest.mark.parametrize(
+        "host", ["localhost", "localhost:80", "127.0.0.1", "[::1]:1", "LocalHost"]
+    )
+    def test_this_machine_is_called_by_its_loopback_names(self, server: Server, host: str) -> None:
+        assert self.get(server, "/", Host=host).status == 200
+        assert self.get(server, "/", Host=host, Origin=f"http://{host}").status == 200
+
+    @pytest.mark.parametrize("host", ["", "192.0.2.7", "localhost.evil.example", "evil.example:80"])
+    def test_it_is_called_by_no_other(self, server: Server, host: str) -> None:
+        assert self.get(server, "/", Host=host).status == 403
+        assert self.get(server, "/", Host=host, Origin="null").status == 403
+
+    def test_open_to_others_it_is_still_called_by_its_names_and_addresses_alone(self) -> None:
+        server = Server(listen("0.0.0.0", 0), ViewState(), self.ask, None, "robot.example")
+        try:
+            for host in ("robot.example", "192.0.2.7:80", "[2001:db8::1]", socket.gethostname()):
+                assert self.get(server, "/", Host=host).status == 200
+            for host in ("evil.example", "192.0.2.7.evil.example"):
+                assert self.get(server, "/", Host=host).status == 403
+        finally:
+            server.close()
+
     def test_a_page_is_told_and_may_ask(self, server: Server) -> None:
         origin = f"http://127.0.0.1:{server.port}"
         with connect(f"ws://127.0.0.1:{server.port}/live", origin=origin) as line:
             message = line.recv(10)
             length = int.from_bytes(message[:4], "little")
             assert json.loads(message[4 : 4 + length])["about"] == {"cell": "made-up"}
-            line.send("not JSON")
             line.send(json.dumps({"do": "pause"}))
             line.send(json.dumps({"do": "more"}))
             line.ping().wait(10)
-        assert self.asked == [{"do": "pause"}]
+        assert [request.command for request in self.asked] == [Pause(do="pause")]
 
     def test_it_listens_on_loopback_only(self, server: Server) -> None:
         assert server.address == f"http://localhost:{server.port}/"

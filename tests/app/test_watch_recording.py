@@ -22,7 +22,7 @@ SMALL = {
     "duration_s": "2.0",
 }
 TIME = "Number.parseFloat(document.getElementById('time').textContent)"
-CAPTION = "watch.pictures.views.get('wrist').caption.textContent"
+CAPTION = "watch.images.views.get('wrist').caption.textContent"
 BADGE = "document.getElementById('pause').textContent"
 
 
@@ -59,18 +59,18 @@ class TestPlayback:
         playback = Playback(puma_run, None)
         taken = [time for time, _ in puma_run.jpegs("wrist")]
         for time in (0.0, 0.5, 0.77, 1.99):
-            (shot,) = playback.shots(time)
-            assert shot.time <= time
-            assert time - shot.time < 0.14  # every second of 30 Hz, two frames late
-            assert shot.time == pytest.approx(min(taken, key=lambda t: abs(t - shot.time)))
-            assert playback.shots(time)[0] is shot
+            (view,) = playback.views(time)
+            assert view.time <= time
+            assert time - view.time < 0.14  # every second of 30 Hz, two frames late
+            assert view.time == pytest.approx(min(taken, key=lambda t: abs(t - view.time)))
+            assert playback.views(time)[0] is view
 
     def test_marks_belong_to_the_picture_they_are_drawn_in(self, puma_run: Recording) -> None:
-        (shot,) = Playback(puma_run, None).shots(1.0)
+        (view,) = Playback(puma_run, None).views(1.0)
         trace = puma_run.cameras["wrist"]
-        row = int(np.argmin(np.abs(trace.time - shot.time)))
-        np.testing.assert_array_equal(shot.points.points_px, trace.points_px[row])
-        assert shot.header["predicted"] is not None
+        row = int(np.argmin(np.abs(trace.time - view.time)))
+        np.testing.assert_array_equal(view.points.points_px, trace.points_px[row])
+        assert view.header["predicted"] is not None
 
     def test_all_of_every_curve_is_there(self, puma_run: Recording) -> None:
         playback = Playback(puma_run, None)
@@ -89,8 +89,8 @@ class TestPlayback:
             playback.state(time)
             row = int(np.argmin(np.abs(trace.time - time)))
             np.testing.assert_allclose(world.world.joint_position("puma"), trace.position[row])
-        board = world.world.data.mocap_pos[0]
-        np.testing.assert_allclose(board, puma_run.cameras["wrist"].T_world_target[-1, :3, 3])
+        view_state = world.world.data.mocap_pos[0]
+        np.testing.assert_allclose(view_state, puma_run.cameras["wrist"].T_world_target[-1, :3, 3])
 
 
 class TestRecordedWorld:
@@ -159,7 +159,7 @@ def test_without_the_cell_the_page_says_why_it_shows_no_space(
     stage = "document.getElementById('stage')?.textContent ?? ''"
     browser.wait(stage, lambda text: "not on this machine" in text)
     browser.wait(
-        "watch.pictures.views.get('wrist')?.caption.textContent ?? ''",
+        "watch.images.views.get('wrist')?.caption.textContent ?? ''",
         lambda text: "4 of 4 found" in text,
     )
     browser.close()

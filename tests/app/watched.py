@@ -27,6 +27,16 @@ class Watched:
         assert found, self.said + self._process.communicate(timeout=60)[1]
         self.address = found[0]
 
+    @property
+    def pid(self) -> int:
+        """The process."""
+        return self._process.pid
+
+    @property
+    def port(self) -> int:
+        """The port of the page."""
+        return int(self.address.rstrip("/").rpartition(":")[2])
+
     def stop(self) -> dict[str, Any]:
         """Press Ctrl-C; return the answer."""
         self._process.send_signal(signal.SIGINT)

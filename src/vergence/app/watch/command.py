@@ -59,12 +59,12 @@ def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
     from vergence.app.watch.server import Server, listen
     from vergence.runtime import Recording
 
-    door = listen(request.host, request.port)
+    listener = listen(request.host, request.port)
     with working("reading the recording"):
         replay = Replay(Recording.open(path))
     with closing(replay):
-        scene = replay.scene.port if replay.scene is not None else None
-        server = Server(door, replay.board, replay.ask, scene)
+        scene = replay.scene.path if replay.scene is not None else None
+        server = Server(listener, replay.view_state, replay.ask, scene, request.host)
         with closing(server), suppress(KeyboardInterrupt):
             _invite(server, request)
             replay.run()
@@ -78,16 +78,21 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
     settings = overrides(request.settings)
     load_cell(request.source, settings, request.seed)  # a mistake is told before all is loaded
     from vergence.app.progress import working
-    from vergence.app.watch.law_desk import LawDesk
+    from vergence.app.watch.law_editor import LawEditor
     from vergence.app.watch.live import Live
     from vergence.app.watch.server import Server, listen
 
-    door = listen(request.host, request.port)
-    desk = LawDesk(request.source, settings, request.seed)
-    out = request.out or new_folder(desk.cell.name)
+    listener = listen(request.host, request.port)
+    editor = LawEditor(request.source, settings, request.seed)
+    out = request.out or new_folder(editor.cell.name)
     with working("setting up the cell"):
-        live = Live(desk, request.images, out, request.image_every)
-    with closing(live), closing(Server(door, live.board, live.ask, live.scene.port)) as server:
+        live = Live(editor, request.images, out, request.image_every)
+    with (
+        closing(live),
+        closing(
+            Server(listener, live.view_state, live.ask, live.scene.path, request.host)
+        ) as server,
+    ):
         try:
             _invite(server, request)
             outcome = live.run().outcome
@@ -95,7 +100,7 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
         except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
             end = {"kind": "stopped", "reason": "stopped by the user", "time": 0.0}
     _say(f"recorded: `vergence watch {live.folder}` shows it again", request)
-    return {"cell": desk.cell.name, "address": server.address, "run": live.folder, "outcome": end}
+    return {"cell": editor.cell.name, "address": server.address, "run": live.folder, "outcome": end}
 
 
 def _invite(server: "Server", request: Request) -> None:

@@ -1,25 +1,36 @@
 """A cell that runs while somebody watches, pauses it, turns its knobs and moves its target."""
 
 import contextlib
-import queue
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from vergence.app.watch.board import Board
-from vergence.app.watch.hand import Hand
-from vergence.app.watch.law_desk import LawDesk
+from vergence.app.watch.commands import (
+    ChooseLaw,
+    Command,
+    Grab,
+    LetGo,
+    Move,
+    Pause,
+    Release,
+    Reset,
+    Resume,
+    SetSpeed,
+    Step,
+    TurnKnob,
+)
+from vergence.app.watch.drag import TargetDrag
+from vergence.app.watch.inbox import Inbox
+from vergence.app.watch.law_editor import LawEditor
 from vergence.app.watch.outline import outline_from, target_corners
 from vergence.app.watch.pace import Pace
+from vergence.app.watch.protocol import Request
 from vergence.app.watch.publisher import Publisher
 from vergence.app.watch.scene import Scene, world_state
+from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.assembly import RunResult, run_driver
-from vergence.errors import InputError
+from vergence.control import Law
 from vergence.runtime import Loop, Recorder
 from vergence.signals import Outcome, OutcomeKind
-
-Command = Mapping[str, Any]
 
 _LOOK_UP_S = 0.1  # the longest wait without a look at whether Ctrl-C was pressed
 
@@ -30,39 +41,39 @@ class Live:
     It runs in the thread that calls `run`; `ask` may be called from any.
 
     Args:
-        desk: has the cell.
+        editor: has the cell.
         images: look through rendered images; if not, at exact projections.
         out: folder of the recording; runs after a reset get a number behind it.
         image_every: record every n-th picture.
 
     Attributes:
-        board: what there is to show.
+        view_state: what there is to show.
         scene: the view in three dimensions.
         folder: of the newest recording.
     """
 
-    def __init__(self, desk: LawDesk, images: bool, out: Path, image_every: int) -> None:
-        self._desk, self._images = desk, images
+    def __init__(self, editor: LawEditor, images: bool, out: Path, image_every: int) -> None:
+        self._editor, self._images = editor, images
         self._out, self._image_every = out, image_every
-        self._inbox: queue.Queue[Command] = queue.Queue()
+        self._inbox = Inbox()
         self._pace = Pace()
-        self._driver = WatchedDriver(desk.cell, images)
+        self._driver = WatchedDriver(editor.cell, images)
         self._corners = target_corners(self._driver.world)
         self._loop: Loop | None = None
         self._recorder = Recorder(out, image_every)
         self._runs, self._again = 0, True
-        self.board = Board()
-        self._hand = Hand(self._driver, self.board)
-        self.scene = Scene(self._driver.world, self.board)
+        self.view_state = ViewState()
+        self._drag = TargetDrag(self._driver, self.view_state)
+        self.scene = Scene(self._driver.world, self.view_state)
 
     @property
     def folder(self) -> Path:
         """Where the newest run is recorded."""
         return self._recorder.folder
 
-    def ask(self, command: Command) -> None:
+    def ask(self, request: Request) -> None:
         """Ask for something; it is done between two turns of the loop."""
-        self._inbox.put(command)
+        self._inbox.ask(request)
 
     def run(self) -> RunResult:
         """Run the cell until Ctrl-C; return what came of the last run."""
@@ -83,14 +94,14 @@ class Live:
         self._driver.close()
 
     def _run_once(self) -> RunResult:
-        cell = self._desk.cell
+        cell = self._editor.cell
         about = {
             "mode": "live",
             "scene": True,
             "draggable": self._driver.world.target_is_free,
             "carried_by": cell.target.carried_by,
         }
-        publisher = Publisher(self.board, cell, self._driver, about)
+        publisher = Publisher(self.view_state, cell, self._driver, about)
         self._tell()
         try:
             return run_driver(
@@ -115,14 +126,14 @@ class Live:
         self._runs += 1
         folder = self._out.with_name(f"{self._out.name}-{self._runs + 1}")
         self._recorder = Recorder(folder, self._image_every)
-        self._driver = WatchedDriver(self._desk.cell, self._images)
-        self._hand = Hand(self._driver, self.board)
+        self._driver = WatchedDriver(self._editor.cell, self._images)
+        self._drag = TargetDrag(self._driver, self.view_state)
 
     def _rest(self) -> None:
         """Do what is asked after a run has ended, until it shall begin again, or Ctrl-C."""
         with contextlib.suppress(KeyboardInterrupt):
             while not self._again:
-                self._obey(self._inbox.get())
+                self._inbox.obey(self._do, timeout_s=None)
                 self._tell()
 
     def _between(self, time: float) -> None:
@@ -130,10 +141,9 @@ class Live:
         self._show(time)
         while not self._stopping and (delay := self._pace.delay(time)) != 0.0:
             self._tell()
-            with contextlib.suppress(queue.Empty):
-                self._obey(self._inbox.get(timeout=min(delay or _LOOK_UP_S, _LOOK_UP_S)))
-        while not self._inbox.empty():
-            self._obey(self._inbox.get())
+            self._inbox.obey(self._do, timeout_s=min(delay or _LOOK_UP_S, _LOOK_UP_S))
+        while not self._inbox.empty:
+            self._inbox.obey(self._do, timeout_s=0.0)
         self._tell()
 
     @property
@@ -142,72 +152,61 @@ class Live:
 
     def _show(self, time: float) -> None:
         world = self._driver.world
-        self.board.state = world_state(world.model, world.data)
-        around = outline_from(self.scene.eye, self._corners, world.target_pose())
-        self.board.status(time=time, outline=around, fovy=self.scene.eye.fovy_deg)
+        self.view_state.state = world_state(world.model, world.data)
+        around = outline_from(self.scene.viewer_camera, self._corners, world.target_pose())
+        self.view_state.status(time=time, outline=around, fovy=self.scene.viewer_camera.fovy_deg)
 
     def _tell(self) -> None:
         pace = self._pace
-        self.board.status(
+        self.view_state.status(
             paused=pace.paused,
             speed=pace.speed,
             measured=round(pace.measured, 2),
             held=self._driver.target.held,
-            law=self._desk.as_json(),
+            law=self._editor.as_json(),
             folder=str(self.folder),
         )
 
-    def _obey(self, command: Command) -> None:
+    def _do(self, command: Command) -> None:
         match command:
-            case {"do": "pause"}:
+            case Pause():
                 self._pace.pause()
-            case {"do": "resume"}:
+            case Resume():
                 self._pace.resume()
-            case {"do": "step"}:
+            case Step():
                 self._pace.step()
-            case {"do": "speed", "value": float(speed) | int(speed)} if speed > 0:
-                self._pace.set_speed(float(speed))
-            case {"do": "reset"}:
+            case SetSpeed(value=speed):
+                self._pace.set_speed(speed)
+            case Reset():
                 self._again = True
                 if self._loop is not None:
                     self._loop.stop()
-            case {"do": "law" | "knob"}:
-                self._change_law(command)
-            case _:
+            case ChooseLaw(name=name):
+                self._replace_law(self._editor.choose(name, self._driver))
+            case TurnKnob(key=key, value=value):
+                self._replace_law(self._editor.turn(key, value, self._driver))
+            case _ if self._driver.world.target_is_free:
                 self._move_target(command)
 
-    def _change_law(self, command: Command) -> None:
-        try:
-            match command:
-                case {"do": "law", "name": str(name)}:
-                    law = self._desk.choose(name, self._driver)
-                case {"key": str(key), "value": bool() | int() | float() | str() as value}:
-                    law = self._desk.turn(key, value, self._driver)
-                case _:
-                    return
-        except InputError as error:
-            self._say("law refused", str(error))
-            return
+    def _replace_law(self, law: Law) -> None:
         if self._loop is not None:
             self._loop.replace_law(law)
-        changes = self._desk.as_json()["settings"]
+        changes = self._editor.as_json()["settings"]
         self._say("law changed", ", ".join(changes) or "back to the cell's own")
 
     def _move_target(self, command: Command) -> None:
-        if not self._driver.world.target_is_free:
-            return
         match command:
-            case {"do": "grab", "view": str(view), "u": u, "v": v}:
-                self._hand.grab(view, float(u), float(v), self.scene.eye)
-            case {"do": "move", "view": str(view), "u": u, "v": v, "along": bool(along)}:
-                self._hand.move(view, float(u), float(v), along)
-            case {"do": "release"}:
-                self._hand.release()
-            case {"do": "let go"}:
+            case Grab(view=view, u=u, v=v):
+                self._drag.grab(view, u, v, self.scene.viewer_camera)
+            case Move(view=view, u=u, v=v, along=along):
+                self._drag.move(view, u, v, along)
+            case Release():
+                self._drag.release()
+            case LetGo():
                 self._driver.target.held = False
 
     def _say(self, name: str, text: str) -> None:
         time = self._driver.time
-        self.board.event(time, name, text)
+        self.view_state.event(time, name, text)
         if self._recorder.running:
             self._recorder.event(time, name, text)

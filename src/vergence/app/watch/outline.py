@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from vergence.app.watch.eye import Eye
+from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.geometry import se3_inverse, transform_points
@@ -38,13 +38,13 @@ def outline(corners: FloatArray, T_camera_target: FloatArray, camera: Camera) ->
 
 
 def outline_from(
-    eye: Eye, corners: FloatArray, T_world_target: FloatArray
+    viewer_camera: ViewerCamera, corners: FloatArray, T_world_target: FloatArray
 ) -> list[list[float]] | None:
-    """Return the hull of a target's corners as an eye sees it, in normalized coordinates.
+    """Return the hull of a target's corners as the viewer's camera sees it, normalized.
 
-    None where a part of it is beside or behind the eye.
+    None where a part of it is beside or behind it.
     """
-    seen = transform_points(se3_inverse(eye.T_world_camera) @ T_world_target, corners)
+    seen = transform_points(se3_inverse(viewer_camera.T_world_camera) @ T_world_target, corners)
     if (seen[:, 2] < _NEAR_M).any():
         return None
     hull: list[list[float]] = _hull(seen[:, :2] / seen[:, 2:]).round(5).tolist()

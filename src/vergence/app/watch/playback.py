@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vergence.app.figures.arm import normalized
-from vergence.app.watch.board import Row
+from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.plots import (
     HAND_DEG,
     HAND_MM,
@@ -19,7 +19,7 @@ from vergence.app.watch.plots import (
     row,
 )
 from vergence.app.watch.recorded_world import RecordedWorld
-from vergence.app.watch.shot import Shot
+from vergence.app.watch.view_state import Row
 from vergence.arrays import FloatArray
 from vergence.geometry import se3_inverse
 from vergence.robot import manipulability_measure
@@ -49,7 +49,7 @@ class Playback:
         traces = recording.cameras
         self.cameras = tuple(name for name in traces if len(traces[name].time))
         self._jpegs = {name: tuple(recording.jpegs(name)) for name in self.cameras}
-        self._shots: dict[str, Shot] = {}
+        self._views: dict[str, CameraView] = {}
         self._truth = _true_poses(recording)
         self.plots = tuple(self._choose_plots())
 
@@ -68,14 +68,14 @@ class Playback:
         traces = (self._recording.cameras[name].received for name in self.cameras)
         return np.unique(np.concatenate([np.zeros(1), *traces]))
 
-    def shots(self, time: float) -> list[Shot]:
+    def views(self, time: float) -> list[CameraView]:
         """Return the pictures that had come by a time, the same objects while they are the same."""
         for name in self.cameras:
-            shown = self._shots.get(name)
-            fresh = self._shot(name, time)
+            shown = self._views.get(name)
+            fresh = self._camera_view(name, time)
             if shown is None or shown.time != fresh.time:
-                self._shots[name] = fresh
-        return list(self._shots.values())
+                self._views[name] = fresh
+        return list(self._views.values())
 
     def state(self, time: float) -> FloatArray | None:
         """Return MuJoCo's state of the world at a time; None where the world is not known."""
@@ -144,14 +144,14 @@ class Playback:
             away = T[:3, 3] - poses[_newest(times, time)][:3, 3]
             yield row(time, self.plots, {"target_mm": np.array([_MM * np.linalg.norm(away)])})
 
-    def _shot(self, name: str, time: float) -> Shot:
+    def _camera_view(self, name: str, time: float) -> CameraView:
         trace, jpegs = self._recording.cameras[name], self._jpegs[name]
         index, kept = _newest(trace.received, time), b""
         if jpegs:
             number = _newest(np.array([taken for taken, _ in jpegs]), float(trace.time[index]))
             taken, kept = jpegs[number]
             index = int(np.argmin(np.abs(trace.time - taken)))
-        return Shot(
+        return CameraView(
             name,
             float(trace.time[index]),
             None,

@@ -1,14 +1,14 @@
-"""Puts every tick of a running cell on the board."""
+"""Puts every tick of a running cell on the view_state."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from vergence.app.figures.arm import normalized
-from vergence.app.watch.board import Board
+from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.outline import outline, target_corners
 from vergence.app.watch.plots import Plot, error_key, live_plots, row
-from vergence.app.watch.shot import Shot
+from vergence.app.watch.view_state import ViewState
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
 from vergence.geometry import se3_inverse, transform_points
@@ -25,16 +25,20 @@ class Publisher:
     """A listener that hands each tick to the page.
 
     Args:
-        board: what the page shows.
+        view_state: what the page shows.
         cell: what runs.
         driver: of that cell.
         about: what else the page has to know of the run.
     """
 
     def __init__(
-        self, board: Board, cell: Cell, driver: SimulatedDriver, about: Mapping[str, object]
+        self,
+        view_state: ViewState,
+        cell: Cell,
+        driver: SimulatedDriver,
+        about: Mapping[str, object],
     ) -> None:
-        self._board, self._cell, self._driver = board, cell, driver
+        self._view_state, self._cell, self._driver = view_state, cell, driver
         self._about = about
         self._corners = target_corners(driver.world)
         self._plots: tuple[Plot, ...] = ()
@@ -45,7 +49,7 @@ class Publisher:
         self._info = info
         arm = info.arms[self._cell.task.arm]
         self._plots = live_plots(self._cell, len(self._driver.features), arm)
-        self._board.begin(
+        self._view_state.begin(
             {
                 "cell": info.cell,
                 "task": self._cell.task.kind,
@@ -59,23 +63,23 @@ class Publisher:
                 **self._about,
             }
         )
-        self._board.status(outcome=None)
+        self._view_state.status(outcome=None)
 
     def tick(self, record: TickRecord) -> None:
         """Hand on what came in, what was seen and what was asked."""
-        shots = [self._shot(frame, record) for frame in record.sample.frames]
-        self._board.tick(row(record.time, self._plots, self._values(record)), shots)
+        views = [self._camera_view(frame, record) for frame in record.sample.frames]
+        self._view_state.tick(row(record.time, self._plots, self._values(record)), views)
 
     def event(self, time: float, name: str, text: str) -> None:
         """Hand on an event."""
-        self._board.event(time, name, text)
+        self._view_state.event(time, name, text)
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Tell the page how it ended."""
         end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-        self._board.status(outcome={**end, "succeeded": outcome.succeeded})
+        self._view_state.status(outcome={**end, "succeeded": outcome.succeeded})
 
-    def _shot(self, frame: Frame, record: TickRecord) -> Shot:
+    def _camera_view(self, frame: Frame, record: TickRecord) -> CameraView:
         views = record.observation.views if record.observation else ()
         mine = (view for view in views if (view.camera, view.time) == (frame.camera, frame.time))
         view, truth = next(mine, None), frame.truth
@@ -84,7 +88,7 @@ class Publisher:
         if truth is not None and not self._looks_at_tool(frame.camera):
             T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
             around = outline(self._corners, T_camera_target, camera)
-        return Shot(
+        return CameraView(
             frame.camera,
             frame.time,
             frame.image,

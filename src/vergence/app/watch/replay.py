@@ -1,17 +1,17 @@
 """A recording that somebody watches: it plays, pauses and goes where the slider is."""
 
 import contextlib
-import queue
-from collections.abc import Mapping
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
-from vergence.app.watch.board import Board
+from vergence.app.watch.commands import Command, Pause, Reset, Resume, Seek, SetSpeed, Step
+from vergence.app.watch.inbox import Inbox
 from vergence.app.watch.playback import Playback
+from vergence.app.watch.protocol import Request
 from vergence.app.watch.recorded_world import RecordedWorld
 from vergence.app.watch.scene import Scene
+from vergence.app.watch.view_state import ViewState
 from vergence.runtime.recording import Recording
 
 _PERIOD_S = 1 / 30
@@ -24,7 +24,7 @@ class Replay:
         recording: of the run.
 
     Attributes:
-        board: what there is to show.
+        view_state: what there is to show.
         scene: the view in three dimensions, where the cell is known.
     """
 
@@ -33,17 +33,17 @@ class Replay:
         known = world if isinstance(world, RecordedWorld) else None
         self._recording = recording
         self._playback = Playback(recording, known)
-        self._inbox: queue.Queue[Mapping[str, Any]] = queue.Queue()
+        self._inbox = Inbox()
         self._time, self._speed, self._paused = 0.0, 1.0, True
-        self.board = Board()
+        self.view_state = ViewState()
         self.scene: Scene | None = None
         if known is not None:
-            self.scene = Scene(known.world, self.board)
+            self.scene = Scene(known.world, self.view_state)
         self._begin("" if known is not None else str(world))
 
-    def ask(self, command: Mapping[str, Any]) -> None:
+    def ask(self, request: Request) -> None:
         """Ask for something; it is done before the next instant is shown."""
-        self._inbox.put(command)
+        self._inbox.ask(request)
 
     def run(self) -> None:
         """Play until Ctrl-C."""
@@ -58,8 +58,7 @@ class Replay:
     def _play(self) -> None:
         before = perf_counter()
         while True:
-            with contextlib.suppress(queue.Empty):
-                self._obey(self._inbox.get(timeout=_PERIOD_S))
+            self._inbox.obey(self._do, timeout_s=_PERIOD_S)
             now = perf_counter()
             if not self._paused:
                 self._go_to(self._time + self._speed * (now - before))
@@ -81,42 +80,42 @@ class Replay:
             "no_scene": f"No view in space: {why_no_scene}",
             "draggable": False,
         }
-        self.board.begin(about, self._playback.rows())
+        self.view_state.begin(about, self._playback.rows())
         for event in self._recording.events:
-            self.board.event(event.time, event.name, event.text)
+            self.view_state.event(event.time, event.name, event.text)
         if outcome is not None:
             end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-            self.board.status(outcome={**end, "succeeded": outcome.succeeded})
+            self.view_state.status(outcome={**end, "succeeded": outcome.succeeded})
         self._show()
 
     def _show(self) -> None:
         state = self._playback.state(self._time)
         if state is not None:
-            self.board.state = state
-        self.board.show(self._playback.shots(self._time))
-        self.board.status(time=self._time, paused=self._paused, speed=self._speed)
+            self.view_state.state = state
+        self.view_state.show(self._playback.views(self._time))
+        self.view_state.status(time=self._time, paused=self._paused, speed=self._speed)
 
     def _go_to(self, time: float) -> None:
         self._time = min(max(time, 0.0), self._recording.duration)
         if self._time == self._recording.duration:
             self._paused = True
 
-    def _obey(self, command: Mapping[str, Any]) -> None:
+    def _do(self, command: Command) -> None:
         match command:
-            case {"do": "pause"}:
+            case Pause():
                 self._paused = True
-            case {"do": "resume"}:
+            case Resume():
                 self._paused = False
                 if self._time == self._recording.duration:
                     self._time = 0.0
-            case {"do": "step"}:
+            case Step():
                 self._paused = True
                 times = self._playback.times()
                 later = times[times > self._time + 1e-9]
                 self._go_to(float(later[0]) if len(later) else np.inf)
-            case {"do": "speed", "value": float(speed) | int(speed)} if speed > 0:
-                self._speed = float(speed)
-            case {"do": "seek", "value": float(time) | int(time)}:
-                self._go_to(float(time))
-            case {"do": "reset"}:
+            case SetSpeed(value=speed):
+                self._speed = speed
+            case Seek(value=time):
+                self._go_to(time)
+            case Reset():
                 self._go_to(0.0)

@@ -1,7 +1,7 @@
-"""The cell in three dimensions: MuJoCo Studio's web viewer, shown what the board says.
+"""The cell in three dimensions: MuJoCo Studio's web viewer, shown the view state.
 
-Only its renderer is used: the browser gets the compiled model once, then the world's state. It
-listens on loopback, whatever the page does.
+Only its renderer is used: the browser gets the compiled model once, then the world's state. It is
+reached through the origin gate alone: it listens on a Unix socket.
 """
 
 import logging
@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from vergence.app.watch.board import Board
-from vergence.app.watch.eye import Eye
+from vergence.app.watch.own_process_socket import OwnProcessSocket
+from vergence.app.watch.private_listener import PrivateListener
+from vergence.app.watch.view_state import ViewState
+from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.arrays import FloatArray
 from vergence.simulation.world import World
 
@@ -22,17 +24,17 @@ _FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its vi
 
 
 class Scene:
-    """Serves the view on a loopback port, in threads of its own, until it is closed.
+    """Serves the view on a Unix socket, in threads of its own, until it is closed.
 
     Args:
-        world: of the cell, as it stands at first.
-        board: has the state to show from then on.
+        world: of the cell, as it is at first.
+        view_state: has the state to show from then on.
 
     Attributes:
-        port: where it listens, on 127.0.0.1.
+        path: the socket on which it listens.
     """
 
-    def __init__(self, world: World, board: Board) -> None:
+    def __init__(self, world: World, view_state: ViewState) -> None:
         import mujoco
         from mujoco.studio import ux
         from mujoco.studio.web import client_camera, headless_ui, state_payload, web_server
@@ -40,13 +42,13 @@ class Scene:
         logging.getLogger("WebServer").setLevel(logging.WARNING)  # it writes to stdout
         logging.getLogger("asyncio").addFilter(_is_no_hang_up)
         model = world.model
-        self._model, self._board = model, board
+        self._model, self._view_state = model, view_state
         self._payload, self._mode = state_payload, ux.TUMBLE_CAMERA_IDX
         bundle = state_payload.serialize_model_bundle(model)
         self._crc = zlib.crc32(bundle)
-        socket, behind = web_server.bind_loopback_socket(), web_server.bind_loopback_socket()
-        self.port = int(socket.getsockname()[1])
-        self._server = web_server.WebServer(socket, behind, mjb_data=bundle)
+        self._listener, behind = PrivateListener(), OwnProcessSocket.listening()
+        self.path = self._listener.path
+        self._server = web_server.WebServer(self._listener.socket, behind, mjb_data=bundle)
         # Without a user interface behind it, the viewer takes the browser for a mere spectator.
         self._interface = headless_ui.HeadlessUi("vergence", behind.getsockname()[1], "")
         self._camera = mujoco.MjvCamera()
@@ -56,16 +58,16 @@ class Scene:
         self._signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         self._ending = threading.Event()
         # A browser that is shown nothing looks from where it likes, and soon gives the viewer up.
-        board.state = world_state(model, world.data)
+        view_state.state = world_state(model, world.data)
         self._thread = threading.Thread(target=self._show, name="scene", daemon=True)
         self._server.start()
         self._thread.start()
 
     @property
-    def eye(self) -> Eye:
+    def viewer_camera(self) -> ViewerCamera:
         """From where the browser looks."""
         camera = self._camera
-        return Eye.around(
+        return ViewerCamera.around(
             camera.lookat,
             camera.distance,
             camera.azimuth,
@@ -78,6 +80,7 @@ class Scene:
         self._ending.set()
         self._server.stop()
         self._thread.join(timeout=2.0)
+        self._listener.close()
 
     def _look_at(self, points: FloatArray) -> None:
         """Choose a first view across the way from the first of some points to the last."""
@@ -101,7 +104,7 @@ class Scene:
                 time.sleep(_PERIOD_S)
 
     def _publish(self) -> None:
-        state = self._board.state
+        state = self._view_state.state
         if state is None:
             return
         browser = self._payload.ViewerInputState(

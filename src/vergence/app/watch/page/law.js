@@ -1,20 +1,35 @@
 // The law: which one, and its numbers; a number has a field, and a slider over three decades.
 
+import { element, first } from "./dom.js";
+
+/** @import { Ask, KnobAbout, LawStatus } from "./protocol.js" */
+/** @typedef {(value: unknown) => void} Turn */
+
 const DECADES = 1.5; // to either side of where it was when the law was chosen
 
 export class Law {
+  /**
+   * @param {HTMLElement} section
+   * @param {Ask} ask
+   */
   constructor(section, ask) {
     this.section = section;
-    this.choice = section.querySelector("select");
-    this.knobs = section.querySelector("#knobs");
-    this.settings = section.querySelector("#settings");
+    this.choice = first(section, "select");
+    this.knobs = element("knobs");
+    this.settings = element("settings");
     this.ask = ask;
+    this.text = "";
+    /** @type {string | null} */
+    this.shown = null;
+    /** @type {Map<string, (value: any) => void>} */
+    this.fields = new Map();
     this.choice.addEventListener("change", () => {
       this.shown = null;
       ask({ do: "law", name: this.choice.value });
     });
   }
 
+  /** @param {LawStatus} [law] */
   status(law) {
     this.section.hidden = !law;
     if (!law) return;
@@ -24,10 +39,11 @@ export class Law {
     const names = [law.choice, ...law.knobs.map(({ key }) => key)].join();
     if (names !== this.shown) this.build(law);
     this.shown = names;
-    for (const knob of law.knobs) this.fields.get(knob.key)(knob.value);
+    for (const knob of law.knobs) this.fields.get(knob.key)?.(knob.value);
     this.settings.replaceChildren(...command(law.settings));
   }
 
+  /** @param {LawStatus} law */
   build(law) {
     this.choice.replaceChildren(...law.choices.map((name) => new Option(name, name)));
     this.choice.value = law.choice;
@@ -35,18 +51,25 @@ export class Law {
     this.knobs.replaceChildren(...law.knobs.map((knob) => this.knob(knob)));
   }
 
+  /** @param {KnobAbout} knob */
   knob(knob) {
     const row = document.createElement("label");
     row.className = `knob ${knob.kind}`;
     row.dataset.key = knob.key;
     const name = document.createElement("span");
     name.textContent = knob.label;
+    /** @type {Turn} */
     const turn = (value) => this.ask({ do: "knob", key: knob.key, value });
     const make = { number: this.number, choice: this.choices, switch: this.flag }[knob.kind];
     row.append(name, ...make.call(this, knob, turn));
     return row;
   }
 
+  /**
+   * @param {KnobAbout} knob
+   * @param {Turn} turn
+   * @returns {HTMLElement[]}
+   */
   number(knob, turn) {
     const field = document.createElement("input");
     field.type = "number";
@@ -57,30 +80,42 @@ export class Law {
     field.addEventListener("change", () => field.value !== "" && turn(Number(field.value)));
     const slider = document.createElement("input");
     slider.type = "range";
-    slider.min = -DECADES;
-    slider.max = DECADES;
-    slider.step = 0.01;
+    slider.min = String(-DECADES);
+    slider.max = String(DECADES);
+    slider.step = "0.01";
     slider.ariaLabel = knob.label;
+    /** @type {number} */
     const middle = knob.value;
     slider.disabled = middle <= 0;
-    slider.addEventListener("input", () => { field.value = short(Number((middle * 10 ** slider.value).toPrecision(3))); });
-    slider.addEventListener("change", () => turn(Number((middle * 10 ** slider.value).toPrecision(3))));
+    const chosen = () => Number((middle * 10 ** Number(slider.value)).toPrecision(3));
+    slider.addEventListener("input", () => { field.value = short(chosen()); });
+    slider.addEventListener("change", () => turn(chosen()));
     this.fields.set(knob.key, (value) => {
       if (document.activeElement !== field) field.value = short(value);
-      if (middle > 0 && document.activeElement !== slider) slider.value = Math.log10(Math.max(value, 1e-300) / middle);
+      if (middle > 0 && document.activeElement !== slider) slider.value = String(Math.log10(Math.max(value, 1e-300) / middle));
     });
     return middle > 0 ? [field, unit, slider] : [field, unit];
   }
 
+  /**
+   * @param {KnobAbout} knob
+   * @param {Turn} turn
+   * @returns {HTMLElement[]}
+   */
   choices(knob, turn) {
     const field = document.createElement("select");
     field.className = "wide";
-    field.append(...knob.choices.map((name) => new Option(name.replaceAll("_", " "), name)));
+    field.append(...(knob.choices ?? []).map((name) => new Option(name.replaceAll("_", " "), name)));
     field.addEventListener("change", () => turn(field.value));
     this.fields.set(knob.key, (value) => { field.value = value; });
     return [field];
   }
 
+  /**
+   * @param {KnobAbout} knob
+   * @param {Turn} turn
+   * @returns {HTMLElement[]}
+   */
   flag(knob, turn) {
     const field = document.createElement("input");
     field.type = "checkbox";
@@ -90,7 +125,10 @@ export class Law {
   }
 }
 
-// Says how to run the cell with what was changed.
+/**
+ * Says how to run the cell with what was changed.
+ * @param {string[]} settings
+ */
 function command(settings) {
   if (!settings.length) return [];
   const code = document.createElement("code");
@@ -98,7 +136,10 @@ function command(settings) {
   return ["The same from the command line: ", code];
 }
 
-// A number as briefly as it can be written.
+/**
+ * A number as briefly as it can be written.
+ * @param {number} value
+ */
 function short(value) {
   return value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential() : String(value);
 }

@@ -1,49 +1,64 @@
-// The page of `vergence watch`: shows what comes over the line, asks for what is clicked.
+// The page of `vergence watch`: shows what comes over the connection, asks for what is clicked.
 
+import { Connection } from "./connection.js";
+import { element } from "./dom.js";
+import { Images } from "./images.js";
 import { Law } from "./law.js";
-import { Line } from "./line.js";
 import { Log } from "./log.js";
 import { Mouse } from "./mouse.js";
-import { Pictures } from "./pictures.js";
 import { Plots } from "./plots.js";
 import { Scene } from "./scene.js";
 import { Transport } from "./transport.js";
 
-const element = (id) => document.getElementById(id);
-const ask = (command) => line.ask(command);
+/** @import { About, Ask, News, Status } from "./protocol.js" */
+
+/** @type {Ask} */
+const ask = (command) => connection.ask(command);
 
 const mouse = new Mouse(ask);
 const transport = new Transport(ask);
-const pictures = new Pictures(element("pictures"), element("legend"), mouse);
-const plots = new Plots(element("plots"), { seek: (value) => ask({ do: "seek", value }) });
+const images = new Images(element("images"), element("legend"), mouse);
+const plots = new Plots(element("plots"), (value) => ask({ do: "seek", value }));
 const scene = new Scene(element("stage"), element("scene-hint"), mouse);
 const law = new Law(element("law"), ask);
 const log = new Log(element("log"));
-const line = new Line(hear, (open) => transport.connected(open));
+const connection = new Connection(
+  hear,
+  (reason) => log.refused(reason),
+  (open) => transport.connected(open),
+);
 
-function hear({ about, status, rows, events, pictures: headers }, blobs) {
-  if (about) for (const part of [transport, pictures, plots, scene, log]) part.begin(about);
+/**
+ * @param {News} news
+ * @param {(Blob | null)[]} blobs
+ */
+function hear({ about, status, rows, events, images: headers }, blobs) {
+  if (about) for (const part of [transport, images, plots, scene, log]) part.begin(about);
   if (about) hint(about);
   transport.status(status);
   scene.status(status);
   law.status(status.law);
   loose(status);
   plots.add(rows);
-  plots.at(status.time);
+  plots.at(status.time ?? 0);
   log.add(events);
-  headers.forEach((header, i) => pictures.show(header, blobs[i]));
+  headers.forEach((header, i) => images.show(header, blobs[i]));
 }
 
+/** @param {About} about */
 function hint({ draggable, carried_by, mode }) {
   if (mode === "recording") return;
   element("drag-hint").textContent = draggable
-    ? "Drag the target with the mouse, in a picture or in space; with Shift it comes nearer or goes away. "
-    : `The target is in the hand of ${carried_by}: the mouse cannot move it.`;
+    ? "Drag the target with the mouse, in an image or in 3D; with Shift it comes nearer or goes away. "
+    : `${carried_by} holds the target: the mouse cannot move it.`;
 }
 
-// While the mouse has stopped the target's own motion, offers to let it go on.
+/**
+ * While the mouse has stopped the target's own motion, offers to let it go on.
+ * @param {Status} status
+ */
 function loose({ held }) {
-  const button = element("let-go");
+  const button = document.getElementById("let-go");
   if (!held) { button?.remove(); return; }
   if (button) return;
   const fresh = document.createElement("button");
@@ -54,4 +69,4 @@ function loose({ held }) {
   element("drag-hint").append(fresh);
 }
 
-window.watch = { scene, pictures, plots, law, mouse }; // for those who script the page
+Object.assign(window, { watch: { scene, images, plots, law, mouse } }); // for those who script the page

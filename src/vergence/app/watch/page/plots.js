@@ -1,5 +1,11 @@
 // Curves over time, drawn by hand: an axis with round numbers, units in the title, the legend above.
 
+import { context_of } from "./dom.js";
+
+/** @import { About, PlotAbout, Row } from "./protocol.js" */
+/** @typedef {(number | null)[]} Values */
+/** @typedef {(value: number) => number} Scale */
+
 // Okabe and Ito's hues, told apart by colour-blind readers too; one for light ground, one for dark.
 const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#6b4fa0", "#7f8c8d", "#a0522d"];
 const DARK = ["#4ea8e8", "#f08a3c", "#2fc79b", "#e59cc4", "#e8c24a", "#8fd3ff", "#a993e0", "#aeb9c4", "#cf8a66"];
@@ -7,30 +13,43 @@ const MARGIN = { left: 46, right: 10, top: 6, bottom: 18 };
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 export class Plots {
-  constructor(root, { seek }) {
+  /**
+   * @param {HTMLElement} root
+   * @param {(time: number) => void} seek
+   */
+  constructor(root, seek) {
     this.root = root;
     this.seek = seek;
+    /** @type {Plot[]} */
     this.plots = [];
+    /** @type {Row[]} */
     this.rows = [];
+    /** @type {number | null} */
+    this.whole = null; // s, of a recording: all of it is shown, with a cursor
+    /** @type {number | null} */
+    this.cursor = null;
+    this.waiting = false;
     this.span = 20; // s shown while it runs
     const redraw = () => this.draw();
     new ResizeObserver(redraw).observe(root);
     dark.addEventListener("change", () => { this.plots.forEach((plot) => plot.legend()); redraw(); });
   }
 
+  /** @param {About} about */
   begin(about) {
     this.rows = [];
-    this.whole = about.duration ?? null; // of a recording: all of it is shown, with a cursor
+    this.whole = about.duration ?? null;
     this.cursor = null;
     this.root.replaceChildren();
     this.plots = about.plots.map((plot, index) => new Plot(this, plot, index + 1));
   }
 
+  /** @param {Row[]} rows */
   add(rows) {
     if (!rows.length) return;
     this.rows.push(...rows);
     if (this.whole === null) {
-      const oldest = this.rows.at(-1)[0] - this.span - 1;
+      const oldest = rows[rows.length - 1][0] - this.span - 1;
       let first = 0;
       while (this.rows[first][0] < oldest) first++;
       this.rows.splice(0, first);
@@ -38,6 +57,7 @@ export class Plots {
     this.draw();
   }
 
+  /** @param {number} time */
   at(time) {
     if (this.whole === null || time === this.cursor) return;
     this.cursor = time;
@@ -53,16 +73,26 @@ export class Plots {
   // Draws all, once a frame at most.
   draw() {
     if (this.waiting) return;
-    this.waiting = requestAnimationFrame(() => {
-      this.waiting = null;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
       for (const plot of this.plots) plot.draw();
     });
   }
 }
 
 class Plot {
+  /**
+   * @param {Plots} plots
+   * @param {PlotAbout} about
+   * @param {number} column  of its values in a row
+   */
   constructor(plots, about, column) {
-    Object.assign(this, { plots, about, column });
+    this.plots = plots;
+    this.about = about;
+    this.column = column;
+    this.value = document.createElement("output");
+    this.value.style.marginLeft = "auto";
     const figure = document.createElement("figure");
     figure.className = "plot";
     figure.dataset.plot = about.key;
@@ -80,6 +110,13 @@ class Plot {
     });
   }
 
+  /**
+   * @param {Row} row
+   * @returns {Values}
+   */
+  values(row) { return /** @type {Values} */ (row[this.column]); }
+
+  /** @param {number} index */
   ink(index) {
     const inks = dark.matches ? DARK : LIGHT;
     return inks[index % inks.length];
@@ -96,18 +133,18 @@ class Plot {
       entry.append(line, text);
       return entry;
     }) : [];
-    this.caption.replaceChildren(name, ` (${unit}) `, ...names);
-    this.value = document.createElement("output");
-    this.value.style.marginLeft = "auto";
-    this.caption.append(this.value);
+    this.caption.replaceChildren(name, ` (${unit}) `, ...names, this.value);
   }
 
-  // Lowest and highest value to show: as told, else what the curves need, with round ends.
+  /**
+   * Lowest and highest value to show: as told, else what the curves need, with round ends.
+   * @param {Row[]} rows
+   */
   bounds(rows) {
     let { low, high } = this.about;
     let [least, most] = [Infinity, -Infinity];
     if (low === null || high === null) {
-      for (const row of rows) for (const value of row[this.column]) {
+      for (const row of rows) for (const value of this.values(row)) {
         if (value === null) continue;
         if (value < least) least = value;
         if (value > most) most = value;
@@ -126,14 +163,17 @@ class Plot {
     if (!width) return;
     canvas.width = Math.round(width * unit);
     canvas.height = Math.round(height * unit);
-    const context = canvas.getContext("2d");
+    const context = context_of(canvas);
     context.scale(unit, unit);
     const [from, to] = plots.range;
     const rows = plots.rows.filter((row) => row[0] >= from - 0.5);
     const [low, high] = this.bounds(rows);
+    /** @type {Scale} */
     const x = (time) => MARGIN.left + (time - from) / (to - from) * (width - MARGIN.left - MARGIN.right);
+    /** @type {Scale} */
     const y = (value) => height - MARGIN.bottom - (value - low) / (high - low) * (height - MARGIN.top - MARGIN.bottom);
     const style = getComputedStyle(document.documentElement);
+    /** @param {string} name */
     const colour = (name) => style.getPropertyValue(name).trim();
     context.font = "11px system-ui, sans-serif";
     context.lineWidth = 1;
@@ -151,31 +191,46 @@ class Plot {
     this.tell(rows);
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Row[]} rows
+   * @param {number} index
+   * @param {Scale} x
+   * @param {Scale} y
+   */
   curve(context, rows, index, x, y) {
     context.strokeStyle = this.ink(index);
     context.beginPath();
     let pen = false;
     for (const row of rows) {
-      const value = row[this.column][index] ?? null;
-      if (value === null) { if (row[this.column].length) pen = false; continue; }
+      const value = this.values(row)[index] ?? null;
+      if (value === null) { if (this.values(row).length) pen = false; continue; }
       pen ? context.lineTo(x(row[0]), y(value)) : context.moveTo(x(row[0]), y(value));
       pen = true;
     }
     context.stroke();
   }
 
-  // Writes the value at the cursor, or the newest, of a plot with one curve; else the largest.
+  /**
+   * Writes the value at the cursor, or the newest, of a plot with one curve; else the largest.
+   * @param {Row[]} rows
+   */
   tell(rows) {
     const { cursor } = this.plots;
-    const known = rows.filter((row) => row[this.column].some((value) => value !== null));
+    const known = rows.filter((row) => this.values(row).some((value) => value !== null));
     const row = cursor === null ? known.at(-1) : known.findLast((each) => each[0] <= cursor + 1e-9);
-    const values = row?.[this.column].filter((value) => value !== null) ?? [];
+    const values = row ? this.values(row).filter((value) => value !== null) : [];
     if (!values.length) { this.value.textContent = ""; return; }
     const most = values.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
     this.value.textContent = (values.length > 1 ? "largest " : "") + most.toPrecision(3);
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} style
+ * @param {number[][]} places
+ */
 function line(context, style, places) {
   context.strokeStyle = style;
   context.beginPath();
@@ -183,6 +238,23 @@ function line(context, style, places) {
   context.stroke();
 }
 
+/**
+ * @typedef {object} Axes
+ * @property {Scale} x
+ * @property {Scale} y
+ * @property {number} from
+ * @property {number} to
+ * @property {number} low
+ * @property {number} high
+ * @property {number} width
+ * @property {number} height
+ * @property {(name: string) => string} colour
+ */
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Axes} axes
+ */
 function grid(context, { x, y, from, to, low, high, width, height, colour }) {
   context.fillStyle = colour("--soft");
   context.textAlign = "right";
@@ -202,16 +274,26 @@ function grid(context, { x, y, from, to, low, high, width, height, colour }) {
   context.fillText("s", width - MARGIN.right, height - 4);
 }
 
-// Round numbers between two ends.
+/**
+ * Round numbers between two ends.
+ * @param {number} low
+ * @param {number} high
+ * @param {number} count
+ */
 function ticks(low, high, count) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough * 0.999);
+  const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough * 0.999) ?? 10 * power;
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
   return found;
 }
 
+/**
+ * @param {number} value
+ * @param {number} low
+ * @param {number} high
+ */
 function label(value, low, high) {
   const size = Math.max(Math.abs(low), Math.abs(high));
   if (value === 0) return "0";

@@ -1,4 +1,10 @@
-// Whether a place lies inside a polygon.
+/** @import { Place } from "./protocol.js" */
+
+/**
+ * Whether a place lies inside a polygon.
+ * @param {Place} place
+ * @param {Place[]} corners
+ */
 export function inside([x, y], corners) {
   let odd = false;
   corners.forEach(([ax, ay], i) => {

@@ -1,10 +1,25 @@
 // Time: pause, step, reset, speed, and in a recording the slider.
+
+import { element } from "./dom.js";
+
+/** @import { About, Ask, Status } from "./protocol.js" */
+
 export class Transport {
+  /** @param {Ask} ask */
   constructor(ask) {
     this.ask = ask;
-    for (const id of ["time", "pause", "step", "reset", "speed", "measured", "badge", "reason", "slider", "seek", "cell"]) {
-      this[id] = document.getElementById(id);
-    }
+    this.time = element("time");
+    this.pause = /** @type {HTMLButtonElement} */ (element("pause"));
+    this.step = /** @type {HTMLButtonElement} */ (element("step"));
+    this.reset = element("reset");
+    this.speed = /** @type {HTMLSelectElement} */ (element("speed"));
+    this.measured = element("measured");
+    this.badge = element("badge");
+    this.reason = element("reason");
+    this.slider = element("slider");
+    this.seek = /** @type {HTMLInputElement} */ (element("seek"));
+    this.cell = element("cell");
+    this.paused = this.recording = this.sliding = false;
     this.pause.addEventListener("click", () => this.toggle());
     this.step.addEventListener("click", () => ask({ do: "step" }));
     this.reset.addEventListener("click", () => ask({ do: "reset" }));
@@ -13,34 +28,37 @@ export class Transport {
     this.seek.addEventListener("pointerdown", () => { this.sliding = true; });
     this.seek.addEventListener("pointerup", () => { this.sliding = false; });
     document.addEventListener("keydown", (event) => {
-      if (event.key !== " " || event.target.matches("input, select, button")) return;
+      if (event.key !== " " || (event.target instanceof Element && event.target.matches("input, select, button"))) return;
       event.preventDefault();
       this.toggle();
     });
   }
 
+  /** @param {About} about */
   begin(about) {
     this.cell.textContent = about.cell;
     document.title = `${about.cell} · vergence`;
     this.recording = about.mode === "recording";
     this.slider.hidden = !this.recording;
-    if (this.recording) this.seek.max = about.duration;
+    if (this.recording) this.seek.max = String(about.duration);
     this.reset.textContent = this.recording ? "To the start" : "Reset";
   }
 
   toggle() { this.ask({ do: this.paused ? "resume" : "pause" }); }
 
+  /** @param {boolean} open */
   connected(open) {
     if (!open) this.mark("not connected", "plain", "vergence does not answer");
   }
 
+  /** @param {Status} status */
   status({ time, paused, speed, measured, outcome }) {
-    this.paused = paused;
+    this.paused = paused ?? false;
     this.time.textContent = time === undefined ? "" : `${time.toFixed(2)} s`;
     this.pause.textContent = paused ? "Resume" : "Pause";
     if (document.activeElement !== this.speed) this.speed.value = String(speed);
     this.measured.textContent = paused || measured === undefined ? "" : `${measured.toFixed(2)} × real time`;
-    if (this.recording && !this.sliding) this.seek.value = time ?? 0;
+    if (this.recording && !this.sliding) this.seek.value = String(time ?? 0);
     const over = outcome && !this.recording;
     this.pause.disabled = this.step.disabled = Boolean(over);
     if (over) this.measured.textContent = "";
@@ -48,6 +66,11 @@ export class Transport {
     else this.mark(paused ? "paused" : "running", paused ? "plain" : "good", "");
   }
 
+  /**
+   * @param {string} word
+   * @param {string} kind
+   * @param {string} reason
+   */
   mark(word, kind, reason) {
     this.badge.textContent = word;
     this.badge.className = `badge ${kind}`;

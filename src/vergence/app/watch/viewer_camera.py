@@ -11,7 +11,7 @@ from vergence.geometry import se3
 
 
 @dataclass(frozen=True, slots=True)
-class Eye:
+class ViewerCamera:
     """The camera of the view in three dimensions."""
 
     T_world_camera: FloatArray  # (4, 4) z forward, x right, y down

@@ -15,7 +15,7 @@ _DECIMALS = 3  # of a pixel: nobody sees more
 
 
 @dataclass(frozen=True)
-class Shot:
+class CameraView:
     """One picture, what was measured in it, what was wanted, and what is true."""
 
     camera: str

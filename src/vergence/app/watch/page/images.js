@@ -1,7 +1,11 @@
-// The cameras' pictures, with what was looked for, found, wanted and true drawn over them.
+// The cameras' images, with what was looked for, found, desired and true drawn over them.
 // Places are in pixels whose centres are at integers; the canvas has its edges there.
 
+import { context_of } from "./dom.js";
 import { inside } from "./polygon.js";
+
+/** @import { Mouse } from "./mouse.js" */
+/** @import { About, CameraAbout, ImageHeader, Place } from "./protocol.js" */
 
 const INK = {
   found: "#14e696", lost: "#ff6e0a", predicted: "#ffffff", windows: "#d6dbe1",
@@ -9,15 +13,23 @@ const INK = {
 };
 const OUTLINE = "rgba(15, 18, 22, 0.75)";
 
-export class Pictures {
+export class Images {
+  /**
+   * @param {HTMLElement} root
+   * @param {HTMLElement} legend
+   * @param {Mouse} mouse
+   */
   constructor(root, legend, mouse) {
     this.root = root;
     this.mouse = mouse;
+    /** @type {Map<string, View>} */
     this.views = new Map();
+    /** @type {Set<string>} */
     this.layers = new Set();
     for (const box of legend.querySelectorAll("input")) {
       const set = () => {
-        box.checked ? this.layers.add(box.dataset.layer) : this.layers.delete(box.dataset.layer);
+        const layer = box.dataset.layer ?? "";
+        box.checked ? this.layers.add(layer) : this.layers.delete(layer);
         for (const view of this.views.values()) view.draw();
       };
       box.addEventListener("change", set);
@@ -26,13 +38,18 @@ export class Pictures {
     new ResizeObserver(() => this.views.forEach((view) => view.draw())).observe(root);
   }
 
+  /** @param {About} about */
   begin(about) {
     this.root.replaceChildren();
     this.root.classList.toggle("one", about.cameras.length === 1);
     this.views = new Map(about.cameras.map((camera) => [camera.name, new View(this, camera, about)]));
   }
 
-  // Shows a picture; of those that come faster than they can be decoded, the last.
+  /**
+   * Shows an image; of those that come faster than they can be decoded, the last.
+   * @param {ImageHeader} header
+   * @param {Blob | null} blob
+   */
   async show(header, blob) {
     const view = this.views.get(header.camera);
     if (!view) return;
@@ -49,24 +66,42 @@ export class Pictures {
 }
 
 class View {
-  constructor(pictures, camera, about) {
-    this.pictures = pictures;
+  /**
+   * @param {Images} images
+   * @param {CameraAbout} camera
+   * @param {About} about
+   */
+  constructor(images, camera, about) {
+    /** @type {[ImageHeader, Blob | null] | null} */
+    this.next = null;
+    this.busy = false;
+    /** @type {ImageHeader | null} */
+    this.header = null;
+    /** @type {ImageBitmap | null} */
+    this.bitmap = null;
+    this.images = images;
     this.camera = camera;
     const figure = document.createElement("figure");
-    figure.className = "picture";
+    figure.className = "image";
     figure.dataset.camera = camera.name;
     this.canvas = document.createElement("canvas");
     this.canvas.style.aspectRatio = `${camera.width} / ${camera.height}`;
     this.caption = document.createElement("figcaption");
     figure.append(this.canvas, this.caption);
-    pictures.root.append(figure);
-    this.caption.innerHTML = "<b></b><span></span>";
-    this.caption.firstChild.textContent = camera.name;
+    images.root.append(figure);
+    const name = document.createElement("b");
+    name.textContent = camera.name;
+    this.words = document.createElement("span");
+    this.caption.append(name, this.words);
     this.hover = false;
     if (about.draggable) this.listen();
   }
 
-  // A place in the picture, px, from one in the window.
+  /**
+   * A place in the image, px, from one in the window.
+   * @param {PointerEvent} event
+   * @returns {Place}
+   */
   place(event) {
     const box = this.canvas.getBoundingClientRect();
     return [
@@ -77,39 +112,35 @@ class View {
 
   listen() {
     const { canvas } = this;
+    /** @param {PointerEvent} event */
     const on = (event) => this.header?.outline && inside(this.place(event), this.header.outline);
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0 || !on(event)) return;
       canvas.setPointerCapture(event.pointerId);
-      this.pictures.mouse.grab(this.camera.name, ...this.place(event));
+      this.images.mouse.grab(this.camera.name, ...this.place(event));
       event.preventDefault();
     });
     canvas.addEventListener("pointermove", (event) => {
-      this.pictures.mouse.move(this.camera.name, ...this.place(event), event.shiftKey);
-      const hover = Boolean(on(event)) || this.pictures.mouse.holds;
-      canvas.style.cursor = this.pictures.mouse.holds ? "grabbing" : hover ? "grab" : "";
+      this.images.mouse.move(this.camera.name, ...this.place(event), event.shiftKey);
+      const hover = Boolean(on(event)) || this.images.mouse.holds;
+      canvas.style.cursor = this.images.mouse.holds ? "grabbing" : hover ? "grab" : "";
       if (hover !== this.hover) { this.hover = hover; this.draw(); }
     });
-    const let_go = () => this.pictures.mouse.release();
-    canvas.addEventListener("pointerup", let_go);
-    canvas.addEventListener("pointercancel", let_go);
+    const release = () => this.images.mouse.release();
+    canvas.addEventListener("pointerup", release);
+    canvas.addEventListener("pointercancel", release);
     canvas.addEventListener("pointerleave", () => { this.hover = false; this.draw(); });
   }
 
+  /**
+   * @param {ImageHeader} header
+   * @param {ImageBitmap | null} bitmap
+   */
   put(header, bitmap) {
     this.bitmap?.close();
     [this.header, this.bitmap] = [header, bitmap];
-    this.caption.lastChild.textContent = this.words(header);
+    this.words.textContent = described(header);
     this.draw();
-  }
-
-  words({ found, asked, time, reasons }) {
-    const at = `${time.toFixed(2)} s`;
-    const wanted = asked?.filter(Boolean).length;
-    if (!wanted) return `nothing looked for · ${at}`;
-    const seen = found.filter(Boolean).length;
-    const why = reasons.find((reason, j) => asked[j] && reason);
-    return `${seen} of ${wanted} found${why ? ` (${why})` : ""} · ${at}`;
   }
 
   draw() {
@@ -119,35 +150,61 @@ class View {
     if (!scale) return;
     canvas.width = Math.round(camera.width * scale);
     canvas.height = Math.round(camera.height * scale);
-    const context = canvas.getContext("2d");
+    const context = context_of(canvas);
     context.imageSmoothingQuality = "high";
     if (this.bitmap) context.drawImage(this.bitmap, 0, 0, canvas.width, canvas.height);
     const kx = canvas.width / camera.width, ky = canvas.height / camera.height;
+    /** @type {(place: Place) => Place} */
     const at = ([u, v]) => [(u + 0.5) * kx, (v + 0.5) * ky];
-    marks(context, header, at, this.pictures.layers, window.devicePixelRatio);
+    marks(context, header, at, this.images.layers, window.devicePixelRatio);
     if (this.hover && header.outline) outline(context, header.outline.map(at));
   }
 }
 
+/**
+ * Says in words what an image showed.
+ * @param {ImageHeader} header
+ */
+function described({ found = [], asked = [], time, reasons = [] }) {
+  const at = `${time.toFixed(2)} s`;
+  const sought = asked.filter(Boolean).length;
+  if (!sought) return `nothing looked for · ${at}`;
+  const seen = found.filter(Boolean).length;
+  const why = reasons.find((reason, j) => asked[j] && reason);
+  return `${seen} of ${sought} found${why ? ` (${why})` : ""} · ${at}`;
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {ImageHeader} header
+ * @param {(place: Place) => Place} at
+ * @param {Set<string>} layers
+ * @param {number} unit
+ */
 function marks(context, header, at, layers, unit) {
   const pen = new Pen(context, unit);
-  const each = (places, draw) => places?.forEach((place, j) => place[0] !== null && draw(at(place), j));
-  const asked = (j) => header.asked?.[j];
-  if (layers.has("windows") && header.half) {
-    each(header.predicted, (_, j) => {
-      const [u, v] = header.predicted[j], [hu, hv] = header.half[j];
+  const { points, predicted, half, found = [], asked = [] } = header;
+  /** @type {(places: Place[] | undefined, draw: (place: Place, j: number) => void) => void} */
+  const each = (places, draw) => places?.forEach((place, j) => { if (place[0] !== null) draw(at(place), j); });
+  if (layers.has("windows") && predicted && half) {
+    each(predicted, (_, j) => {
+      const [u, v] = predicted[j], [hu, hv] = half[j];
       pen.box(at([u - hu, v - hv]), at([u + hu, v + hv]), INK.windows);
     });
   }
   if (layers.has("desired")) each(header.desired, (place) => pen.plus(place, 8, INK.desired));
   if (layers.has("true")) each(header.true, (place) => pen.ring(place, 2.5, INK.true));
-  if (layers.has("predicted")) each(header.predicted, (place) => pen.diamond(place, 3.5, INK.predicted));
-  if (layers.has("found")) each(header.points, (place, j) => header.found[j] && pen.ring(place, 6, INK.found));
+  if (layers.has("predicted")) each(predicted, (place) => pen.diamond(place, 3.5, INK.predicted));
+  if (layers.has("found")) each(points, (place, j) => { if (found[j]) pen.ring(place, 6, INK.found); });
   if (layers.has("lost")) {
-    each(header.points, (place, j) => !header.found[j] && asked(j) && pen.cross(place, 6, INK.lost));
+    each(points, (place, j) => { if (!found[j] && asked[j]) pen.cross(place, 6, INK.lost); });
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Place[]} places
+ */
 export function outline(context, places) {
   context.beginPath();
   places.forEach(([x, y]) => context.lineTo(x, y));
@@ -161,25 +218,45 @@ export function outline(context, places) {
 
 // Draws each mark twice: a dark rim, then its ink.
 class Pen {
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} unit  px of the canvas in one of the page
+   */
   constructor(context, unit) {
     this.context = context;
     this.unit = unit;
   }
 
+  /**
+   * @param {Path2D} path
+   * @param {string} ink
+   */
   stroke(path, ink, width = 1.8) {
-    for (const [style, extra] of [[OUTLINE, 1.6], [ink, 0]]) {
+    for (const { style, extra } of [{ style: OUTLINE, extra: 1.6 }, { style: ink, extra: 0 }]) {
       this.context.strokeStyle = style;
       this.context.lineWidth = (width + extra) * this.unit;
       this.context.stroke(path);
     }
   }
 
+  /**
+   * @param {Place} place
+   * @param {number} r
+   * @param {string} ink
+   */
   ring([x, y], r, ink) {
     const path = new Path2D();
     path.arc(x, y, r * this.unit, 0, 2 * Math.PI);
     this.stroke(path, ink);
   }
 
+  /**
+   * @param {Place} place
+   * @param {number} r
+   * @param {string} ink
+   * @param {number[][]} ends
+   * @param {number} [width]
+   */
   lines([x, y], r, ink, ends, width) {
     const path = new Path2D();
     for (const [a, b, c, d] of ends) {
@@ -189,14 +266,34 @@ class Pen {
     this.stroke(path, ink, width);
   }
 
+  /**
+   * @param {Place} place
+   * @param {number} r
+   * @param {string} ink
+   */
   plus(place, r, ink) { this.lines(place, r, ink, [[-1, 0, 1, 0], [0, -1, 0, 1]]); }
 
+  /**
+   * @param {Place} place
+   * @param {number} r
+   * @param {string} ink
+   */
   cross(place, r, ink) { this.lines(place, r * 0.75, ink, [[-1, -1, 1, 1], [1, -1, -1, 1]]); }
 
+  /**
+   * @param {Place} place
+   * @param {number} r
+   * @param {string} ink
+   */
   diamond(place, r, ink) {
     this.lines(place, r, ink, [[0, -1, 1, 0], [1, 0, 0, 1], [0, 1, -1, 0], [-1, 0, 0, -1]], 1);
   }
 
+  /**
+   * @param {Place} corner
+   * @param {Place} opposite
+   * @param {string} ink
+   */
   box([left, top], [right, bottom], ink) {
     const path = new Path2D();
     path.rect(left, top, right - left, bottom - top);

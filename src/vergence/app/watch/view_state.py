@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from vergence.app.watch.shot import Shot
+from vergence.app.watch.camera_view import CameraView
 from vergence.arrays import FloatArray
 
 Row = list[Any]  # time, s, then the values of each plot
@@ -15,27 +15,27 @@ _KEPT_ROWS = 1800  # of a running cell: what a page shows is the last minute at 
 
 @dataclass(slots=True)
 class Reader:
-    """How far somebody has read a board."""
+    """How far a page has read a view state."""
 
     run: int = 0
     version: int = 0
     rows: int = 0
     events: int = 0
-    shots: dict[str, Shot] = field(default_factory=dict)
+    views: dict[str, CameraView] = field(default_factory=dict)
 
 
 class News(NamedTuple):
-    """What is on a board that somebody has not read."""
+    """What of a view state a page has not read."""
 
     about: Mapping[str, Any] | None  # what runs, if that is new
     status: Mapping[str, Any]
     rows: Sequence[Row]
     events: Sequence[Mapping[str, Any]]
-    shots: Sequence[Shot]
+    views: Sequence[CameraView]
 
 
-class Board:
-    """Holds what pages show; one thread writes, others read.
+class ViewState:
+    """What pages show; one thread writes, others read.
 
     Attributes:
         state: MuJoCo's integration state of the world, for the view in three dimensions.
@@ -49,7 +49,7 @@ class Board:
         self._rows: list[Row] = []
         self._dropped = 0  # rows
         self._events: list[Mapping[str, Any]] = []
-        self._shots: dict[str, Shot] = {}
+        self._views: dict[str, CameraView] = {}
         self.state: FloatArray | None = None
 
     def begin(self, about: Mapping[str, Any], rows: Sequence[Row] = ()) -> None:
@@ -63,25 +63,25 @@ class Board:
             self._run += 1
             self._about, self._rows, self._events = about, list(rows), []
             self._dropped = 0
-            self._shots = {}
+            self._views = {}
             self._version += 1
 
-    def tick(self, row: Row, shots: Sequence[Shot]) -> None:
-        """Add a row of the plots, and put up new pictures."""
+    def tick(self, row: Row, views: Sequence[CameraView]) -> None:
+        """Add a row of the plots, and show new images."""
         with self._lock:
             self._rows.append(row)
             if len(self._rows) > 2 * _KEPT_ROWS:
                 del self._rows[:_KEPT_ROWS]
                 self._dropped += _KEPT_ROWS
-            self._shots.update({shot.camera: shot for shot in shots})
+            self._views.update({view.camera: view for view in views})
             self._version += 1
 
-    def show(self, shots: Sequence[Shot]) -> None:
-        """Put up pictures, those that are not up already."""
+    def show(self, views: Sequence[CameraView]) -> None:
+        """Show images, those that are not shown already."""
         with self._lock:
-            fresh = {s.camera: s for s in shots if self._shots.get(s.camera) is not s}
+            fresh = {s.camera: s for s in views if self._views.get(s.camera) is not s}
             if fresh:
-                self._shots.update(fresh)
+                self._views.update(fresh)
                 self._version += 1
 
     def event(self, time: float, name: str, text: str) -> None:
@@ -91,19 +91,19 @@ class Board:
             self._version += 1
 
     def status(self, **values: Any) -> None:
-        """Change what is said of the state of things."""
+        """Change the status."""
         with self._lock:
             if any(self._status.get(key, self) != value for key, value in values.items()):
                 self._status.update(values)
                 self._version += 1
 
-    def shot(self, camera: str) -> Shot | None:
-        """Return the newest picture of a camera."""
+    def view(self, camera: str) -> CameraView | None:
+        """Return the newest image of a camera."""
         with self._lock:
-            return self._shots.get(camera)
+            return self._views.get(camera)
 
     def news(self, reader: Reader) -> News | None:
-        """Return what a reader has not read, and note that he has; None if there is nothing."""
+        """Return what a reader has not read, and mark it as read; None if there is nothing."""
         with self._lock:
             if reader.run == self._run and reader.version == self._version:
                 return None
@@ -111,8 +111,8 @@ class Board:
             if reader.run != self._run:
                 about = self._about
                 reader.run, reader.rows, reader.events = self._run, 0, 0
-                reader.shots = {}
-            fresh = [s for n, s in self._shots.items() if reader.shots.get(n) is not s]
+                reader.views = {}
+            fresh = [s for n, s in self._views.items() if reader.views.get(n) is not s]
             news = News(
                 about,
                 dict(self._status),
@@ -123,5 +123,5 @@ class Board:
             reader.version = self._version
             reader.rows = self._dropped + len(self._rows)
             reader.events = len(self._events)
-            reader.shots = dict(self._shots)
+            reader.views = dict(self._views)
             return news

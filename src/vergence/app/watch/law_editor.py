@@ -1,4 +1,4 @@
-"""Where the law of a cell is chosen and turned while the cell runs."""
+"""Changes the law of a cell while the cell runs."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,10 +7,11 @@ from vergence.app.watch.knobs import knobs, law_choices, turned
 from vergence.assembly import build_law
 from vergence.cell import Cell, load_cell
 from vergence.control import Law
+from vergence.errors import InputError, nearest
 from vergence.simulation import SimulatedDriver
 
 
-class LawDesk:
+class LawEditor:
     """Keeps a cell with what was changed of its law; every change is a setting of the cell file.
 
     Args:
@@ -33,8 +34,11 @@ class LawDesk:
         """Return another law, with the numbers it has by itself.
 
         Raises:
-            InputError: if it does not suit the cell; the law stays as it was.
+            InputError: if there is no such law, or it does not suit the cell; the law stays as it
+                was.
         """
+        if name not in self._choices:
+            raise InputError("message", "name", name, nearest(name, self._choices))
         changed = {"law": self._choices[name]}
         if name == next(iter(self._choices)):
             changed = {}
@@ -46,8 +50,12 @@ class LawDesk:
         """Return the same law with one number turned.
 
         Raises:
-            InputError: if the number is not allowed; the law stays as it was.
+            InputError: if there is no such number, or the value is not allowed; the law stays as
+                it was.
         """
+        keys = [knob["key"] for knob in knobs(self.cell.law)]
+        if key not in keys:
+            raise InputError("message", "key", key, nearest(key, keys))
         return self._change(self._changed | turned(key, value), driver)
 
     def as_json(self) -> dict[str, Any]:

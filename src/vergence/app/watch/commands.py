@@ -1,0 +1,148 @@
+"""What a page may ask for: each command, and the range of its numbers."""
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    StringConstraints,
+    TypeAdapter,
+    ValidationError,
+)
+
+from vergence.errors import InputError
+
+_Name = Annotated[str, StringConstraints(strict=True, max_length=100)]
+_Place = Annotated[float, Field(ge=-1e5, le=1e5)]  # px, or normalized image coordinates
+_Int = Annotated[StrictInt, Field(ge=-(10**9), le=10**9)]
+
+
+class _Command(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class More(_Command):
+    """Send what is new: the page has shown the last message."""
+
+    do: Literal["more"]
+
+
+class Pause(_Command):
+    """Stop time."""
+
+    do: Literal["pause"]
+
+
+class Resume(_Command):
+    """Let time pass."""
+
+    do: Literal["resume"]
+
+
+class Step(_Command):
+    """Let time pass until the next image."""
+
+    do: Literal["step"]
+
+
+class Reset(_Command):
+    """Begin again."""
+
+    do: Literal["reset"]
+
+
+class SetSpeed(_Command):
+    """Let time pass so many times as fast as on the wall."""
+
+    do: Literal["speed"]
+    value: Annotated[float, Field(ge=0.01, le=1000)]
+
+
+class Seek(_Command):
+    """Go to a time of a recording, s."""
+
+    do: Literal["seek"]
+    value: Annotated[float, Field(ge=0, le=1e9)]
+
+
+class ChooseLaw(_Command):
+    """Use another law."""
+
+    do: Literal["law"]
+    name: _Name
+
+
+class TurnKnob(_Command):
+    """Change one number or choice of the law."""
+
+    do: Literal["knob"]
+    key: _Name
+    value: StrictBool | _Int | StrictFloat | _Name
+
+
+class Grab(_Command):
+    """Take the target with the mouse."""
+
+    do: Literal["grab"]
+    view: _Name  # a camera; empty for the view in three dimensions
+    u: _Place
+    v: _Place
+
+
+class Move(_Command):
+    """Move the target with the mouse."""
+
+    do: Literal["move"]
+    view: _Name
+    u: _Place
+    v: _Place
+    along: StrictBool  # the optical axis
+
+
+class Release(_Command):
+    """Leave the target where the mouse has brought it."""
+
+    do: Literal["release"]
+
+
+class LetGo(_Command):
+    """Let the target move by itself again."""
+
+    do: Literal["let go"]
+
+
+Command: TypeAlias = (
+    More
+    | Pause
+    | Resume
+    | Step
+    | Reset
+    | SetSpeed
+    | Seek
+    | ChooseLaw
+    | TurnKnob
+    | Grab
+    | Move
+    | Release
+    | LetGo
+)
+
+_COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])
+
+
+def parse(message: str | bytes) -> Command:
+    """Return the command that a message of a page is.
+
+    Raises:
+        InputError: if it is none; the text tells the page why.
+    """
+    try:
+        return _COMMANDS.validate_json(message)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise InputError("message", key, first["input"], first["msg"]) from None
