@@ -17,6 +17,7 @@ export MUJOCO_GL ?= egl
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
+	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
 	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
 	@echo "make lint     formatting, lints and types only"
@@ -47,6 +48,9 @@ demo: setup
 
 test: setup test-images test-browser
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
+
+fuzz: setup
+	VERGENCE_FUZZ=long $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)
 
 lint: lint-format lint-rules lint-types lint-page
 

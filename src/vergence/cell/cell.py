@@ -1,21 +1,21 @@
 """A work cell as its file describes it."""
 
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError, field_validator
+from pydantic import Field, PrivateAttr, ValidationError
 from pydantic_core import ErrorDetails
 
 from vergence.cell.schema import (
     TABLES,
     ArmTable,
     CameraTable,
+    Duration,
     Law,
+    Name,
     PerceptionTable,
-    Positive,
     SceneTable,
     Table,
     TargetTable,
@@ -23,6 +23,7 @@ from vergence.cell.schema import (
     ToolTable,
     TrackTable,
 )
+from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
 from vergence.places import find_cell
 
@@ -30,27 +31,22 @@ from vergence.places import find_cell
 class Cell(Table):
     """Arms, cameras, a target, a task and a law: all that a run depends on."""
 
-    name: str  # what its runs are called
-    duration_s: Positive  # of a run, at most
-    seed: Annotated[int, Field(ge=0)] = 0  # of everything that is drawn by chance
-    inner_rate_hz: Annotated[float, Field(ge=100)] = 500.0  # of physics, set-points and guard
+    name: Name  # what its runs are called
+    duration_s: Duration  # of a run, at most
+    seed: Annotated[int, Field(ge=0, lt=1 << 63)] = 0  # of everything that is drawn by chance
+    inner_rate_hz: Annotated[float, Field(ge=100, le=1e4)] = 500.0  # of physics and guard
     scene: SceneTable = SceneTable()  # what stands around the arms
-    arms: dict[str, ArmTable] = Field(min_length=1)  # by name
-    cameras: dict[str, CameraTable] = Field(min_length=1)  # by name
+    arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # by name
+    cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # by name
     target: TargetTable  # what is looked at
     task: Task  # what is to be done about it
     perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
     law: Law  # how the arm is moved
-    laws: dict[str, Law] = Field(default_factory=dict)  # others, by name, to compare it with
+    laws: dict[Name, Law] = Field(  # others, by name, to compare it with
+        default_factory=dict, max_length=64
+    )
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
-
-    @field_validator("name")
-    @classmethod
-    def _names_a_folder(cls, name: str) -> str:
-        if not re.fullmatch(r"\w[\w .-]*", name):
-            raise ValueError("letters, digits, spaces, and . _ - after the first")
-        return name
 
     @property
     def path(self) -> Path:
@@ -99,28 +95,14 @@ def load_cell(
         InputError: if there is no such cell or anything in it cannot be used.
     """
     path = find_cell(name_or_path)
-    try:
-        text = path.read_text()
-        values = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "", str(error), "a TOML file") from None
+    text, values = read_toml(path)
     for key, value in (overrides or {}).items():
-        values = _merge(values, _nested(key, value))
+        values = _merge(values, setting(key, value))
         text += f"\n# set: {key} = {value}"
     if seed is not None:
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
     return _validate(values, path, text)
-
-
-def _nested(key: str, value: str) -> dict[str, Any]:
-    try:
-        parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        parsed = value  # a bare word is meant as a string
-    for part in reversed(key.split(".")):
-        parsed = {part: parsed}
-    return dict(parsed)
 
 
 def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,6 +193,16 @@ def _allowed(complaint: ErrorDetails) -> str:
             return "a list"
         case "path_type":
             return "a file's path"
+        case "greater_than":
+            return f"greater than {complaint['ctx']['gt']:g}"
+        case "greater_than_equal":
+            return f"at least {complaint['ctx']['ge']:g}"
+        case "less_than":
+            return f"less than {complaint['ctx']['lt']:g}"
+        case "less_than_equal":
+            return f"at most {complaint['ctx']['le']:g}"
+        case "string_pattern_mismatch":
+            return "a letter or digit, then at most 63 letters, digits, spaces, and . _ -"
         case "too_long":
             return f"at most {complaint['ctx']['max_length']} values"
         case "too_short":

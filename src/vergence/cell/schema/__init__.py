@@ -2,8 +2,9 @@
 
 from vergence.cell.schema.base import (
     Axis,
+    Duration,
+    Name,
     Placement,
-    Positive,
     Table,
     Vector3,
 )
@@ -46,11 +47,13 @@ __all__ = [
     "CameraTable",
     "CircleMotion",
     "ConstrainedTable",
+    "Duration",
     "FollowTable",
     "JointMotion",
     "Law",
     "LineMotion",
     "Motion",
+    "Name",
     "OptimalTrackingTable",
     "PathTrackingTable",
     "PerceptionTable",
@@ -59,7 +62,6 @@ __all__ = [
     "PoseMotion",
     "PoseTrajectoryTable",
     "PositionBasedTable",
-    "Positive",
     "RandomMotion",
     "ReachTable",
     "SceneTable",

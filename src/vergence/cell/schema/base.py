@@ -1,12 +1,36 @@
-"""What every table of a cell file is made of."""
+"""What every table of a cell file is made of: a range, with both ends, for every number."""
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-Vector3 = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0)]
+# Ranges are those of machines: what lies outside is a slip of the pen or of the unit, and would
+# take terabytes or years to simulate.
+Coordinate = Annotated[float, Field(ge=-1e3, le=1e3)]  # m
+Angle = Annotated[float, Field(ge=-3.6e4, le=3.6e4)]  # degrees; also metres of a sliding joint
+Vector3 = tuple[Coordinate, Coordinate, Coordinate]
+Angles3 = tuple[Angle, Angle, Angle]
+Velocity3 = tuple[Coordinate, Coordinate, Coordinate]  # m/s
+Length = Annotated[float, Field(ge=1e-6, le=1e3)]  # m
+Distance = Annotated[float, Field(ge=0, le=1e3)]  # m
+Speed = Annotated[float, Field(ge=1e-6, le=100)]  # m/s
+JointRate = Annotated[float, Field(ge=1e-3, le=1e5)]  # degrees/s, or degrees/s²
+Time = Annotated[float, Field(ge=0, le=86400)]  # s
+Duration = Annotated[float, Field(ge=1e-3, le=86400)]  # s
+Rate = Annotated[float, Field(ge=1e-2, le=1e4)]  # Hz
+Gain = Annotated[float, Field(ge=1e-4, le=1e3)]  # 1/s, or without a unit
+Weight = Annotated[float, Field(ge=1e-15, le=1e15)]  # of a term that is minimised
+OptionalWeight = Annotated[float, Field(ge=0, le=1e15)]  # 0 leaves the term out
+SingularValue = Annotated[float, Field(ge=0, le=10)]
+Pixels = Annotated[float, Field(ge=0, le=1e4)]
+PixelCoordinate = Annotated[float, Field(ge=-1e5, le=1e5)]
+Point2 = tuple[PixelCoordinate, PixelCoordinate]
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
+Text = Annotated[str, StringConstraints(max_length=200)]
+Name = Annotated[str, StringConstraints(pattern=r"^\w[\w .-]{0,63}$")]  # of what messages speak of
+
+MOST_JOINTS = 64
+MOST_POINTS = 1000
 
 
 class Table(BaseModel):
@@ -19,4 +43,4 @@ class Placement(Table):
     """A pose: a position and roll-pitch-yaw angles, R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
     position_m: Vector3 = (0.0, 0.0, 0.0)  # x, y, z of its origin
-    rotation_rpy_deg: Vector3 = (0.0, 0.0, 0.0)  # roll, pitch, yaw
+    rotation_rpy_deg: Angles3 = (0.0, 0.0, 0.0)  # roll, pitch, yaw

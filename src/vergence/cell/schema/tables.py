@@ -5,9 +5,41 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from vergence.cell.schema.base import Placement, Positive, Table, Vector3
+from vergence.cell.schema.base import (
+    MOST_JOINTS,
+    MOST_POINTS,
+    Angle,
+    Angles3,
+    Distance,
+    Duration,
+    JointRate,
+    Length,
+    Name,
+    Pixels,
+    Placement,
+    Point2,
+    Rate,
+    Speed,
+    Table,
+    Text,
+    Time,
+    Vector3,
+    Velocity3,
+)
 
-_Side = Annotated[int, Field(ge=16)]
+_MOST_WAYPOINTS = 1000
+_Side = Annotated[int, Field(ge=16, le=8192)]
+_Joints = Annotated[tuple[Angle, ...], Field(max_length=MOST_JOINTS)]
+_JointRates = JointRate | Annotated[tuple[JointRate, ...], Field(max_length=MOST_JOINTS)]
+_Focal = Annotated[float, Field(ge=1, le=1e6)]  # px
+_Lens = Annotated[float, Field(ge=1e-2, le=1e4)]  # mm, or µm of a pixel
+_Features = Annotated[tuple[Vector3, ...], Field(max_length=MOST_POINTS)]
+_Desired = (
+    Literal["initial", "centred"] | Annotated[tuple[Point2, ...], Field(max_length=MOST_POINTS)]
+)
+_Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
+_Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
+_Density = Annotated[float, Field(ge=1e-9, le=1e6)]
 
 
 class SceneTable(Table):
@@ -20,8 +52,10 @@ class SceneTable(Table):
 class Waypoints(Table):
     """Way-points of a motion of its own, with rest at each and minimum jerk between them."""
 
-    times_s: tuple[Annotated[float, Field(ge=0)], ...] = Field(min_length=2)  # first 0, increasing
-    speed: Positive = 1.0  # the times are divided by it
+    times_s: tuple[Time, ...] = Field(
+        min_length=2, max_length=_MOST_WAYPOINTS
+    )  # first 0, increasing
+    speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0  # the times are divided by it
 
     @model_validator(mode="after")
     def _one_each(self) -> "Waypoints":
@@ -39,7 +73,9 @@ class JointMotion(Waypoints):
     """The arm moves its joints through way-points, relative to its start."""
 
     kind: Literal["joints"]
-    offsets_deg: tuple[tuple[float, ...], ...]  # metres for sliding joints
+    offsets_deg: Annotated[
+        tuple[_Joints, ...], Field(max_length=_MOST_WAYPOINTS)
+    ]  # metres for sliding joints
 
 
 class PoseMotion(Waypoints):
@@ -49,8 +85,12 @@ class PoseMotion(Waypoints):
     """
 
     kind: Literal["poses"]
-    positions_m: tuple[Vector3, ...]  # one for each time
-    rotations_rpy_deg: tuple[Vector3, ...]  # one for each time
+    positions_m: Annotated[
+        tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)
+    ]  # one for each time
+    rotations_rpy_deg: Annotated[
+        tuple[Angles3, ...], Field(max_length=_MOST_WAYPOINTS)
+    ]  # one for each time
 
 
 ArmMotion = Annotated[JointMotion | PoseMotion, Field(discriminator="kind")]
@@ -60,32 +100,38 @@ class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
     model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
-    body: str  # the last body: cameras are mounted on it unless they name another
-    start_deg: tuple[float, ...]  # at the start: degrees; metres for sliding joints
-    rate_max_deg_s: Positive | tuple[Positive, ...] = 180.0  # m/s·(180/π) for sliding joints
-    acceleration_max_deg_s2: Positive | tuple[Positive, ...] = 720.0  # m/s²·(180/π) if they slide
-    servo_bandwidth_hz: Positive = 12.0  # of the joint servos that stand for the robot's own
+    body: Text  # the last body: cameras are mounted on it unless they name another
+    start_deg: _Joints  # at the start: degrees; metres for sliding joints
+    rate_max_deg_s: _JointRates = 180.0  # m/s·(180/π) for sliding joints
+    acceleration_max_deg_s2: _JointRates = 720.0  # m/s²·(180/π) if they slide
+    servo_bandwidth_hz: Rate = 12.0  # of the joint servos that stand for the robot's own
     motion: ArmMotion | None = None  # what it does by itself; without one the loop holds it
 
 
 class CameraTable(Placement):
     """A camera; its placement is in the body that carries it, or in the world."""
 
-    arm: str | None = None  # the arm that carries it; fixed in the world if absent
-    body: str | None = None  # which body of that arm; its last if absent
+    arm: Text | None = None  # the arm that carries it; fixed in the world if absent
+    body: Text | None = None  # which body of that arm; its last if absent
     resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the picture
-    focal_mm: Positive | None = None  # of the lens, with pixel_um
-    pixel_um: tuple[Positive, Positive] | None = None  # width and height of a pixel
-    focal_px: tuple[Positive, Positive] | None = None  # instead of focal_mm and pixel_um
-    principal_px: tuple[float, float] | None = None  # the middle of the image if absent
-    distortion: tuple[float, ...] = Field(default=(), max_length=5)  # k1, k2, p1, p2, k3 of OpenCV
+    focal_mm: _Lens | None = None  # of the lens, with pixel_um
+    pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
+    focal_px: tuple[_Focal, _Focal] | None = None  # instead of focal_mm and pixel_um
+    principal_px: Point2 | None = None  # the middle of the image if absent
+    distortion: tuple[Annotated[float, Field(ge=-1e4, le=1e4)], ...] = Field(
+        default=(), max_length=5
+    )  # k1, k2, p1, p2, k3 of OpenCV
     calibration: Path | None = None  # a camera file, also ROS's, for the six keys above
-    rate_hz: Positive = 30.0  # pictures a second
-    latency_frames: Annotated[int, Field(ge=0)] = 0  # from exposure until the picture arrives
-    noise_grey: Annotated[float, Field(ge=0)] = 1.0  # standard deviation, of 255
-    blind_s: tuple[tuple[float, float], ...] = ()  # from when to when its pictures are black
-    calibration_error_m: Annotated[float, Field(ge=0)] = 0.0  # how far its believed pose is off
-    calibration_error_deg: Annotated[float, Field(ge=0)] = 0.0  # and by what angle
+    rate_hz: Rate = 30.0  # pictures a second
+    latency_frames: Annotated[int, Field(ge=0, le=1000)] = (
+        0  # from exposure until the picture arrives
+    )
+    noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
+    blind_s: Annotated[
+        tuple[tuple[Time, Time], ...], Field(max_length=1000)
+    ] = ()  # from when to when its pictures are black
+    calibration_error_m: Distance = 0.0  # how far its believed pose is off
+    calibration_error_deg: _Angle = 0.0  # and by what angle
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":
@@ -114,18 +160,18 @@ class LineMotion(Table):
     """The target moves along a line, then stands."""
 
     kind: Literal["line"]
-    velocity_m_s: Vector3  # in the world
-    distance_m: Positive  # after which it stops
-    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
+    velocity_m_s: Velocity3  # in the world
+    distance_m: Length  # after which it stops
+    start_s: Time = 0.0  # stands until then
 
 
 class CircleMotion(Table):
     """The target moves on a horizontal circle that starts at its placement."""
 
     kind: Literal["circle"]
-    radius_m: Positive  # of the circle
-    period_s: Positive  # of once around
-    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
+    radius_m: Length  # of the circle
+    period_s: Duration  # of once around
+    start_s: Time = 0.0  # stands until then
 
 
 class StepMotion(Table):
@@ -133,7 +179,7 @@ class StepMotion(Table):
 
     kind: Literal["step"]
     offset_m: Vector3  # in the world
-    time_s: Annotated[float, Field(ge=0)]  # when
+    time_s: Time  # when
 
 
 class RandomMotion(Table):
@@ -141,9 +187,9 @@ class RandomMotion(Table):
 
     kind: Literal["random"]
     amplitude_m: Vector3  # along the world's axes
-    amplitude_rpy_deg: Vector3 = (0.0, 0.0, 0.0)  # about them
-    fastest_hz: Positive = 0.3  # of the sinusoids
-    start_s: Annotated[float, Field(ge=0)] = 0.0  # stands until then
+    amplitude_rpy_deg: Angles3 = (0.0, 0.0, 0.0)  # about them
+    fastest_hz: Rate = 0.3  # of the sinusoids
+    start_s: Time = 0.0  # stands until then
 
 
 Motion = Annotated[
@@ -156,9 +202,9 @@ class TargetTable(Placement):
     """The object; its placement is where its motion starts, or its pose in what carries it."""
 
     model: Path  # MJCF or URDF
-    carried_by: str | None = None  # an arm, whose last body it is fixed to
+    carried_by: Text | None = None  # an arm, whose last body it is fixed to
     motion: Motion = StillMotion()  # what it does by itself
-    features: tuple[Vector3, ...] | None = None  # m, in the target; picked in the image if absent
+    features: _Features | None = None  # m, in the target; picked in the image if absent
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":
@@ -171,53 +217,53 @@ class ToolTable(Placement):
     """What the arm holds in its hand; its placement is in the arm's last body."""
 
     model: Path  # MJCF
-    camera: str  # the fixed one that looks at it
-    features: tuple[Vector3, ...] = Field(min_length=1)  # x, y, z of each, in the tool
-    desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = (
-        "initial"  # in that camera, as for the task
-    )
+    camera: Text  # the fixed one that looks at it
+    features: tuple[Vector3, ...] = Field(
+        min_length=1, max_length=MOST_POINTS
+    )  # x, y, z of each, in the tool
+    desired: _Desired = "initial"  # in that camera, as for the task
 
 
 class TrackTable(Table):
     """Keep features where they are wanted in one camera's image."""
 
     kind: Literal["track"] = "track"
-    arm: str  # which moves, or carries the target
-    camera: str  # carried by the arm, or fixed
+    arm: Text  # which moves, or carries the target
+    camera: Text  # carried by the arm, or fixed
     feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
-    desired: Literal["initial", "centred"] | tuple[tuple[float, float], ...] = (
+    desired: _Desired = (
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
     tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
-    image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Positive = 0.2  # with pictures, but none of the features found
+    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Duration = 0.2  # with pictures, but none of the features found
 
 
 class FollowTable(Table):
     """Keep a camera in the hand, or what the hand holds before a fixed one, at a wanted pose."""
 
     kind: Literal["follow"]
-    arm: str  # which moves
-    camera: str  # carried by the arm, or fixed where the arm carries the target
+    arm: Text  # which moves
+    camera: Text  # carried by the arm, or fixed where the arm carries the target
     desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
-    image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Positive = 2.0  # with pictures, but the target lost
+    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Duration = 2.0  # with pictures, but the target lost
 
 
 class ReachTable(Table):
     """Bring the camera to where the target looks as in a picture taken before, along a plan."""
 
     kind: Literal["reach"]
-    arm: str  # which moves
-    camera: str  # carried by the arm
-    goal_deg: tuple[float, ...]  # joints when the desired picture was taken; metres if they slide
-    distance_m: Positive  # believed distance of that camera from the reference plane, d*
+    arm: Text  # which moves
+    camera: Text  # carried by the arm
+    goal_deg: _Joints  # joints when the desired picture was taken; metres if they slide
+    distance_m: Length  # believed distance of that camera from the reference plane, d*
     planner: Literal["optimised", "potential_field"] = "optimised"  # optimised, or the paper's
-    margin_px: Annotated[float, Field(ge=0)] = 10.0  # kept from the border of the image
+    margin_px: Pixels = 10.0  # kept from the border of the image
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
-    camera_speed_m_s: Positive = 0.25  # on the way
-    image_timeout_s: Positive = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Positive = 0.5  # with pictures, but the target lost
+    camera_speed_m_s: Speed = 0.25  # on the way
+    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
+    target_timeout_s: Duration = 0.5  # with pictures, but the target lost
 
 
 def _task_kind(value: Any) -> str | None:
@@ -237,17 +283,19 @@ Task = Annotated[
 class PerceptionTable(Table):
     """How the target's pose is estimated, where the task needs it."""
 
-    cameras: tuple[str, ...] | None = None  # those that are looked through; all if absent
+    cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = (
+        None  # those that are looked through; all if absent
+    )
     filter: Literal["pose", "rpy"] = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper
     selection: Literal["information", "indexes"] = (
         "information"  # of features: or by spread, as [Lippiello2005]
     )
-    budget: Annotated[int, Field(ge=3)] = 16  # features measured a tick, over all cameras
-    noise_px: Positive = 0.5  # expected of a measured point; drawn where there are no images
-    believed_noise_px: Positive | None = None  # in place of what each measurement says of itself
+    budget: Annotated[int, Field(ge=3, le=4096)] = 16  # features measured a tick, over all cameras
+    noise_px: _Noise = 0.5  # expected of a measured point; drawn where there are no images
+    believed_noise_px: _Noise | None = None  # in place of what each measurement says of itself
     outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches made on purpose
     occlusion: bool = True  # whether arms and fixtures in the way are predicted
-    start_error_m: Annotated[float, Field(ge=0)] = 0.01  # how well the first pose is known
-    start_error_deg: Annotated[float, Field(ge=0)] = 2.0  # and its angle
-    acceleration_density: Positive = 0.01  # m²/s³, of the target, for the filter on SE(3)
-    angular_acceleration_density: Positive = 0.25  # rad²/s³
+    start_error_m: Distance = 0.01  # how well the first pose is known
+    start_error_deg: _Angle = 2.0  # and its angle
+    acceleration_density: _Density = 0.01  # m²/s³, of the target, for the filter on SE(3)
+    angular_acceleration_density: _Density = 0.25  # rad²/s³
