@@ -8,12 +8,13 @@ from vergence.camera.calibration import (
     CalibrationFailure,
     LensFit,
     MountingFit,
+    Noise,
     fit_lens,
     fit_mounting,
     free_parameters,
 )
-from vergence.camera.calibration.hand_eye import closed_form
-from vergence.camera.calibration.joint_fit import JointProblem, State
+from vergence.camera.calibration.hand_eye import Mounting, closed_form
+from vergence.camera.calibration.joint_fit import PARAMETERS, JointProblem, State
 from vergence.camera.calibration.lens_fit import board_pose
 from vergence.camera.calibration.normal_equations import steps_without
 from vergence.camera.calibration.reprojection import lens_of, reproject, residuals, rms
@@ -39,7 +40,7 @@ def lens(seen, **options) -> LensFit:
 
 
 def mounted(
-    given: Scene, fixed=False, sightings=None, rng=None
+    given: Scene, fixed=False, sightings=None, rng=None, **options
 ) -> MountingFit | CalibrationFailure:
     fit = lens(given.sightings)
     assert len(fit.sightings) == len(given.sightings)
@@ -51,6 +52,7 @@ def mounted(
         fixed=fixed,
         free=FREE,
         rng=rng or np.random.default_rng(0),
+        **options,
     )
 
 
@@ -85,19 +87,27 @@ def test_slopes_of_the_joint_problem_are_those_of_finite_differences(fixed: bool
     rng, h = np.random.default_rng(1), 1e-6
     given = scene(rng, 3, fixed)
     A = given.T_base_flange if fixed else np.array([se3_inverse(T) for T in given.T_base_flange])
-    problem = JointProblem(tuple(given.sightings), A, CAMERA, FREE, fixed)
-    from vergence.camera.calibration.hand_eye import Mounting
+    problem = JointProblem(tuple(given.sightings), A, CAMERA, FREE, fixed, 0.01)
+    mounting, noise = Mounting(given.X, given.Y), Noise(0.1, 2e-3, 3e-3)
+    state = State(lens_of(CAMERA), mounting, 0.02, rng.normal(0.0, 0.02, (3, 6)))
+    block = problem.block(state, 1, noise)
 
-    state = State(lens_of(CAMERA), Mounting(given.X, given.Y))
-    for step in (np.zeros(21), np.concatenate((np.zeros(9), rng.normal(0, 0.03, 12)))):
-        slopes = problem._slopes(state, step, 1)
-        for n in range(21):
-            d = h * np.eye(21)[n]
-            ahead, behind = (problem.residuals(state.moved(step + s * d))[1] for s in (1, -1))
-            slope = (ahead - behind) / (2 * h)
-            np.testing.assert_allclose(
-                slopes[:, n], slope, rtol=2e-4, atol=2e-3 + 1e-6 * abs(slope).max()
-            )
+    def slope(step: np.ndarray, own: np.ndarray) -> np.ndarray:
+        ahead, behind = (
+            problem.block(state.moved(h * s * step, h * s * own), 1, noise) for s in (1, -1)
+        )
+        return (ahead.residual - behind.residual) / (2 * h)
+
+    for n in range(PARAMETERS):
+        expected = slope(np.eye(PARAMETERS)[n], np.zeros((3, 6)))
+        close = {"rtol": 2e-4, "atol": 2e-2 + 1e-6 * abs(expected).max()}
+        np.testing.assert_allclose(block.J[:, n], expected, **close)
+    for n in range(6):
+        own = np.zeros((3, 6))
+        own[1, n] = 1.0
+        expected = slope(np.zeros(PARAMETERS), own)
+        close = {"rtol": 2e-4, "atol": 2e-2 + 1e-6 * abs(expected).max()}
+        np.testing.assert_allclose(block.own[:, n], expected, **close)
 
 
 @pytest.mark.parametrize("fixed", [False, True])
@@ -152,7 +162,7 @@ def test_errors_of_the_arm_are_estimated_and_counted_in(fixed: bool) -> None:
     assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.35
 
 
-def test_a_picture_left_out_is_predicted_as_by_a_fit_without_it() -> None:
+def test_a_image_left_out_is_predicted_as_by_a_fit_without_it() -> None:
     given = scene(np.random.default_rng(3), 12)
     whole = mounted(given)
     assert isinstance(whole, MountingFit)
@@ -209,7 +219,7 @@ def test_boards_that_look_the_same_upside_down_are_turned_the_right_way() -> Non
     assert np.linalg.norm(errors(fit, given)[9:12]) < 0.5e-3
 
 
-def test_blurred_pictures_and_other_boards_are_named_and_do_no_harm() -> None:
+def test_blurred_images_and_other_boards_are_named_and_do_no_harm() -> None:
     rng = np.random.default_rng(7)
     seen, _ = views(rng, 20)
     seen[3] = seen[3]._replace(points_px=seen[3].points_px + rng.normal(0, 3.0, (88, 2)))
@@ -223,15 +233,15 @@ def test_blurred_pictures_and_other_boards_are_named_and_do_no_harm() -> None:
 def test_a_board_that_is_never_tilted_cannot_tell_the_focal_length() -> None:
     fit = fit_lens(views(np.random.default_rng(8), 12, tilt=0.02)[0], 640, 480)
     assert not fit
-    assert "add pictures with the board tilted" in str(fit)
+    assert "add images with the board tilted" in str(fit)
 
 
-def test_too_few_pictures_are_refused_in_words() -> None:
+def test_too_few_images_are_refused_in_words() -> None:
     fit = fit_lens(views(np.random.default_rng(9), 3)[0], 640, 480)
     assert not fit
-    assert "found in 3 pictures; at least 4" in str(fit)
+    assert "found in 3 different images; at least 4" in str(fit)
     given = scene(np.random.default_rng(9), 4)
-    assert "there are 4 pictures" in str(mounted(given))
+    assert "there are 4 images" in str(mounted(given))
 
 
 def test_an_arm_that_turned_about_one_axis_only_is_refused_in_words() -> None:
@@ -244,7 +254,7 @@ def test_an_arm_that_turned_about_one_axis_only_is_refused_in_words() -> None:
     assert "hardly turned" in str(mounted(given._replace(T_base_flange=still)))
 
 
-def test_poses_that_have_nothing_to_do_with_the_pictures_are_refused() -> None:
+def test_poses_that_have_nothing_to_do_with_the_images_are_refused() -> None:
     given = scene(np.random.default_rng(11), 15)
     other = scene(np.random.default_rng(12), 15)
     fit = mounted(given._replace(T_base_flange=other.T_base_flange))
@@ -264,9 +274,67 @@ def test_the_mistake_that_was_made_is_named(fixed: bool) -> None:
     wrongly_read = mounted(given._replace(T_base_flange=wrong), fixed)
     words = wrongly_read.hint if wrongly_read else str(wrongly_read)
     assert "in the order x, y, z, w" in words
-    larger = [s._replace(points=1.03 * s.points) for s in given.sightings]
-    scaled = mounted(given._replace(sightings=larger), fixed)
-    assert "if the squares were 97.1 % of the size" in (scaled.hint if scaled else str(scaled))
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["in hand", "to hand"])
+def test_a_board_of_another_size_is_noticed_and_does_no_harm(fixed: bool) -> None:
+    for seed in range(3):
+        given = scene(np.random.default_rng(seed), 15, fixed)
+        larger = [s._replace(points=1.02 * s.points) for s in given.sightings]
+        fit = mounted(given._replace(sightings=larger), fixed)
+        assert isinstance(fit, MountingFit)
+        assert fit.board_scale == pytest.approx(1 / 1.02, abs=5e-4)
+        assert any("98.0 % of the size given" in words for words in fit.warnings)
+        assert np.linalg.norm(errors(fit, given)[9:12]) < 0.5e-3
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.01])
+def test_the_deviation_of_the_mounting_contains_that_of_the_boards_size(deviation: float) -> None:
+    # An arm good to 1 mm that hardly travels says little about the size of the board.
+    ratios = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        given = scene(rng, 12, arm_m=1e-3, arm_rad=1e-3, tilt=0.3, roll=0.3)
+        size = 1.0 + rng.normal(0.0, deviation)
+        other = [s._replace(points=s.points / size) for s in given.sightings]
+        fit = mounted(given._replace(sightings=other), scale_deviation=deviation)
+        assert isinstance(fit, MountingFit)
+        ratios.append(errors(fit, given)[9:12] / fit.deviations[9:12])
+    assert np.sqrt(np.mean(np.square(ratios))) < 1.35
+
+
+@pytest.mark.parametrize("arm", [(0.0, 0.0), (1e-3, 1e-3), (3e-3, 4e-3), (6e-3, 8e-3)])
+def test_the_mounting_is_found_with_arms_of_any_precision(arm: tuple[float, float]) -> None:
+    ratios = []
+    for seed in range(4):
+        given = scene(np.random.default_rng(seed), 12, arm_m=arm[0], arm_rad=arm[1])
+        fit = mounted(given)
+        assert isinstance(fit, MountingFit), fit
+        assert fit.bad == ()
+        ratios.append(errors(fit, given)[9:] / fit.deviations[9:15])
+        np.testing.assert_allclose(fit.noise[1:], arm, rtol=0.6, atol=2e-5)
+    assert np.sqrt(np.mean(np.square(ratios))) < 1.6
+
+
+def test_a_fit_that_did_not_converge_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = scene(np.random.default_rng(0), 8, arm_m=3e-3, arm_rad=4e-3)
+    monkeypatch.setattr("vergence.camera.calibration.solver._MOST_STEPS", 1)
+    fit = mounted(given)
+    assert not fit
+    assert "did not converge" in str(fit)
+
+
+def test_copies_of_an_image_count_once() -> None:
+    rng = np.random.default_rng(0)
+    seen, _ = views(rng, 6)
+    again = [s._replace(name=f"copy of {s.name}") for s in seen]
+    fit, twice = lens(seen), lens(seen + again)
+    np.testing.assert_allclose(twice.deviations, fit.deviations, rtol=1e-9)
+    assert [bad.name for bad in twice.bad] == [s.name for s in again]
+    assert "where 000.png shows it" in twice.bad[0].reason
+    alone = fit_lens([seen[0]._replace(name=f"{n}.png") for n in range(20)], 640, 480)
+    assert not alone
+    assert "found in 1 different images without 19 copies" in str(alone)
 
 
 def test_a_lens_that_is_known_stays_as_it_is() -> None:

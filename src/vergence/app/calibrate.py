@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vergence.arrays import FloatArray
     from vergence.camera import Camera
     from vergence.camera.calibration import (
-        BadPicture,
+        BadImage,
         CalibrationFailure,
         LensFit,
         MountingFit,
@@ -58,7 +58,7 @@ class Calibration(NamedTuple):
         return self.lens.camera if self.mounting is None else self.mounting.camera
 
     @property
-    def bad(self) -> "tuple[BadPicture, ...]":
+    def bad(self) -> "tuple[BadImage, ...]":
         """All pictures that were left out."""
         more = () if self.mounting is None else self.mounting.bad
         return self.data.blank + self.lens.bad + more
@@ -66,10 +66,7 @@ class Calibration(NamedTuple):
     @property
     def warnings(self) -> list[str]:
         """What to know before trusting it."""
-        from vergence.app.calibration.words import lens_warnings, mounting_warnings
-
-        more = [] if self.mounting is None else mounting_warnings(self.mounting)
-        return lens_warnings(self.lens, self.known) + more
+        return self.lens.warnings + ([] if self.mounting is None else self.mounting.warnings)
 
     @property
     def estimates(self) -> "list[Estimate]":
@@ -223,7 +220,7 @@ def _failed(failure: "CalibrationFailure", data: "Dataset", as_json: bool) -> in
     return FAILURE
 
 
-def _left_out(bad: "Sequence[BadPicture]") -> list[dict[str, Any]]:
+def _left_out(bad: "Sequence[BadImage]") -> list[dict[str, Any]]:
     return [{"picture": b.name, "residual_px": b.residual_px, "reason": b.reason} for b in bad]
 
 
@@ -313,7 +310,7 @@ def _table(found: Calibration) -> list[str]:
     ]
 
 
-def _tell_left_out(bad: "Sequence[BadPicture]") -> None:
+def _tell_left_out(bad: "Sequence[BadImage]") -> None:
     for picture in bad:
         size = (
             "" if picture.residual_px != picture.residual_px else f" ({picture.residual_px:.2f} px)"

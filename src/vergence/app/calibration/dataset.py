@@ -11,7 +11,7 @@ from vergence.app.calibration.poses import find_poses, read_poses
 from vergence.app.progress import bar
 from vergence.app.tracking.footage import open_footage
 from vergence.arrays import FloatArray
-from vergence.camera.calibration import BadPicture, Sighting
+from vergence.camera.calibration import BadImage, Sighting
 from vergence.errors import InputError, nearest
 from vergence.tables import numbers, read_table, require_known
 from vergence.vision.board import DICTIONARY, Board
@@ -28,7 +28,7 @@ class Dataset(NamedTuple):
     width: int  # of the pictures, px
     height: int
     sightings: tuple[Sighting, ...]
-    blank: tuple[BadPicture, ...]  # without a board, or without a pose
+    blank: tuple[BadImage, ...]  # without a board, or without a pose
     T_base_flange: FloatArray | None  # (N, 4, 4) of each sighting; None without arm poses
 
 
@@ -50,7 +50,7 @@ def read_dataset(folder: Path, board: Board | None, poses: Path | None) -> Datas
     _require_pictures(arm, [name for name, _ in pictures], poses)
     height, width = pictures[0][1].shape
     found: list[Sighting] = []
-    blank: list[BadPicture] = []
+    blank: list[BadImage] = []
     progress = bar("{task.completed} / {task.total}")
     task = progress.add_task("find the board", total=len(pictures))
     with progress, ThreadPoolExecutor(4) as pool:
@@ -58,9 +58,9 @@ def read_dataset(folder: Path, board: Board | None, poses: Path | None) -> Datas
         for (name, _), sighting in zip(pictures, seen, strict=True):
             progress.advance(task)
             if sighting is None:
-                blank.append(BadPicture(name, np.nan, _NOT_FOUND))
+                blank.append(BadImage(name, np.nan, _NOT_FOUND))
             elif arm is not None and name not in arm:
-                blank.append(BadPicture(name, np.nan, f"no pose of the arm in {poses}"))
+                blank.append(BadImage(name, np.nan, f"no pose of the arm in {poses}"))
             else:
                 found.append(sighting)
     stack = None if arm is None else np.array([arm[s.name] for s in found]).reshape(-1, 4, 4)

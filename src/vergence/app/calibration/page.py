@@ -8,10 +8,10 @@ import numpy as np
 
 from vergence.app import markup
 from vergence.app.calibration.estimates import Estimate, rotation_error_deg
-from vergence.app.calibration.words import coverage
 from vergence.app.figures.calibration import residual_bars_figure, residual_field_figure
 from vergence.app.report import REPORT
 from vergence.app.table import Row
+from vergence.camera.calibration import coverage
 
 if TYPE_CHECKING:
     from vergence.app.calibrate import Calibration

@@ -1,4 +1,4 @@
-"""Hand and eye in closed form, and which pictures agree on it.
+"""Hand and eye in closed form, and which images agree on it.
 
 One equation holds for a camera in the hand and for one that looks at the hand:
 
@@ -19,8 +19,8 @@ from vergence.camera.calibration.reprojection import residuals, rms
 from vergence.camera.calibration.sighting import Sighting
 from vergence.geometry import se3, se3_inverse, so3_log
 
-_SUBSETS = 150  # of three pictures, tried for the start
-TOLERATED = 0.05  # of the picture's width: farther off, a picture counts as contradicting
+_SUBSETS = 150  # of three images, tried for the start
+TOLERATED = 0.08  # of the image's width: farther off, an image counts as contradicting
 _HALF_TURN = np.deg2rad(170.0)  # beyond, the sign of a rotation vector is not to be trusted
 
 
@@ -37,11 +37,11 @@ class Mounting(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """A mounting on which most pictures agree."""
+    """A mounting on which most images agree."""
 
     mounting: Mounting
-    turns: IntArray  # (N,) which of the board's possible orientations each picture shows
-    residual_px: FloatArray  # (N,) rms of each picture under it
+    turns: IntArray  # (N,) which of the board's possible orientations each image shows
+    residual_px: FloatArray  # (N,) rms of each image under it
 
 
 def turning_deg(A: FloatArray) -> FloatArray:
@@ -58,7 +58,7 @@ def turning_deg(A: FloatArray) -> FloatArray:
 def closed_form(A: FloatArray, T: FloatArray) -> Mounting:
     """Return the mounting of arm poses A (N, 4, 4) and board poses T (N, 4, 4) in the camera.
 
-    Between two pictures (A_j A_i⁻¹) X = X (T_j T_i⁻¹): the rotation from the rotation vectors, the
+    Between two images (A_j A_i⁻¹) X = X (T_j T_i⁻¹): the rotation from the rotation vectors, the
     position then linear, both in the least-squares sense [ParkMartin1994].
     """
     moves = []
@@ -71,9 +71,16 @@ def closed_form(A: FloatArray, T: FloatArray) -> Mounting:
     left = np.vstack([np.zeros((1, 3)), *(a[:3, :3] - np.eye(3) for a, *_ in moves)])
     right = np.concatenate([np.zeros(1), *(R @ b[:3, 3] - a[:3, 3] for a, b, *_ in moves)])
     X = se3(R, np.ascontiguousarray(np.linalg.lstsq(left, right, rcond=None)[0]))
+    return Mounting(X, board_in_mount(A, T, X))
+
+
+def board_in_mount(A: FloatArray, T: FloatArray, X: FloatArray) -> FloatArray:
+    """Return Y (4, 4) for a camera at X: the mean over arm poses A and board poses T, (N, 4, 4)."""
     boards = np.array([se3_inverse(a) @ X @ t for a, t in zip(A, T, strict=True)])
-    Y = se3(nearest_rotation(boards[:, :3, :3].mean(axis=0)), boards[:, :3, 3].mean(axis=0))
-    return Mounting(X, Y)
+    Y: FloatArray = se3(
+        nearest_rotation(boards[:, :3, :3].mean(axis=0)), boards[:, :3, 3].mean(axis=0)
+    )
+    return Y
 
 
 def agree(
@@ -84,17 +91,17 @@ def agree(
     width: int,
     rng: np.random.Generator,
 ) -> Agreement:
-    """Find the mounting on which most pictures agree, whatever some others say.
+    """Find the mounting on which most images agree, whatever some others say.
 
-    Mountings are made of three pictures each; the one with the least residuals over all, each cut
-    off where it counts as contradicting, is made again of all pictures that agree.
+    Mountings are made of three images each; the one with the least residuals over all, each cut
+    off where it counts as contradicting, is made again of all images that agree.
 
     Args:
-        sightings: of each picture, one for each orientation that the board may have had in it.
+        sightings: of each image, one for each orientation that the board may have had in it.
         A: arm poses, (N, 4, 4).
         T: board poses in the camera for these, (N, S, 4, 4).
         lens: parameters, (9,).
-        width: of the pictures, px.
+        width: of the images, px.
         rng: chooses the threes.
     """
     count, orientations = T.shape[:2]
@@ -127,7 +134,7 @@ def nearest_rotation(M: FloatArray) -> FloatArray:
 
 
 def _threes(count: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
-    """Return all threes of pictures, or as many as are tried."""
+    """Return all threes of images, or as many as are tried."""
     if count <= 11:
         return list(combinations(range(count), 3))
     return [tuple(rng.choice(count, 3, replace=False)) for _ in range(_SUBSETS)]

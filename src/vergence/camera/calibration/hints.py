@@ -1,4 +1,4 @@
-"""What would make pictures and arm poses agree, where they do not: the mistakes people make."""
+"""What would make images and arm poses agree, where they do not: the mistakes people make."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -35,7 +35,7 @@ def hint(
     fixed: bool,
     rng: np.random.Generator,
 ) -> str:
-    """Return which mistake would explain that pictures and poses disagree; empty if none does.
+    """Return which mistake would explain that images and poses disagree; empty if none does.
 
     The arguments are those of `agree`, and whether the camera is fixed.
     """

@@ -1,4 +1,4 @@
-"""The lens of a camera, from pictures of a board."""
+"""The lens of a camera, from images of a board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.camera.calibration.cautions import lens_warnings
 from vergence.camera.calibration.failure import CalibrationFailure
 from vergence.camera.calibration.normal_equations import (
     Share,
@@ -21,12 +22,12 @@ from vergence.camera.calibration.reprojection import (
     residuals,
     rms,
 )
-from vergence.camera.calibration.sighting import BadPicture, Sighting, pixels
+from vergence.camera.calibration.sighting import BadImage, Sighting, pixels
 from vergence.camera.pinhole import Camera
 from vergence.errors import InputError
 from vergence.geometry import se3, se3_exp, so3_exp
 
-FEWEST_PICTURES = 4
+FEWEST_IMAGES = 4
 FEWEST_CORNERS = 6
 MODELS = {  # which distortion coefficients are estimated
     "none": (),
@@ -36,33 +37,39 @@ MODELS = {  # which distortion coefficients are estimated
     "full": ("k1", "k2", "p1", "p2", "k3"),
 }
 _FLATTEST_DEG = 8.0  # the board must be seen turned by more than this
-_SUSPICIOUS = 3.0  # times the median residual of all pictures
-_SMALLEST_PX = 0.3  # residuals below are never held against a picture
+_SUSPICIOUS = 3.0  # times the median residual of all images
+_SAME_PX = 0.3  # rms: nearer, two images show the board in one pose
+_SMALLEST_PX = 0.3  # residuals below are never held against an image
 
 
 @dataclass(frozen=True, slots=True)
 class LensFit:
-    """A camera as pictures of a board have it; poses of the board are free.
+    """A camera as images of a board have it; poses of the board are free.
 
-    The deviations assume errors of the corners that are independent, alike in all pictures, and of
+    The deviations assume errors of the corners that are independent, alike in all images, and of
     the size of the residuals; that the board is as flat and as large as said; and that the lens
     follows the model.
     """
 
     camera: Camera
     covariance: FloatArray  # (9, 9) in the order of `LENS`, 0 where not estimated
-    jackknife: FloatArray  # (9,) standard deviations from leaving out each picture in turn
+    jackknife: FloatArray  # (9,) standard deviations from leaving out each image in turn
     noise_px: float  # standard deviation of a corner's coordinate
     sightings: tuple[Sighting, ...]  # those kept
     T_camera_board: FloatArray  # (N, 4, 4)
     residuals: tuple[FloatArray, ...]  # (2n,) each, px
-    left_out_px: FloatArray  # (N,) rms of each picture under the lens that the others give
-    bad: tuple[BadPicture, ...]
+    left_out_px: FloatArray  # (N,) rms of each image under the lens that the others give
+    bad: tuple[BadImage, ...]
 
     @property
     def deviations(self) -> FloatArray:
         """Standard deviations (9,), 0 for what was not estimated."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before trusting it."""
+        return lens_warnings(self)
 
     @property
     def rms_px(self) -> float:
@@ -77,27 +84,28 @@ def fit_lens(
     model: str = "full",
     known: Camera | None = None,
 ) -> LensFit | CalibrationFailure:
-    """Estimate a lens, leaving out pictures that the others contradict.
+    """Estimate a lens, leaving out images that the others contradict.
 
     OpenCV minimises the squared distances of all corners over lens and poses, from the closed form
-    of [Zhang2000]. Then the picture with the largest residual goes while it is far beyond the
+    of [Zhang2000]. Then the image with the largest residual goes while it is far beyond the
     usual.
 
     Args:
-        sightings: of one board, in pictures by one camera.
-        width: of the pictures, px.
-        height: of the pictures.
+        sightings: of one board, in images by one camera.
+        width: of the images, px.
+        height: of the images.
         model: a key of `MODELS`.
-        known: the camera, if it is known already: then only pictures and poses are judged.
+        known: the camera, if it is known already: then only images and poses are judged.
 
     Returns:
-        the fit, or in words why these pictures cannot tell.
+        the fit, or in words why these images cannot tell.
     """
     if model not in MODELS:
         raise InputError("fit_lens", "model", model, ", ".join(MODELS))
-    kept, bad = list(sightings), list[BadPicture]()
+    kept, copies = _without_copies(sightings)
+    bad = list[BadImage]()
     while True:
-        reason = _too_few(kept, bad)
+        reason = _too_few(kept, bad, copies)
         if reason:
             return CalibrationFailure(reason)
         if known is None:
@@ -114,19 +122,19 @@ def fit_lens(
             break
         reason = (
             f"its corners lie {pixels(sizes[worst])} from where a flat board can show them; in the "
-            f"other pictures {pixels(usual)} is usual: blurred, bent, or not this board"
+            f"other images {pixels(usual)} is usual: blurred, bent, or not this board"
         )
-        bad.append(BadPicture(kept[worst].name, float(sizes[worst]), reason))
+        bad.append(BadImage(kept[worst].name, float(sizes[worst]), reason))
         del kept[worst]
     turned = _spread_deg(poses)
     if turned < _FLATTEST_DEG and known is None:
         return CalibrationFailure(
-            f"the board is parallel to itself in all pictures, within {turned:.1f}°, which leaves "
-            "the focal length open: add pictures with the board tilted by 20 to 45° about "
+            f"the board is parallel to itself in all images, within {turned:.1f}°, which leaves "
+            "the focal length open: add images with the board tilted by 20 to 45° about "
             "different axes"
         )
     free = np.zeros(9) if known is not None else free_parameters(model)
-    return _finished(camera, poses, kept, bad, free)
+    return _finished(camera, poses, kept, [*copies, *bad], free)
 
 
 def free_parameters(model: str) -> FloatArray:
@@ -135,7 +143,7 @@ def free_parameters(model: str) -> FloatArray:
 
 
 def board_pose(camera: Camera, seen: Sighting) -> FloatArray:
-    """Return T_camera_board (4, 4) that fits one picture best."""
+    """Return T_camera_board (4, 4) that fits one image best."""
     import cv2
 
     rays = np.ascontiguousarray(camera.normalize(seen.points_px))
@@ -151,17 +159,37 @@ def board_pose(camera: Camera, seen: Sighting) -> FloatArray:
     return T
 
 
-def _too_few(kept: Sequence[Sighting], bad: Sequence[BadPicture]) -> str:
-    if len(kept) < FEWEST_PICTURES:
-        gone = f" after {len(bad)} bad ones were left out" if bad else ""
+def _without_copies(sightings: Sequence[Sighting]) -> tuple[list[Sighting], list[BadImage]]:
+    """Return the sightings that differ, and those that repeat one of them."""
+    kept, copies = list[Sighting](), list[BadImage]()
+    for seen in sightings:
+        same = next((other for other in kept if _same(seen, other)), None)
+        if same is None:
+            kept.append(seen)
+            continue
+        reason = f"the board is where {same.name} shows it: the same image, or nothing had moved"
+        copies.append(BadImage(seen.name, np.nan, reason))
+    return kept, copies
+
+
+def _same(one: Sighting, other: Sighting) -> bool:
+    if not np.array_equal(one.points, other.points):
+        return False
+    return rms((one.points_px - other.points_px).ravel()) < _SAME_PX
+
+
+def _too_few(kept: Sequence[Sighting], bad: Sequence[BadImage], copies: Sequence[BadImage]) -> str:
+    if len(kept) < FEWEST_IMAGES:
+        gone = [f"{len(bad)} bad ones"] * bool(bad) + [f"{len(copies)} copies"] * bool(copies)
+        without = f" without {' and '.join(gone)}" if gone else ""
         return (
-            f"the board was found in {len(kept)} pictures{gone}; at least {FEWEST_PICTURES} are "
-            "needed, 15 to 30 are good"
+            f"the board was found in {len(kept)} different images{without}; at least "
+            f"{FEWEST_IMAGES} are needed, 15 to 30 are good"
         )
     if len(bad) > len(kept):
         return (
-            f"{len(bad)} of {len(bad) + len(kept)} pictures contradict the others: is the board "
-            "the one that was said, flat, and all pictures by one camera with fixed focus?"
+            f"{len(bad)} of {len(bad) + len(kept)} images contradict the others: is the board "
+            "the one that was said, flat, and all images by one camera with fixed focus?"
         )
     return ""
 
@@ -203,7 +231,7 @@ def _pose(w: object, t: object) -> FloatArray:
 
 
 def _spread_deg(poses: FloatArray) -> float:
-    """Return the largest angle between the board's planes in two pictures, degrees."""
+    """Return the largest angle between the board's planes in two images, degrees."""
     normals = poses[:, :3, 2]
     cosines = np.abs(normals @ normals.T)
     return float(np.rad2deg(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
@@ -213,7 +241,7 @@ def _finished(
     camera: Camera,
     poses: FloatArray,
     kept: Sequence[Sighting],
-    bad: Sequence[BadPicture],
+    bad: Sequence[BadImage],
     free: FloatArray,
 ) -> LensFit:
     lens = lens_of(camera)
@@ -239,6 +267,6 @@ def _finished(
 
 
 def _alone(lens: FloatArray, like: Camera, seen: Sighting) -> float:
-    """Return the rms of a picture whose pose alone is fitted, under a lens, px."""
+    """Return the rms of an image whose pose alone is fitted, under a lens, px."""
     camera = camera_with(lens, like)
     return rms(residuals(lens, board_pose(camera, seen), seen))

@@ -18,7 +18,7 @@ def lens_of(camera: Camera) -> FloatArray:
 
 
 def camera_with(lens: FloatArray, like: Camera) -> Camera:
-    """Return the camera with parameters (9,) and the picture size of another."""
+    """Return the camera with parameters (9,) and the image size of another."""
     fx, fy, cx, cy = (float(value) for value in lens[:4])
     return Camera(like.width, like.height, fx, fy, cx, cy, lens[4:])
 

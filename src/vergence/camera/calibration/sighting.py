@@ -1,4 +1,4 @@
-"""A board as one picture shows it."""
+"""A board as one image shows it."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,9 @@ from vergence.arrays import FloatArray
 
 
 class Sighting(NamedTuple):
-    """The corners of a board found in one picture."""
+    """The corners of a board found in one image."""
 
-    name: str  # of the picture
+    name: str  # of the image
     points: FloatArray  # (n, 3) the corners in the board's frame, m
     points_px: FloatArray  # (n, 2) where they were found
 
@@ -23,8 +23,8 @@ def pixels(size: float) -> str:
     return f"{size:.0f} px" if size >= 10.0 else f"{size:.2g} px"
 
 
-class BadPicture(NamedTuple):
-    """A picture that the others contradict, or that shows no board."""
+class BadImage(NamedTuple):
+    """An image that the others contradict, or that shows no board."""
 
     name: str
     residual_px: float  # root mean square; NaN where no board was found
