@@ -14,11 +14,18 @@ from harness import calls, loops, row
 from peer_programs import mink, pink, visp
 from vergence.arrays import FloatArray
 from vergence.cell import load_cell
-from vergence.control.constrained_rates import constrained_rates
-from vergence.control.constrained_solver import ConstrainedSolver
-from vergence.control.constraints import DEPTH, pack_features
-from vergence.control.objective import least_squares_objective
-from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE
+from vergence.control import CameraMounting, Limits
+from vergence.control.limits import AXES, COLUMNS, HALF, MIDDLE, ConstraintSettings, pack_features
+from vergence.control.limits._rows import DEPTH
+from vergence.control.objectives.objective import least_squares_kernel
+from vergence.control.solvers import Setting
+from vergence.control.solvers._constrained_rates import (
+    Avoidance,
+    Scene,
+    Task,
+    constrained_rates,
+)
+from vergence.control.solvers.quadratic_program import constraint_settings
 from vergence.features import interaction_matrix_points
 from vergence.robot import Arm, yoshikawa_measure
 from vergence.simulation import SimulatedDriver
@@ -30,7 +37,7 @@ class Tick(NamedTuple):
     """What one tick is made from; the same every time."""
 
     arm: Arm
-    solver: ConstrainedSolver
+    settings: ConstraintSettings
     q: FloatArray
     wanted: FloatArray
     features: FloatArray
@@ -48,10 +55,11 @@ def tick_of(cell: str, count: int, posts: int = 0) -> Tick:
     points = np.array([(x, y) for x in grid for y in grid])[:count]
     depth = np.linspace(0.9, 1.1, count)
     lowest = 0.5 * yoshikawa_measure(arm.jacobian(q))
-    solver = ConstrainedSolver(arm, camera, manipulability_min=lowest, S=1e-3)
+    setting = Setting(arm, CameraMounting(camera), None, PERIOD)
+    settings = constraint_settings(setting, Limits())._replace(manipulability_min=lowest)
     features = pack_features(points, np.zeros_like(points), depth)
     wanted = points + np.array([0.06, -0.04])
-    return Tick(arm, solver, q, wanted, features, beside(arm.forward_kinematics(q), posts))
+    return Tick(arm, settings, q, wanted, features, beside(arm.forward_kinematics(q), posts))
 
 
 def beside(T_world_camera: FloatArray, count: int) -> FloatArray:
@@ -71,18 +79,21 @@ def one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance)
     points = features[:, :2]
     L = interaction_matrix_points(points, features[:, DEPTH])
     error = (-GAIN * (points - wanted)).ravel()
-    twist = least_squares_objective(L, error, np.ones(len(L)), R)
-    rest = np.zeros(len(q))
+    twist = least_squares_kernel(L, error, np.ones(len(L)), R)
+    n = len(q)
+    rest, none = np.zeros(n), np.empty((0, 0))
+    task = Task(twist.H, twist.g, none, np.empty(0), rest)
+    scene = Scene(
+        features, solids, none, np.eye(4), np.empty((0, n)), np.empty(0),
+        np.empty(0, dtype=np.int64),
+    )  # fmt: skip
     return constrained_rates(
         chain,
         limits,
         q,
         rest,
-        twist.H,
-        twist.g,
-        rest,
-        features,
-        solids,
+        task,
+        scene,
         PERIOD,
         settings,
         avoidance,
@@ -99,9 +110,10 @@ def repeat(count, chain, limits, q, wanted, features, solids, R, settings, avoid
 
 
 def arguments(tick: Tick) -> tuple[Any, ...]:
-    solver, R = tick.solver, np.full(6, 1e-6)
-    before = (tick.arm.chain, solver.limits, tick.q, tick.wanted, tick.features, tick.solids, R)
-    return (*before, solver.settings, solver.avoidance)
+    arm, R = tick.arm, np.full(6, 1e-6)
+    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    before = (arm.chain, limits, tick.q, tick.wanted, tick.features, tick.solids, R)
+    return (*before, tick.settings, Avoidance(1e-3, 0.5, 50.0, 1e-6))
 
 
 def from_python(tick: Tick) -> Callable[[], object]:

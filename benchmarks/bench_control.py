@@ -11,11 +11,14 @@ from harness import calls, loops, row
 from peer_programs import machinevision, visp
 from vergence.camera import Camera
 from vergence.control import (
-    OptimalTrackingLaw,
-    optimal_tracking_tick,
-    pack_setup,
-    tracking_twist,
+    MotionSettings,
+    OptimalTracking,
+    PseudoInverse,
+    Servo,
+    Situation,
+    TrackingSetup,
 )
+from vergence.control.objectives import optimal_tracking_tick, pack_setup, tracking_twist
 from vergence.robot import Arm
 
 POSE = np.array([-2.19, 0.75, -3.01, 0.1, -0.87, 0.2])
@@ -32,20 +35,29 @@ def puma() -> Arm:
     return Arm.from_mujoco(mujoco.MjModel.from_xml_path(model), "flange", kind="body")
 
 
-def law_of(arm: Arm, S: float) -> OptimalTrackingLaw:
-    camera = Camera(640, 480, 1454.0, 1230.0, 319.5, 239.5)
-    return OptimalTrackingLaw(arm, camera, DEPTH, avoidance_axes=("x", "y", "z"), S=S)
+def setup_of(arm: Arm, S: float) -> TrackingSetup:
+    servo = Servo(
+        arm,
+        Camera(640, 480, 1454.0, 1230.0, 319.5, 239.5),
+        OptimalTracking(avoidance_axes=("x", "y", "z"), Q=8e-6, S=S),
+        solver=PseudoInverse(),
+        depth_m=DEPTH,
+        situation=Situation(motion=MotionSettings(feed_forward=False, prediction=False)),
+    )
+    setup = servo.tracking
+    assert setup is not None
+    return setup
 
 
-def law_alone(law: OptimalTrackingLaw) -> Callable[[], None]:
+def law_alone(setup: TrackingSetup) -> Callable[[], None]:
     """Interaction matrix and camera twist, without the arm: what `vpServo` does for a camera."""
-    weights, v_camera = pack_setup(law.setup).weights, np.empty(6)
+    weights, v_camera = pack_setup(setup).weights, np.empty(6)
     return lambda: tracking_twist(weights, FEATURES, v_camera)
 
 
-def whole_tick(law: OptimalTrackingLaw) -> Callable[[], None]:
+def whole_tick(setup: TrackingSetup) -> Callable[[], None]:
     """From features and joint positions to joint rates."""
-    weights, joints = pack_setup(law.setup)
+    weights, joints = pack_setup(setup)
     result = np.empty(16)
     return lambda: optimal_tracking_tick(weights, joints, POSE, FEATURES, result)
 
@@ -62,10 +74,10 @@ def repeat_tick(count, weights, joints, q, features):  # type: ignore[no-untyped
 
 def run() -> list[dict[str, Any]]:
     arm = puma()
-    plain, avoiding = law_of(arm, S=0.0), law_of(arm, S=1e-6)
+    plain, avoiding = setup_of(arm, S=0.0), setup_of(arm, S=1e-6)
     alone = calls(law_alone(plain))
     tick, gradient = calls(whole_tick(plain)), calls(whole_tick(avoiding))
-    packed = pack_setup(avoiding.setup)
+    packed = pack_setup(avoiding)
     inside = loops(lambda count: repeat_tick(count, *packed, POSE, FEATURES))
     return [
         row("control: interaction matrix + law", alone, visp("tick"), ratio_aim=0.15),

@@ -1,7 +1,7 @@
-"""Ask a UR5 for a picture that it must not reach: without constraints, and with them.
+"""Ask a UR5 for an image that it must not reach: without limits, and with them.
 
-The four points are wanted beyond the border of the picture. A plain law goes there and loses them;
-the constrained law stops at the border, and its recording says what held it back.
+The four points are desired beyond the border of the image. The pseudo-inverse goes there and loses
+them; the quadratic program stops at the border, and its recording says which limit held it back.
 Needs the arm's model: pip install 'vergence[arms]'
 """
 
@@ -10,24 +10,23 @@ from pathlib import Path
 import numpy as np
 
 from vergence.cell import load_cell
-from vergence.control import ConstrainedLaw, ConstrainedSolver, ImageBased, Law, PlainLaw
+from vergence.control import ImageBased, Law, Limits, PseudoInverse, Servo
 from vergence.estimation import ExactPoints
 from vergence.planning import FixedReference
-from vergence.robot import manipulability_measure
 from vergence.runtime import Loop, Recorder, Recording
 from vergence.runtime.recording import RunInfo
 from vergence.signals import Reference
 from vergence.simulation import SimulatedDriver
 
 MARGIN_PX = 20.0
-BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are wanted
+BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are desired
 
 
-def servo(driver: SimulatedDriver, law: Law, wanted_px: np.ndarray, folder: Path) -> Recording:
+def servo(driver: SimulatedDriver, law: Law, desired_px: np.ndarray, folder: Path) -> Recording:
     """Run a law for five seconds and return what was recorded."""
     recorder = Recorder(folder)
     recorder.begin(RunInfo.of(driver, "ur5", driver.cell.text, driver.cell.seed, "wrist"))
-    goal = FixedReference(Reference(0.0, wanted_px))
+    goal = FixedReference(Reference(0.0, desired_px))
     loop = Loop(
         driver, "ur5", ExactPoints("wrist"), goal, law, outer_rate_hz=30, listeners=[recorder]
     )
@@ -42,21 +41,19 @@ def main() -> None:
             load_cell("ur5", {"target.motion": '{ kind = "still" }'}), images=False
         )
         arm, camera = driver.world.arm_to_camera("wrist"), driver.cameras["wrist"]
-        start = driver.read().joints["ur5"].position
         truth = driver.first_frame("wrist").truth
         assert truth is not None
-        objective = ImageBased(camera, gain=2.0)
-        law: Law = PlainLaw(arm, camera, objective, truth.depth_m)
-        if name == "constrained":
-            solver = ConstrainedSolver(
-                arm,
-                camera,
-                order=("view", "singularity", "joint margin"),  # what bends last stands first
+        objective = ImageBased(gain=2.0)
+        if name == "plain":
+            law = Servo(arm, camera, objective, solver=PseudoInverse(), depth_m=truth.depth_m)
+        else:
+            limits = Limits(
+                order=("view", "singularity", "joint margin"),  # highest priority first
                 view_margin_px=MARGIN_PX,
-                manipulability_min=0.5 * manipulability_measure(arm.jacobian(start)),
-                depth_range=(0.7, 1.4),  # the depth may be wrong by so much
+                manipulability_share=0.5,
+                depth_range=(0.7, 1.4),  # true over believed depth
             )
-            law = ConstrainedLaw(solver, objective, truth.depth_m)
+            law = Servo(arm, camera, objective, limits=limits, depth_m=truth.depth_m)
         run = servo(driver, law, truth.points_px + BEYOND_PX, Path("runs") / f"ur5-{name}")
         seen = run.cameras["wrist"].points_px
         lost = np.count_nonzero(np.isnan(seen[:, :, 0]).any(axis=0))

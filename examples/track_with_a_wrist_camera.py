@@ -1,9 +1,9 @@
-"""Follow a moving board with the camera in a Puma's hand, every part put together by hand."""
+"""Follow a moving board with a camera on a Puma, every part put together by hand."""
 
 import numpy as np
 
 from vergence.cell import load_cell
-from vergence.control import OptimalTrackingLaw
+from vergence.control import OptimalTracking, PseudoInverse, Servo
 from vergence.estimation import TrackedPoints
 from vergence.planning import FixedReference
 from vergence.runtime import Loop
@@ -18,14 +18,12 @@ def main() -> None:
     image = driver.first_frame("wrist").image
     assert image is not None
     points = pick_features(image, 4).points_px
-    law = OptimalTrackingLaw(
+    law = Servo(
         driver.world.arm_to_camera("wrist"),
         driver.cameras["wrist"],
-        depth_m=[1.0] * len(points),
-        axes=("x", "y", "rx", "ry"),
-        avoidance_axes=("x", "y"),
-        Q=2e-6 / len(points),
-        S=0.001,
+        OptimalTracking(axes=("x", "y", "rx", "ry"), avoidance_axes=("x", "y"), S=0.001),
+        solver=PseudoInverse(),
+        depth_m=1.0,
     )
     tracker = SsdTracker(image, points)
     seen = TrackedPoints("wrist", tracker)

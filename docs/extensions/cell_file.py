@@ -10,11 +10,14 @@ from typing import Any
 
 from docutils import nodes
 from field_comments import field_comments
+from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 from vergence.cell import Cell, schema
+from vergence.parts import is_part, kind_of
+from vergence.registry import find, kinds
 
 UNITS = {
     "deg_s2": "°/s²",
@@ -55,6 +58,69 @@ def reference() -> Iterator[str]:
             continue
         described.add(name)
         yield from _table(name, table)
+    yield from _parts()
+
+
+def _parts() -> Iterator[str]:
+    """Yield the sections of the law: the servo, its solvers, limits and objectives."""
+    yield from ("(the-law)=", "## The law", "")
+    settings = find("law", "servo")
+    yield from (_text(settings), "")
+    yield from _part(settings)
+    for role, place in (("limits", "law.limits"), ("solver", "law.solver"), ("objective", "law")):
+        for kind in kinds(role):
+            cls = find(role, kind)
+            title = f"`[{place}]`"
+            title += f' with `kind = "{kind}"`' if len(kinds(role)) > 1 else ""
+            yield from (f"## {title}", "", _text(cls), "")
+            yield from _part(cls)
+
+
+def _text(cls: type) -> str:
+    return " ".join((cls.__doc__ or "").split("\n\n")[0].split())
+
+
+def _part(cls: Any) -> Iterator[str]:
+    """Yield the table of a part's fields."""
+    comments = field_comments(cls)
+    yield from ("| key | type | unit | default | meaning |", "|---|---|---|---|---|")
+    for name, about in cls.__pydantic_fields__.items():
+        if not comments[name]:
+            raise ExtensionError(f"{cls.__name__}.{name} has no comment that says what it means")
+        unit = (about.json_schema_extra or {}).get("unit", "") or _unit(name)
+        cells = (f"`{name}`", _kind_of_value(about), unit, _part_default(about), comments[name])
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    yield ""
+
+
+def _kind_of_value(about: Any) -> str:
+    """Say what a field of a part takes, with its range."""
+    extra = about.json_schema_extra or {}
+    if "slot" in extra:
+        return "list of tables" if extra["slot"].many else "table or name"
+    schema = TypeAdapter(about.annotation).json_schema()
+    for bound in about.metadata:
+        for mark, key in (("gt", "exclusiveMinimum"), ("ge", "minimum"),
+                          ("lt", "exclusiveMaximum"), ("le", "maximum")):  # fmt: skip
+            if (value := getattr(bound, mark, None)) is not None:
+                inner = next(
+                    (o for o in schema.get("anyOf", []) if o.get("type") == "number"), schema
+                )
+                inner[key] = value
+    return _type(schema)
+
+
+def _part_default(about: Any) -> str:
+    if about.is_required():
+        return "required"
+    default = about.get_default(call_default_factory=True)
+    if default is None or default == ():
+        return ""
+    return f"`{_toml(kind_of(default) if is_part(default) else _listed(default))}`"
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _tables(root: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -65,8 +131,8 @@ def _tables(root: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
         yield place, name, table
         inner = []
         for key, value in table["properties"].items():
-            if place == "" and key == "laws":
-                continue  # each is what [law] is
+            if place == "" and key in ("law", "laws"):
+                continue  # a part: it has sections of its own
             for ref in _references(value):
                 below = ".NAME" if "additionalProperties" in value else ""
                 at = f"{place}.{key}{below}" if place else f"{key}{below}"
@@ -125,6 +191,8 @@ def _toml(value: Any) -> str:
 
 
 def _type(value: dict[str, Any]) -> str:
+    if not value.keys() & {"anyOf", "oneOf", "$ref", "const", "enum", "type"}:
+        return "table"
     options = value.get("anyOf") or value.get("oneOf")
     if options:
         named = list(dict.fromkeys(_type(o) for o in options if o.get("type") != "null"))

@@ -10,7 +10,7 @@ from pathlib import Path
 from driver import SocketDriver
 
 from vergence.cell import load_cell
-from vergence.control import OptimalTrackingLaw
+from vergence.control import OptimalTracking, PseudoInverse, Servo
 from vergence.errors import VergenceError
 from vergence.estimation import TrackedPoints
 from vergence.planning import FixedReference
@@ -29,12 +29,12 @@ def servo(driver: Driver, model: SimulatedDriver, duration_s: float, folder: Pat
         sample = driver.read()
     image = sample.frames[0].image
     points = pick_features(image, 4).points_px
-    law = OptimalTrackingLaw(
+    law = Servo(
         model.world.arm_to_camera("wrist"),
         driver.cameras["wrist"],
-        depth_m=[1.0] * len(points),
-        axes=("x", "y", "rx", "ry"),
-        Q=2e-6 / len(points),
+        OptimalTracking(axes=("x", "y", "rx", "ry")),
+        solver=PseudoInverse(),
+        depth_m=1.0,
     )
     seen = TrackedPoints("wrist", SsdTracker(image, points))
     goal = FixedReference(Reference(0.0, points))

@@ -79,7 +79,7 @@ def _tick(
         0.4 + 0.1 * np.cos(time),
         0.8 + 0.1 * np.sin(time),
         ("joint rates",) if abs(rates[2]) > 0.4 else (),
-        given_up={"view": 0.3 * time / duration} if 2.0 < time < 2.5 else {},
+        slack={"view": 0.3 * time / duration} if 2.0 < time < 2.5 else {},
     )
     return TickRecord(
         time,

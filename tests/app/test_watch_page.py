@@ -154,7 +154,7 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
         )
 
     log = "document.getElementById('log').innerText"
-    choose("constrained")
+    choose("image_based")
     assert "1/s" in browser.wait("document.querySelector('.knob[data-key=gain]')?.innerText ?? ''")
     turn("3.5")
     browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.5" in t)

@@ -15,7 +15,7 @@ from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.commands import Command, Pause, parse
 from vergence.app.watch.drag import Drag
 from vergence.app.watch.inbox import Inbox
-from vergence.app.watch.knobs import KNOBS, LAWS, knobs, law_choices
+from vergence.app.watch.knobs import knobs, law_choices
 from vergence.app.watch.moved_target import MovedTarget
 from vergence.app.watch.pace import Pace
 from vergence.app.watch.protocol import Request
@@ -24,7 +24,6 @@ from vergence.app.watch.server import Server, listen
 from vergence.app.watch.view_state import Reader, ViewState
 from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.cell import built_in_cells, load_cell
-from vergence.cell.schema import Table
 from vergence.errors import InputError
 from vergence.geometry import se3, so3_exp
 
@@ -110,18 +109,16 @@ class TestPace:
 
 
 class TestKnobs:
-    def test_no_label_is_left_of_a_number_that_is_gone(self) -> None:
-        tables = [table for kinds in LAWS.values() for table in kinds]
-        assert set(KNOBS) <= {key for table in tables for key in table.model_fields}
+    def test_a_knob_has_unit_and_range(self) -> None:
+        shown = {knob["key"]: knob for knob in knobs(load_cell("eye_to_hand").law)}
+        assert shown["gain"]["unit"] == "1/s"
+        assert (shown["gain"]["low"], shown["gain"]["high"]) == (0.0, 100.0)
+        assert shown["interaction"]["choices"] == ["current", "desired", "mean"]
 
-    def test_a_number_without_a_label_is_called_by_its_name(self) -> None:
-        class NewTable(Table):
-            kind: str = "new"
-            reach_share: float = 0.5
-            smallest_gap_m: float = 0.2
-
-        shown = [(knob["label"], knob["unit"], knob["value"]) for knob in knobs(NewTable())]
-        assert shown == [("reach share", "", 0.5), ("smallest gap", "m", 0.2)]
+    def test_only_what_acts_is_a_knob(self) -> None:
+        keys = {knob["key"] for knob in knobs(load_cell("puma560").law)}
+        assert {"Q", "S", "penalty_k", "solver.singular_below"} <= keys
+        assert not keys & {"gain", "limits.joint_margin", "solver.S", "flow_smoothing_s"}
 
     @pytest.mark.parametrize("name", [n for n in built_in_cells() if n not in ("ur5", "panda")])
     def test_every_choice_is_a_law_that_the_cell_file_takes(self, name: str) -> None:

@@ -200,7 +200,7 @@ def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:
         ("cameras.wrist.distortion", "[1, 2, 3, 4, 5, 6]", "cameras.wrist.distortion", "at most 5"),
         ("cameras.wrist.blind_s", "[[2, 1]]", "cameras.wrist.blind_s", "from before to"),
         ("cameras.wrist.rate_hz", "501", "cameras.wrist.rate_hz", "up to inner_rate_hz, 500"),
-        ("law.kind", "path_tracking", "law.kind", "constrained, optimal_tracking, plain"),
+        ("law.kind", "path_tracking", "law.kind", "image_based, optimal_tracking, point_pose"),
     ],
 )
 def test_a_value_that_cannot_be_used(

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from vergence.camera import Camera
-from vergence.control import OptimalTrackingLaw
+from vergence.control import MotionSettings, OptimalTracking, PseudoInverse, Servo, Situation
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm
 from vergence.signals import ImagePoints, JointState, Observation, Reference
@@ -15,6 +15,7 @@ CAMERA = Camera(640, 480, 1454.5, 1230.8, 319.5, 239.5)
 START = np.deg2rad([-125.6, 42.7, -172.7, 0.0, -50.0, 0.0])
 SQUARE = 0.1 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 PERIOD = 1 / 30
+AS_IT_IS = Situation(PERIOD, MotionSettings(feed_forward=False, prediction=False))
 
 
 def puma() -> Arm:
@@ -23,6 +24,18 @@ def puma() -> Arm:
     # MuJoCo's cameras look along -z: turned about x, ours looks along the flange's z.
     spec.body("flange").add_camera(name="wrist", pos=[0, 0, 0.12], quat=[0, 1, 0, 0])
     return Arm.from_mujoco(spec.compile(), "wrist")
+
+
+def tracking_law(arm: Arm, depth: np.ndarray, **numbers) -> Servo:
+    """The law of [Nelson1995]; its Q is for one feature."""
+    return Servo(
+        arm,
+        CAMERA,
+        OptimalTracking(**numbers),
+        solver=PseudoInverse(),
+        depth_m=depth,
+        situation=AS_IT_IS,
+    )
 
 
 def in_view(arm: Arm, q: np.ndarray, points: np.ndarray, depth: float = 1.0) -> np.ndarray:
@@ -46,7 +59,8 @@ def observed(points_px: np.ndarray, found: np.ndarray | None = None) -> Observat
 
 
 def servo(
-    law: OptimalTrackingLaw,
+    arm: Arm,
+    law: Servo,
     q: np.ndarray,
     points_world: np.ndarray,
     desired_px: np.ndarray,
@@ -54,7 +68,7 @@ def servo(
     velocity_m_s: np.ndarray | None = None,
 ):
     """Let the law run; return every q (ticks + 1, n) and every picture (ticks + 1, M, 2)."""
-    arm, points_world = law.arm, points_world.copy()
+    points_world = points_world.copy()
     path, pictures = [q], []
     for _ in range(ticks):
         points_px, _ = seen(arm, path[-1], points_world)

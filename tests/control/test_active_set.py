@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from vergence.control.active_set import solve_ordered_qp
+from vergence.control.solvers._active_set import solve_ordered_qp
 
 
 def random_problem(rng, n, m, slack):
@@ -75,15 +75,15 @@ def test_contradiction_bends_the_last_in_order_only():
             possible = linprog(np.zeros(4), A_ub=-C[:rows], b_ub=-d[:rows], bounds=(None, None))
             if possible.status == 0:
                 assert held[:rows].min() > -1e-6
-                assert found.given_up[:rows].max() == 0.0
-        np.testing.assert_allclose(found.given_up, np.maximum(-held, 0), atol=2e-7)
+                assert found.slack[:rows].max() == 0.0
+        np.testing.assert_allclose(found.slack, np.maximum(-held, 0), atol=2e-7)
 
 
 def test_single_bending_row_gives_up_no_more_than_it_must():
     C = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     found = solve(np.eye(2), np.zeros(2), C, np.array([-0.5, 2.0, 0.25]), [0, 1, 1])
     np.testing.assert_allclose(found.x, [0.5, 0.25], atol=1e-6)
-    np.testing.assert_allclose(found.given_up, [0.0, 1.5, 0.0], atol=1e-6)
+    np.testing.assert_allclose(found.slack, [0.0, 1.5, 0.0], atol=1e-6)
 
 
 def test_rows_without_a_limit_are_no_rows():

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from vergence.cell import load_cell
-from vergence.control.constrained import ConstrainedLaw
-from vergence.control.constrained_solver import ConstrainedSolver
-from vergence.control.constraints import (
+from vergence.control import CameraMounting, ImageBased, Limits, Servo
+from vergence.control.limits._rows import (
     ACCELERATION,
     JOINT_MARGIN,
+    RELAXED,
     SINGULARITY,
-    SOFT,
     VIEW,
     constraint_rows,
     pack_features,
 )
-from vergence.control.image_based import ImageBased
+from vergence.control.solvers import Setting
+from vergence.control.solvers.quadratic_program import constraint_settings
 from vergence.errors import InputError
 from vergence.robot import yoshikawa_measure
 from vergence.signals import ImagePoints, JointState, Observation, Reference
@@ -33,10 +33,10 @@ def scene():
     return driver.world.arm_to_camera("wrist"), driver.cameras["wrist"], truth, q
 
 
-def law_for(scene, **settings):
+def law_for(scene, **limits):
     arm, camera, truth, _ = scene
-    solver = ConstrainedSolver(arm, camera, **settings)
-    return ConstrainedLaw(solver, ImageBased(camera, gain=2.0), truth.depth_m)
+    limits = Limits(**{"manipulability_share": 0.0, **limits})
+    return Servo(arm, camera, ImageBased(gain=2.0), limits=limits, depth_m=truth.depth_m)
 
 
 def observe(camera, points_px, time=0.0):
@@ -86,8 +86,8 @@ def test_features_stay_in_view_although_the_goal_is_outside(scene, depth_error):
     law_depth = truth.depth_m * depth_error
     wanted = truth.points_px + (400.0, 0.0)
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
-    solver = ConstrainedSolver(arm, camera, depth_range=(0.3, 3.4), view_margin_px=10.0)
-    law = ConstrainedLaw(solver, ImageBased(camera, 2.0), law_depth)
+    limits = Limits(depth_range=(0.3, 3.4), view_margin_px=10.0)
+    law = Servo(arm, camera, ImageBased(gain=2.0), limits=limits, depth_m=law_depth)
     rates = np.zeros(6)
     for k in range(150):
         time = k * PERIOD
@@ -121,7 +121,7 @@ def test_distance_from_a_singularity_is_kept(scene):
     lowest = 0.9 * yoshikawa_measure(arm.jacobian(q))
     wanted = project(arm, camera, stretched, corners)
     assert yoshikawa_measure(arm.jacobian(stretched)) < lowest
-    joints, _, active = closed_loop(scene, wanted, manipulability_min=lowest)
+    joints, _, active = closed_loop(scene, wanted, manipulability_share=0.9)
     measures = [yoshikawa_measure(arm.jacobian(row)) for row in joints]
     assert min(measures) > 0.99 * lowest
     assert any("singularity" in names for names in active)
@@ -139,20 +139,20 @@ def test_a_start_outside_a_soft_limit_is_brought_back_smoothly(scene):
     assert (np.diff(joints[:, 4])[still_outside] > 0).all()
 
 
-def test_a_conflict_names_what_was_given_up(scene):
+def test_a_conflict_names_what_was_slack(scene):
     _, camera, truth, q = scene
     law = law_for(scene, view_margin_px=235.0, order=("singularity", "view"))
     command = law.command(
         observe(camera, truth.points_px), Reference(0.0, truth.points_px), JointState(0, q, 0 * q)
     )
-    assert command.given_up["view"] > 0.0
+    assert command.slack["view"] > 0.0
     assert np.isfinite(command.velocity).all()
 
 
 def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
     arm, camera, truth, q = scene
-    law = law_for(scene, manipulability_min=1e-3)
-    settings = law.solver.settings
+    setting = Setting(arm, CameraMounting(camera), None, PERIOD)
+    settings = constraint_settings(setting, Limits())._replace(manipulability_min=1e-3)
     points = camera.normalize(truth.points_px)
     features = pack_features(points, 0 * points, truth.depth_m)
     J = arm.jacobian(q)
@@ -183,4 +183,4 @@ def test_barrier_rows_are_the_derivatives_of_what_they_keep(scene):
 def test_unknown_constraints_are_refused_with_the_nearest_name(scene):
     with pytest.raises(InputError, match="did you mean view"):
         law_for(scene, order=("vieww",))
-    assert SOFT[0] == "view"
+    assert RELAXED[0] == "view"

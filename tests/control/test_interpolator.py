@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vergence.control import MovingPose, interpolate, moved, pose_difference
+from vergence.control import MovingPose, moved, pose_difference
+from vergence.control.objectives._interpolator import interpolate
 from vergence.geometry import se3, so3_exp
 
 DT = 1 / 500

@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from servo_scene import CAMERA, PERIOD, SQUARE, START, in_view, observed, puma, seen
+from servo_scene import (
+    CAMERA,
+    PERIOD,
+    SQUARE,
+    START,
+    in_view,
+    observed,
+    puma,
+    seen,
+    tracking_law,
+)
 
-from vergence.control import (
-    OptimalTrackingLaw,
+from vergence.control import OptimalTracking
+from vergence.control.objectives._tracking import (
     TrackingGains,
     image_model,
     image_square,
@@ -18,7 +28,7 @@ from vergence.control import (
 )
 from vergence.errors import InputError, ShapeError
 from vergence.features import interaction_matrix_points
-from vergence.robot import Arm, manipulability
+from vergence.robot import manipulability
 from vergence.signals import JointState, OutcomeKind, Reference
 
 ARM = puma()
@@ -131,9 +141,8 @@ def test_no_features_ask_for_no_motion() -> None:
 @pytest.mark.parametrize("S", [0.0, 1e-3])
 def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     k = 50.0 if per_joint else 1e5
-    law = OptimalTrackingLaw(
+    law = tracking_law(
         ARM,
-        CAMERA,
         np.ones(4),
         axes=FOUR,
         avoidance_axes=("x", "y"),
@@ -143,11 +152,11 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     )
     features = drawn_features(np.random.default_rng(32), 4)
     result = np.empty(16)
-    optimal_tracking_tick(*pack_setup(law.setup), START, features, result)
+    optimal_tracking_tick(*pack_setup(law.tracking), START, features, result)
     tick = unpack_tick(result)
-    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, k, per_joint, law.singular_below)
+    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, k, per_joint, law.tracking.damping)
     error, B = image_model(features, CAMERA.focal_px)
-    u = tracking_displacement(B.T @ B, B.T @ error, law.setup.gains, m.value, m.gradient_camera)
+    u = tracking_displacement(B.T @ B, B.T @ error, law.tracking.gains, m.value, m.gradient_camera)
     np.testing.assert_allclose(tick.v_camera, u / PERIOD, rtol=1e-9, atol=1e-12)
     wanted = m.J_inverse @ tick.v_camera
     np.testing.assert_allclose(tick.rates, tick.scale * wanted, rtol=1e-9, atol=1e-12)
@@ -157,8 +166,8 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
 
 
 def test_the_law_alone_is_the_tick_without_avoidance() -> None:
-    law = OptimalTrackingLaw(ARM, CAMERA, np.ones(4))
-    weights, joints = pack_setup(law.setup)
+    law = tracking_law(ARM, np.ones(4))
+    weights, joints = pack_setup(law.tracking)
     features = drawn_features(np.random.default_rng(31), 4)
     result, v_camera = np.empty(16), np.empty(6)
     optimal_tracking_tick(weights, joints, START, features, result)
@@ -171,11 +180,12 @@ def test_a_feature_that_was_not_found_has_no_say() -> None:
     desired, depth = seen(ARM, START, world)
     points = desired + (12.0, -7.0)
     found = np.array([True, False, True, True])
-    law = OptimalTrackingLaw(ARM, CAMERA, depth, R=1e-2)
+    law = tracking_law(ARM, depth, R=1e-2)
     spoilt = points.copy()
     spoilt[1] = np.nan
     masked = law.command(observed(spoilt, found), Reference(0.0, desired), joints_at(START))
-    three = OptimalTrackingLaw(ARM, CAMERA, depth[found], R=1e-2).command(
+    # Q is shared by all features, found or not.
+    three = tracking_law(ARM, depth[found], Q=1.5e-6, R=1e-2).command(
         observed(points[found]), Reference(0.0, desired[found]), joints_at(START)
     )
     assert np.isfinite(masked.velocity).all()
@@ -186,8 +196,8 @@ def test_depth_comes_from_the_reference_where_it_knows_it() -> None:
     world = in_view(ARM, START, SQUARE, 1.3)
     desired, depth = seen(ARM, START, world)
     points = desired + (12.0, -7.0)
-    guessing = OptimalTrackingLaw(ARM, CAMERA, np.full(4, 0.2))
-    knowing = OptimalTrackingLaw(ARM, CAMERA, depth)
+    guessing = tracking_law(ARM, np.full(4, 0.2))
+    knowing = tracking_law(ARM, depth)
     told = guessing.command(
         observed(points), Reference(0.0, desired, depth_m=depth), joints_at(START)
     )
@@ -199,7 +209,7 @@ def test_near_a_singularity_the_law_gives_up_with_a_reason() -> None:
     q = START.copy()
     q[4] = np.deg2rad(0.05)
     desired, depth = seen(ARM, q, in_view(ARM, q, SQUARE))
-    law = OptimalTrackingLaw(ARM, CAMERA, depth)
+    law = tracking_law(ARM, depth)
     command = law.command(observed(desired + 5.0), Reference(0.0, desired), joints_at(q))
     assert command.fault is not None
     kind, reason = command.fault
@@ -210,7 +220,7 @@ def test_near_a_singularity_the_law_gives_up_with_a_reason() -> None:
 
 def test_rates_never_pass_their_limits_and_the_command_says_when_they_were_cut() -> None:
     desired, depth = seen(ARM, START, in_view(ARM, START, SQUARE))
-    law = OptimalTrackingLaw(ARM, CAMERA, depth, Q=1.0, R=1e-6)
+    law = tracking_law(ARM, depth, Q=1.0, R=1e-6)
     command = law.command(observed(desired + 200.0), Reference(0.0, desired), joints_at(START))
     assert (abs(command.velocity) <= ARM.rate_max * (1 + 1e-12)).all()
     assert command.active == ("joint rates",)
@@ -226,17 +236,25 @@ def test_rates_never_pass_their_limits_and_the_command_says_when_they_were_cut()
         ({"Q": 0.0}, "Q"),
         ({"R": [1.0, 1.0, 0.0, 1.0, 1.0, 1.0]}, "R"),
         ({"S": -1.0}, "S"),
-        ({"depth_m": [1.0, 0.0]}, "depth_m"),
+        ({"axes": ()}, "axes"),
+        ({"Q": np.inf}, "Q"),
+        ({"R": [1.0, 1.0]}, "R"),
+        ({"penalty": "per joint"}, "penalty"),
+        ({"avoidance_speed_max_m_s": np.nan}, "avoidance_speed_max_m_s"),
     ],
 )
 def test_gains_that_make_no_sense_are_refused(changes, key: str) -> None:
-    arm: Arm = ARM
-    depth = changes.pop("depth_m", [1.0])
     with pytest.raises(InputError) as caught:
-        OptimalTrackingLaw(arm, CAMERA, depth, **changes)
-    assert caught.value.key == key
+        OptimalTracking(**changes)
+    assert caught.value.key.split(".")[0] == key
+
+
+@pytest.mark.parametrize("depth", [[1.0, 0.0], np.nan, -1.0])
+def test_depths_are_above_zero(depth) -> None:
+    with pytest.raises(InputError, match="depth_m"):
+        tracking_law(ARM, depth)
 
 
 def test_depths_are_one_row() -> None:
     with pytest.raises(ShapeError, match="depth_m"):
-        OptimalTrackingLaw(ARM, CAMERA, np.ones((2, 2)))
+        tracking_law(ARM, np.ones((2, 2)))

@@ -1,13 +1,10 @@
-"""The plain law: an objective and nothing else."""
+"""The pseudo-inverse: an objective and nothing else."""
 
 import numpy as np
 import pytest
 
 from vergence.cell import load_cell
-from vergence.control.constrained import ConstrainedLaw
-from vergence.control.constrained_solver import ConstrainedSolver
-from vergence.control.image_based import ImageBased
-from vergence.control.plain import PlainLaw
+from vergence.control import ImageBased, MotionSettings, PseudoInverse, Servo, Situation
 from vergence.errors import InputError
 from vergence.robot.positive_definite import invert_spd_any
 from vergence.signals import ImagePoints, JointState, Observation, OutcomeKind, Reference
@@ -25,6 +22,17 @@ def scene():
     return driver.world.arm_to_camera("wrist"), driver.cameras["wrist"], truth, q
 
 
+def plain(arm, camera, objective, depth_m):
+    situation = Situation(motion=MotionSettings(feed_forward=False))
+    return Servo(
+        arm, camera, objective, solver=PseudoInverse(), depth_m=depth_m, situation=situation
+    )
+
+
+def constrained(arm, camera, objective, depth_m):
+    return Servo(arm, camera, objective, depth_m=depth_m)
+
+
 def observe(points_px, found=None, time=0.0):
     m = len(points_px)
     found = np.ones(m, bool) if found is None else found
@@ -39,7 +47,7 @@ def still(q, time=0.0):
 def test_error_decays_at_the_gain(scene):
     arm, camera, truth, q = scene
     world = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
-    law = PlainLaw(arm, camera, ImageBased(camera, gain=2.0), truth.depth_m)
+    law = plain(arm, camera, ImageBased(gain=2.0), truth.depth_m)
     desired = truth.points_px + [15.0, -10.0]
     errors = []
     for k in range(60):
@@ -55,7 +63,7 @@ def test_error_decays_at_the_gain(scene):
 
 def test_the_camera_keeps_its_course_where_rates_are_at_their_limit(scene):
     arm, camera, truth, q = scene
-    command = PlainLaw(arm, camera, ImageBased(camera, gain=100.0), truth.depth_m).command(
+    command = plain(arm, camera, ImageBased(gain=100.0), truth.depth_m).command(
         observe(truth.points_px), Reference(0.0, truth.points_px + 60.0), still(q)
     )
     assert command.active == ("joint rates",)
@@ -67,18 +75,14 @@ def test_a_singular_arm_ends_the_task(scene):
     arm, camera, truth, q = scene
     straight = q.copy()
     straight[4] = 0.0
-    command = PlainLaw(arm, camera, ImageBased(camera), truth.depth_m).command(
+    command = plain(arm, camera, ImageBased(), truth.depth_m).command(
         observe(truth.points_px), Reference(0.0, truth.points_px), still(straight)
     )
     assert command.fault is not None
     assert command.fault[0] is OutcomeKind.SINGULARITY
 
 
-def constrained(arm, camera, objective, depth_m):
-    return ConstrainedLaw(ConstrainedSolver(arm, camera), objective, depth_m)
-
-
-@pytest.mark.parametrize("kind", [PlainLaw, constrained])
+@pytest.mark.parametrize("kind", [plain, constrained])
 def test_features_that_were_not_found_count_for_nothing(scene, kind):
     arm, camera, truth, q = scene
     points = truth.points_px.copy()
@@ -86,8 +90,8 @@ def test_features_that_were_not_found_count_for_nothing(scene, kind):
     found = np.array([True, True, False, True])
     desired = truth.points_px + 10.0
     few = np.flatnonzero(found)
-    without = kind(arm, camera, ImageBased(camera), truth.depth_m[few])
-    partly = kind(arm, camera, ImageBased(camera), truth.depth_m)
+    without = kind(arm, camera, ImageBased(), truth.depth_m[few])
+    partly = kind(arm, camera, ImageBased(), truth.depth_m)
     np.testing.assert_allclose(
         partly.command(observe(points, found), Reference(0.0, desired), still(q)).velocity,
         without.command(observe(points[few]), Reference(0.0, desired[few]), still(q)).velocity,
@@ -98,7 +102,7 @@ def test_features_that_were_not_found_count_for_nothing(scene, kind):
 def test_depths_below_zero_are_refused(scene):
     arm, camera, _, _ = scene
     with pytest.raises(InputError, match="depth_m"):
-        PlainLaw(arm, camera, ImageBased(camera), np.array([1.0, -1.0]))
+        plain(arm, camera, ImageBased(), np.array([1.0, -1.0]))
 
 
 @pytest.mark.parametrize("n", [2, 6, 7, 11])

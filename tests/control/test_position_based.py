@@ -3,8 +3,20 @@
 import numpy as np
 import pytest
 
+from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.control import Guard, InnerLaw, MovingPose, PositionBasedLaw, moved
+from vergence.control import (
+    CameraMounting,
+    DampedPseudoInverse,
+    Guard,
+    InnerLaw,
+    MotionSettings,
+    MovingPose,
+    PoseServo,
+    PositionBased,
+    Situation,
+    moved,
+)
 from vergence.geometry import se3, se3_compose, se3_inverse, se3_log, so3_exp
 from vergence.robot import Arm
 from vergence.signals import JointState, Observation, Reference, Setpoint, TargetState
@@ -23,12 +35,26 @@ def arms() -> dict[str, tuple[Arm, np.ndarray]]:
     return {"six": six, "seven": (driver.arms["slave"], driver.world.joint_position("slave"))}
 
 
+def law_of(
+    arm: Arm, T_world_camera=None, feed_forward: bool = True, prediction: bool = True, **numbers
+) -> PoseServo:
+    mounting = CameraMounting(Camera(640, 480, 600, 600, 319.5, 239.5), T_world_camera)
+    motion = MotionSettings(feed_forward, prediction)
+    return PoseServo(
+        arm,
+        mounting,
+        PositionBased(**numbers),
+        solver=DampedPseudoInverse(),
+        situation=Situation(1 / RATE, motion),
+    )
+
+
 def target_state(target: MovingPose, time: float) -> TargetState:
     return TargetState(time, target.T, target.twist, np.eye(12), True)
 
 
 def follow(
-    arm: Arm, start: np.ndarray, twist: np.ndarray, law: PositionBasedLaw, seconds: float
+    arm: Arm, start: np.ndarray, twist: np.ndarray, law: PoseServo, seconds: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return hand errors (K, 6) in the hand and joint positions (K, n), a row an outer tick.
 
@@ -61,7 +87,7 @@ def test_a_target_at_constant_velocity_is_followed_without_error(
 ) -> None:
     arm, start = arms[which]
     twist = np.array([-0.03, 0.05, 0.02, 0.0, 0.05, 0.1])
-    errors, _ = follow(arm, start, twist, PositionBasedLaw(arm, 1 / RATE), 2.0)
+    errors, _ = follow(arm, start, twist, law_of(arm), 2.0)
     assert np.abs(errors[-10:]).max() < 2e-4
 
 
@@ -70,7 +96,7 @@ def test_without_feed_forward_and_prediction_the_hand_lags_by_filter_and_latency
 ) -> None:
     arm, start = arms["seven"]
     twist = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
-    law = PositionBasedLaw(arm, 1 / RATE, filter_hz=5.0, feed_forward=False, prediction=False)
+    law = law_of(arm, filter_hz=5.0, feed_forward=False, prediction=False)
     errors, _ = follow(arm, start, twist, law, 2.0)
     least = 0.05 * (2 / (2 * np.pi * 5.0) + LATENCY_S)
     lag = np.linalg.norm(errors[-1, :3])
@@ -82,7 +108,7 @@ def test_a_target_that_stands_is_reached_either_way(
     feed_forward: bool, arms: dict[str, tuple[Arm, np.ndarray]]
 ) -> None:
     arm, start = arms["seven"]
-    law = PositionBasedLaw(arm, 1 / RATE, feed_forward=feed_forward, prediction=feed_forward)
+    law = law_of(arm, feed_forward=feed_forward, prediction=feed_forward)
     errors, _ = follow(arm, start, np.zeros(6), law, 1.0)
     assert np.abs(errors).max() < 1e-9
 
@@ -93,7 +119,7 @@ def test_a_spare_joint_leaves_its_limit_while_the_hand_stays(
     arm, start = arms["seven"]
     start = start.copy()
     start[0] = 0.95 * arm.q_max[0]
-    law = PositionBasedLaw(arm, 1 / RATE, null_space=0.5)
+    law = law_of(arm, null_space_rate=0.5)
     errors, positions = follow(arm, start, np.zeros(6), law, 3.0)
     assert abs(positions[-1, 0]) < abs(start[0]) - 0.1
     assert np.abs(errors).max() < 1e-3
@@ -103,7 +129,7 @@ def test_limits_hold_when_the_target_flees_out_of_reach(
     arms: dict[str, tuple[Arm, np.ndarray]],
 ) -> None:
     arm, start = arms["six"]
-    law = PositionBasedLaw(arm, 1 / RATE)
+    law = law_of(arm)
     _, positions = follow(arm, start, np.array([1.0, 0.5, 0.3, 0.5, 0.0, 0.0]), law, 4.0)
     assert np.isfinite(positions).all()
     assert (positions >= arm.q_min).all()
@@ -114,7 +140,7 @@ def test_without_a_target_the_arm_is_asked_to_stand(
     arms: dict[str, tuple[Arm, np.ndarray]],
 ) -> None:
     arm, start = arms["six"]
-    law = PositionBasedLaw(arm, 1 / RATE)
+    law = law_of(arm)
     joints = JointState(0.0, start, np.zeros(6))
     T_target = se3_compose(arm.forward_kinematics(start), WANTED)
     seen = Observation(0.0, (), target_state(MovingPose(T_target, np.ones(6)), 0.0))
@@ -126,7 +152,7 @@ def test_without_a_target_the_arm_is_asked_to_stand(
 
 
 def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> None:
-    assert isinstance(PositionBasedLaw(arms["six"][0], 1 / RATE), InnerLaw)
+    assert isinstance(law_of(arms["six"][0]), InnerLaw)
 
 
 def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seconds: float):
@@ -139,7 +165,7 @@ def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seco
     offset = MovingPose(se3(so3_exp(np.array([0.1, 0.2, -0.1])), np.array([0.0, 0.02, 0.1])), slip)
     T_start = se3_compose(arm.forward_kinematics(start), offset.T)
     T_wanted = T_start @ se3(so3_exp(np.array([0.3, -0.2, 0.2])), np.array([0.1, -0.1, 0.05]))
-    law = PositionBasedLaw(arm, 1 / RATE, T_world_camera=T_world_camera, **law_settings)
+    law = law_of(arm, T_world_camera, **law_settings)
     reference = Reference(0.0, T_camera_target=se3_compose(se3_inverse(T_world_camera), T_wanted))
     guard, tick, places, exposed = Guard(arm, start, 1 / RATE), 0, [], [start]
     for k in range(int(seconds * OUTER)):

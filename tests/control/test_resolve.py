@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vergence.control import resolve_twist
+from vergence.control._rates import resolve_twist
 
 
 def test_without_limits_the_arm_moves_its_camera_as_wanted() -> None:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vergence.cell import load_cell
-from vergence.control.constraints import pack_features
-from vergence.control.sight_lines import (
+from vergence.control.limits._rows import pack_features
+from vergence.control.limits.occlusion import (
     AXES,
     COLUMNS,
     END,

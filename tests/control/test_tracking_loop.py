@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from servo_scene import CAMERA, START, in_view, puma, seen, servo
+from servo_scene import CAMERA, START, in_view, puma, seen, servo, tracking_law
 
-from vergence.control import OptimalTrackingLaw, tracking_kernels
+from vergence.control import Servo
+from vergence.control.objectives import _tracking as tracking_kernels
 from vergence.geometry import se3_distance
 from vergence.robot import manipulability
 
@@ -12,9 +13,9 @@ ARM = puma()
 ONE = np.zeros((1, 3))
 
 
-def six_axis_law(depth: np.ndarray) -> OptimalTrackingLaw:
+def six_axis_law(depth: np.ndarray) -> Servo:
     # Motion is cheap, so that only the features count.
-    return OptimalTrackingLaw(ARM, CAMERA, depth, Q=2e-6, R=1e-4)
+    return tracking_law(ARM, depth, Q=2e-6, R=1e-4)
 
 
 @pytest.mark.parametrize("count", [3, 4, 8])
@@ -25,7 +26,7 @@ def test_three_and_more_features_bring_the_camera_back_to_its_pose(count: int) -
     desired, depth = seen(ARM, START, world)
     for _ in range(3):
         start = START + rng.uniform(-0.03, 0.03, 6)
-        path, pictures = servo(six_axis_law(depth), start, world, desired, 250)
+        path, pictures = servo(ARM, six_axis_law(depth), start, world, desired, 250)
         np.testing.assert_allclose(pictures[-1], desired, atol=0.05)
         gap = se3_distance(ARM.forward_kinematics(path[-1]), ARM.forward_kinematics(START), 1.0)
         assert gap < 2e-3
@@ -38,9 +39,9 @@ def test_three_and_more_features_bring_the_camera_back_to_its_pose(count: int) -
 def test_one_feature_is_brought_home_along_the_controlled_axes(axes) -> None:
     world = in_view(ARM, START, ONE)
     desired, depth = seen(ARM, START, world)
-    law = OptimalTrackingLaw(ARM, CAMERA, depth, axes=axes)
+    law = tracking_law(ARM, depth, axes=axes)
     world = world + (0.05, 0.03, 0.0)
-    path, pictures = servo(law, START, world, desired, 150)
+    path, pictures = servo(ARM, law, START, world, desired, 150)
     assert np.linalg.norm(pictures[0] - desired) > 50
     np.testing.assert_allclose(pictures[-1], desired, atol=0.01)
     if axes == ("x", "y"):
@@ -54,7 +55,7 @@ def test_with_the_printed_sign_of_the_first_entry_two_axes_lose_the_feature() ->
     _, depth = seen(ARM, START, world)
     features = np.array([[0.02, 0.0, 0.0, 0.0, depth[0]]])
     error, B = tracking_kernels.image_model(features, CAMERA.focal_px)
-    gains = OptimalTrackingLaw(ARM, CAMERA, depth, axes=("x", "y")).gains
+    gains = tracking_law(ARM, depth, axes=("x", "y")).tracking.gains
     x = error.copy()
     misprinted = B.copy()
     misprinted[0, 0] *= -1
@@ -73,8 +74,8 @@ def test_with_the_printed_sign_of_the_first_entry_two_axes_lose_the_feature() ->
 def test_a_steadily_moving_object_is_followed_with_a_steady_error() -> None:
     world = in_view(ARM, START, ONE)
     desired, depth = seen(ARM, START, world)
-    law = OptimalTrackingLaw(ARM, CAMERA, depth, axes=("x", "y", "rx", "ry"))
-    _, pictures = servo(law, START, world, desired, 60, np.array([0.1, 0.0, 0.0]))
+    law = tracking_law(ARM, depth, axes=("x", "y", "rx", "ry"))
+    _, pictures = servo(ARM, law, START, world, desired, 60, np.array([0.1, 0.0, 0.0]))
     errors = np.linalg.norm(pictures[:, 0] - desired[0], axis=1)
     assert errors[-1] < 32
     assert np.ptp(errors[-20:]) < 1.0
@@ -85,15 +86,14 @@ def test_avoidance_keeps_the_measure_up_where_tracking_alone_lets_it_fall() -> N
     desired, depth = seen(ARM, START, world)
     lowest = {}
     for S in (0.0, 1e-3):
-        law = OptimalTrackingLaw(
+        law = tracking_law(
             ARM,
-            CAMERA,
             depth,
             axes=("x", "y", "rx", "ry"),
             avoidance_axes=("x", "y") if S else (),
             S=S,
         )
-        path, pictures = servo(law, START, world, desired, 120, np.array([-0.15, 0.0, 0.0]))
+        path, pictures = servo(ARM, law, START, world, desired, 120, np.array([-0.15, 0.0, 0.0]))
         limits = (ARM.q_min, ARM.q_max, 1e5, False, 0.0)
         measures = [manipulability(ARM.chain, q, *limits).value for q in path]
         lowest[S] = min(measures) / measures[0]

@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.control.path_tracking import PathTrackingLaw
+from vergence.control import Law
 from vergence.geometry import se3_distance, se3_inverse, transform_points
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.trajectory import Trajectory
@@ -47,7 +47,7 @@ def observe(
 def follow(
     truth: PlanningProblem,
     trajectory: Trajectory | None,
-    law: PathTrackingLaw,
+    law: Law,
     camera: Camera,
     random: np.random.Generator | None = None,
     noise_px: float = 0.0,

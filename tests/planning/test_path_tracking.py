@@ -4,35 +4,54 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_loop import follow
+from closed_loop import PERIOD, follow
 from gantry_cell import CAMERA, gantry, section6
 
-from vergence.control.path_tracking import PathTrackingLaw, tracking_twist
+from vergence.control import (
+    DampedPseudoInverse,
+    ImageBased,
+    MotionSettings,
+    Servo,
+    Situation,
+)
 from vergence.errors import InputError
-from vergence.features import interaction_matrix_points
+from vergence.features import Points, interaction_matrix_points
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.trajectory import Trajectory
 from vergence.signals import ImagePoints, JointState, Observation, OutcomeKind, Reference
 
 
+def tracking_law(gain: float = 2.0, interaction: str = "desired") -> Servo:
+    """The law of section 5: images as they are, a stationary target."""
+    return Servo(
+        gantry(),
+        CAMERA,
+        ImageBased(gain=gain, interaction=interaction),
+        solver=DampedPseudoInverse(singular_below=1e-2),
+        situation=Situation(PERIOD, MotionSettings(False, False), fewest=3),
+    )
+
+
 def test_twist_solves_the_least_squares_problem() -> None:
     random = np.random.default_rng(0)
-    L = interaction_matrix_points(random.uniform(-0.3, 0.3, (5, 2)), random.uniform(0.5, 1, 5))
-    error, feedforward = random.normal(size=(2, 10))
-    expected = np.linalg.lstsq(L, feedforward - 2.0 * error, rcond=None)[0]
-    np.testing.assert_allclose(tracking_twist(L, error, feedforward, 2.0, 0.0), expected, rtol=1e-8)
+    points, depth = random.uniform(-0.3, 0.3, (5, 2)), random.uniform(0.5, 1, 5)
+    goal = points + random.normal(size=(5, 2))
+    L = interaction_matrix_points(points, depth)
+    expected = np.linalg.lstsq(L, -2.0 * (points - goal).ravel(), rcond=None)[0]
+    objective = ImageBased(gain=2.0, damping=1e-12)
+    twist = objective.twist(Points(points, depth), Points(goal, depth))
+    np.testing.assert_allclose(twist, expected, rtol=1e-8)
 
 
-def test_error_decays_at_the_gain_without_feedforward_error() -> None:
+def test_error_decays_at_the_gain() -> None:
     random = np.random.default_rng(1)
     points, depth = random.uniform(-0.3, 0.3, (4, 2)), random.uniform(0.5, 1, 4)
     L = interaction_matrix_points(points, depth)
-    motion = random.normal(size=6) * 1e-3
-    error = L @ motion
-    np.testing.assert_allclose(
-        L @ tracking_twist(L, error, np.zeros(8), 1.5, 0.0), -1.5 * error, atol=1e-9
-    )
+    error = L @ (random.normal(size=6) * 1e-3)
+    objective = ImageBased(gain=1.5, damping=1e-12)
+    twist = objective.twist(Points(points, depth), Points(points - error.reshape(-1, 2), depth))
+    np.testing.assert_allclose(L @ twist, -1.5 * error, atol=1e-9)
 
 
 @pytest.mark.parametrize("model", ["current", "desired", "mean"])
@@ -42,7 +61,7 @@ def test_planned_trajectory_is_realised(
 ) -> None:
     problem = section6(margin_px=15.0, margin_joint=0.03)
     trajectory = Trajectory.of(planner.plan(problem))
-    law = PathTrackingLaw(gantry(), CAMERA, model=model)
+    law = tracking_law(interaction=model)
     run = follow(problem, trajectory, law, CAMERA)
     assert run.tracking_error_px < 5.0
     assert run.final_error_px < 0.5
@@ -55,7 +74,7 @@ def test_classical_image_based_servoing_fails_from_the_same_start() -> None:
     problem = section6()
     path = OptimisedPlanner().plan(problem)
     goal = Reference(0.0, path.points_px[-1], np.zeros((9, 2)), path.depth_m[-1])
-    law = PathTrackingLaw(gantry(), CAMERA, gain=0.5)
+    law = tracking_law(gain=0.5)
     run = follow(problem, None, law, CAMERA, settle_s=20.0, goal=goal)
     assert not run.succeeded
 
@@ -68,7 +87,7 @@ def view(found: np.ndarray) -> Observation:
 
 
 def test_lost_points_are_left_out_and_too_few_are_a_fault() -> None:
-    law = PathTrackingLaw(gantry(), CAMERA)
+    law = tracking_law()
     joints = JointState(0.0, section6().q_start, np.zeros(6))
     wanted = np.array([[300.0, 200.0], [350.0, 210.0], [340.0, 290.0], [310.0, 280.0]])
     reference = Reference(0.0, wanted, None, np.full(4, 0.7))
@@ -85,4 +104,4 @@ def test_lost_points_are_left_out_and_too_few_are_a_fault() -> None:
 
 def test_unknown_model_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InputError, match="current, desired, mean"):
-        PathTrackingLaw(gantry(), CAMERA, model="average")  # type: ignore[arg-type]
+        ImageBased(interaction="average")  # type: ignore[arg-type]

@@ -8,7 +8,14 @@ import pytest
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.control import OptimalTrackingLaw
+from vergence.control import (
+    ImageBased,
+    MotionSettings,
+    OptimalTracking,
+    PseudoInverse,
+    Servo,
+    Situation,
+)
 from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
 from vergence.geometry import se3, so3_exp
 from vergence.runtime import TickRecord
@@ -54,18 +61,22 @@ def drawn_run(seed: int) -> IdealRun:
     )
     truth = IdealDriver(cell).frame().truth
     assert truth is not None
-    axes = tuple(rng.choice(AXES, rng.integers(2, 7), replace=False))
-    law = OptimalTrackingLaw(
-        arm,
-        CAMERA,
-        truth.depth_m * np.exp(rng.uniform(-0.7, 0.7)),
+    depth_factor = float(np.exp(rng.uniform(-0.7, 0.7)))
+    axes = tuple(str(a) for a in rng.choice(AXES, rng.integers(2, 7), replace=False))
+    objective = OptimalTracking(
         axes=axes,
         avoidance_axes=axes[: rng.integers(0, len(axes) + 1)],
         S=float(rng.choice([0.0, 1e-3])),
-        period=1.0 / cell.rate_hz,
         penalty=str(rng.choice(["product", "per_joint"])),
         penalty_k=float(rng.choice([50.0, 1e5])),
-        singular_below=float(rng.choice([1e-4, 0.05])),
+    )
+    law = Servo(
+        arm,
+        CAMERA,
+        objective,
+        solver=PseudoInverse(singular_below=float(rng.choice([1e-4, 0.05]))),
+        depth_m=truth.depth_m * depth_factor,
+        situation=Situation(1.0 / cell.rate_hz, MotionSettings(False, False)),
     )
     wanted = truth.points_px + rng.normal(0, 30, 2)
     return IdealRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
@@ -141,9 +152,10 @@ def test_one_core_and_all_of_them_find_the_same(traces) -> None:
 
 
 def test_a_law_that_the_kernel_does_not_know_is_left_to_the_loop() -> None:
-    from vergence.control import ImageBased, PlainLaw
-
     run = RUNS[0]
-    plain = PlainLaw(run.cell.arm, CAMERA, ImageBased(CAMERA), np.ones(len(run.cell.features)))
+    plain = Servo(
+        run.cell.arm, CAMERA, ImageBased(), solver=PseudoInverse(), depth_m=1.0,
+        situation=Situation(motion=MotionSettings(False, False)),
+    )  # fmt: skip
     assert covers(run)
     assert not covers(IdealRun(run.cell, plain, run.wanted_px, 1.0))

@@ -36,6 +36,7 @@ from vergence.experiments import (
     start_trials,
 )
 from vergence.experiments.batch import IdealRun
+from vergence.parts import kind_of
 from vergence.signals import Outcome, OutcomeKind
 
 QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
@@ -203,11 +204,13 @@ def test_scores_count_every_trial_once(results):
 
 
 def test_laws_are_found_by_name(tmp_path):
-    cell = load_cell("ur5", {"laws.mine": "{ kind = 'plain', gain = 7.0 }"})
+    cell = load_cell("ur5", {"laws.mine": "{ kind = 'image_based', gain = 7.0 }"})
     assert law_table(cell, "mine")["gain"] == 7.0
     assert law_table(cell, OWN)["gain"] == cell.law.gain
     for name in PRESETS:
-        assert cell.replace(law=law_table(cell, name)).law.kind == PRESETS[name]["kind"]
+        law = cell.replace(law=law_table(cell, name)).law
+        assert law.kind == PRESETS[name]["kind"]
+        assert kind_of(law.solver) == PRESETS[name]["solver"]
     assert law_table(cell, "image_based")["gain"] == cell.law.gain
     with pytest.raises(InputError, match="did you mean image_based"):
         law_table(cell, "image_basde")

@@ -13,8 +13,8 @@ from vergence.runtime import Recorder, Recording
     "law",
     [
         {},
-        {"kind": "plain", "gain": 2.0},
-        {"kind": "constrained", "objective": "optimal_tracking", "R": 0.01},
+        {"gain": 2.0, "solver": "pseudo_inverse", "feed_forward": False},
+        {"kind": "optimal_tracking", "R": 0.01, "Q": 8e-6},
     ],
 )
 def test_every_law_for_a_camera_in_the_hand_serves_a_fixed_one(law):
@@ -54,7 +54,7 @@ def test_by_pose_it_matters_not_where_the_only_camera_is_believed_to_stand():
 
 
 def test_by_pose_the_constrained_law_gets_there_too():
-    law = {"kind": "constrained", "filter_hz": 0.4}
+    law = {"kind": "position_based", "filter_hz": 0.4, "solver": "quadratic_program"}
     result = run_cell(load_cell("eye_to_hand_pose").replace(law=law), images=False)
     assert result.outcome.succeeded
     assert result.summary["final_hand_error_m"] < 1e-3

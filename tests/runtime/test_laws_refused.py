@@ -1,13 +1,12 @@
 """A law that cannot work is refused before anything moves, with the key and the reason."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from vergence.assembly import build_law, run_cell
+from vergence.assembly import run_cell
+from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.control import ConstrainedLaw, ConstrainedSolver, ImageBased, OptimalTracking
+from vergence.control import ImageBased, Servo
 from vergence.errors import InputError
 from vergence.simulation import SimulatedDriver
 
@@ -26,65 +25,75 @@ def complaint(cell, **settings):
     return error
 
 
-@pytest.mark.parametrize("cell", ["puma560", "lippiello2005", "gantry"])
+CONSTRAINED = {
+    "puma560": "image_based", "lippiello2005": "position_based", "gantry": "image_based",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("cell", CONSTRAINED)
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("view_margin_px", "400", "half the picture"),
-        ("joint_margin", "0.6", "half of a joint's range"),
-        ("depth_range", "[1.2, 2.0]", "a factor above 0 up to 1"),
-        ("depth_range", "[0.5, 0.9]", "one from 1"),
+        ("view_margin_px", "400", "half the image"),
+        ("joint_margin", "0.6", "less than 0.5"),
+        ("depth_range", "[1.2, 2.0]", "at most 1"),
+        ("depth_range", "[0.5, 0.9]", "at least 1"),
         ("approach_rate_hz", "1000", "one command's share"),
-        ("order", '["view", "view"]', "each constraint once"),
+        ("order", '["view", "view"]', "each limit once"),
     ],
 )
 def test_limits_that_contradict_each_other(cell, key, value, said):
-    error = complaint(cell, law__kind="constrained", **{f"law__{key}": value})
-    assert error.key == f"law.{key}"
+    law = f'{{ kind = "{CONSTRAINED[cell]}" }}'
+    error = complaint(cell, law=law, **{f"law__limits__{key}": value})
+    assert error.key.startswith(f"law.limits.{key}")
     assert said in error.allowed
 
 
 @pytest.mark.parametrize(
     ("kind", "key", "value"),
     [
-        ("constrained", "S", "-1.0"),
-        ("constrained", "clearance_m", "-0.1"),
-        ("constrained", "gain", "0.0"),
-        ("constrained", "Q", "-1e-6"),
-        ("plain", "gain", "-2.0"),
-        ("plain", "R", "[1.0, -1.0, 1.0, 1.0, 1.0, 1.0]"),
+        ("image_based", "solver.S", "-1.0"),
+        ("image_based", "limits.clearance_m", "-0.1"),
+        ("image_based", "gain", "0.0"),
+        ("image_based", "gain", "1e9"),
+        ("image_based", "damping", "nan"),
+        ("image_based", "interaction", "desird"),
+        ("image_based", "depth_m", "-1"),
         ("optimal_tracking", "Q", "0.0"),
+        ("optimal_tracking", "R", "[1.0, -1.0, 1.0, 1.0, 1.0, 1.0]"),
         ("optimal_tracking", "S", "-1e-3"),
-        ("position_based", "filter_hz", "0.0"),
-        ("position_based", "null_space", "-1.0"),
-        ("path_tracking", "gain", "0.0"),
+        ("position_based", "filter_hz", "-5"),
+        ("position_based", "null_space_rate", "-1.0"),
     ],
 )
-def test_weights_of_the_wrong_sign(kind, key, value):
-    cell = {"position_based": "lippiello2005", "path_tracking": "gantry"}.get(kind, "puma560")
-    error = complaint(cell, law__kind=kind, **{f"law__{key}": value})
+def test_numbers_out_of_their_range(kind, key, value):
+    cell = "lippiello2005" if kind == "position_based" else "puma560"
+    law = f'{{ kind = "{kind}", solver = {{ kind = "quadratic_program" }} }}'
+    error = complaint(cell, law=law, **{f"law__{key.replace('.', '__')}": value})
     assert error.key.startswith(f"law.{key}")
 
 
-@pytest.mark.parametrize("kind", ["plain", "constrained", "optimal_tracking"])
-def test_as_many_weights_as_axes(kind):
-    law = {"law__kind": kind, "law__R": "[1.0, 2.0]"}
-    if kind != "optimal_tracking":
-        law["law__objective"] = "optimal_tracking"
-    error = complaint("puma560", **law)
+@pytest.mark.parametrize("solver", ["pseudo_inverse", "quadratic_program"])
+def test_as_many_weights_as_axes(solver):
+    law = f'{{ kind = "optimal_tracking", solver = "{solver}", R = [1.0, 2.0] }}'
+    error = complaint("puma560", law=law)
     assert (error.key, error.given) == ("law.R", "2 weights")
     assert "one for each of the axes" in error.allowed
 
 
-def test_a_law_that_needs_a_depth_that_nothing_tells(monkeypatch):
-    cell = load_cell("puma560", {"law.kind": "plain", "target.features": SQUARE})
-    driver = SimulatedDriver(cell, images=False)
-    frame = driver.first_frame("wrist")
-    unknown = replace(frame, truth=replace(frame.truth, depth_m=np.full(4, np.nan)))
-    monkeypatch.setattr(SimulatedDriver, "first_frame", lambda self, camera: unknown)
-    with pytest.raises(InputError, match="a depth in metres") as caught:
-        build_law(cell, driver)
-    assert caught.value.key == "law.depth_m"
+def test_another_kind_keeps_the_keys_that_it_has_and_refuses_the_others_by_name():
+    kept = load_cell("ur5", {"law.solver": "pseudo_inverse", "law.limits": ""})
+    assert kept.law.objective.gain == 4.0
+    error = complaint("puma560", law__kind="image_based")
+    assert error.key == "law.axes"
+    assert "image_based does not have" in str(error.given)
+    assert "--set law.axes= removes it" in error.allowed
+
+
+def test_limits_beside_a_solver_that_keeps_none():
+    error = complaint("ur5", law__solver="pseudo_inverse")
+    assert error.key == "law.limits"
+    assert "quadratic_program" in error.allowed
 
 
 def written(tmp_path, law, height=-0.05):
@@ -118,8 +127,8 @@ camera = "eye"
 
 @pytest.mark.parametrize(
     "law",
-    ['kind = "plain"', 'kind = "constrained"', 'kind = "optimal_tracking"',
-     'kind = "optimal_tracking"\naxes = ["x", "y", "rz"]'],
+    ['kind = "image_based"\nsolver = "pseudo_inverse"', 'kind = "image_based"',
+     'kind = "optimal_tracking"', 'kind = "optimal_tracking"\naxes = ["x", "y", "rz"]'],
 )  # fmt: skip
 def test_an_arm_with_fewer_motions_than_the_law_asks(tmp_path, law):
     error = complaint(written(tmp_path, law))
@@ -139,22 +148,20 @@ def test_the_one_axis_that_it_has_is_served(tmp_path):
 
 
 def test_a_camera_offset_that_looks_away(tmp_path):
-    error = complaint(written(tmp_path, 'kind = "plain"', height=-2.0))
+    error = complaint(written(tmp_path, 'kind = "image_based"', height=-2.0))
     assert "does not see" in str(error.given)
 
 
 def test_a_camera_on_a_link_that_does_not_move():
-    error = complaint("puma560", cameras__wrist__body='"base"', law__kind="plain")
+    error = complaint("puma560", cameras__wrist__body='"base"', law='{ kind = "image_based" }')
     assert "base" in str(error) or "joint" in str(error)
 
 
-def test_whoever_builds_laws_by_hand_is_told_too():
-    driver = SimulatedDriver(load_cell("puma560"), images=False)
-    arm, camera = driver.world.arm_to_camera("wrist"), driver.cameras["wrist"]
-    solver = ConstrainedSolver(arm, camera)
-    with pytest.raises(InputError, match="depths above zero"):
-        ConstrainedLaw(solver, ImageBased(camera), np.array([1.0, np.nan]))
+def test_python_gives_the_same_answers():
+    for wrong in ({"gain": 0.0}, {"interaction": "desird"}, {"damping": np.nan}, {"gian": 1.0}):
+        with pytest.raises(InputError) as caught:
+            ImageBased(**wrong)
+        assert caught.value.key == next(iter(wrong))
+    arm = SimulatedDriver(load_cell("puma560"), images=False).world.arm_to_camera("wrist")
     with pytest.raises(InputError, match="above zero"):
-        ImageBased(camera, gain=0.0)
-    with pytest.raises(InputError, match="one, or 6"):
-        OptimalTracking(camera, R=[1.0, 2.0])
+        Servo(arm, Camera(640, 480, 600, 600, 319.5, 239.5), ImageBased(), depth_m=[1.0, np.nan])

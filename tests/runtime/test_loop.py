@@ -83,7 +83,7 @@ def test_single_dropped_pictures_do_not_end_a_run() -> None:
 
 
 @pytest.mark.parametrize("reason", ["the image is empty", "left the image", "not finite"])
-def test_a_lost_target_is_waited_for_in_place_and_then_given_up_with_its_reason(reason) -> None:
+def test_a_lost_target_is_waited_for_in_place_and_then_slack_with_its_reason(reason) -> None:
     driver, notes = ScriptedDriver(), Notes()
     eyes = ScriptedEyes(hide=lambda exposed: reason if exposed > 1.0 else "")
     loop = looped(driver, eyes, listeners=[notes], patience=Patience(target_s=0.4))

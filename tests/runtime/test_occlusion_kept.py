@@ -8,7 +8,7 @@ import pytest
 
 from vergence.assembly import run_cell
 from vergence.cell import load_cell
-from vergence.control.sight_lines import AXES, HALF, MIDDLE, RADIUS
+from vergence.control.limits import AXES, HALF, MIDDLE, RADIUS
 from vergence.simulation import SimulatedDriver
 from vergence.simulation.solids import Solids
 
@@ -46,8 +46,7 @@ def cell(tmp_path: Path):
             "scene.model": str(tmp_path / "room.xml"),
             "target.features": str([[x, y, 0.0] for x in (-0.05, 0.05) for y in (-0.05, 0.05)]),
             "target.motion": '{ kind = "line", velocity_m_s = [0.05, 0, 0], distance_m = 0.3 }',
-            "law.kind": "constrained",
-            "law.gain": "2",
+            "law": '{ kind = "image_based", gain = 2 }',
             "duration_s": "8",
         },
     )  # fmt: skip
@@ -57,7 +56,9 @@ def test_a_beam_hides_the_target_only_where_sight_lines_are_not_kept(cell):
     kept, given_away = Hidden(), Hidden()
     result = run_cell(cell, [kept], images=False)
     run_cell(
-        cell.replace(law={"order": ["view", "singularity", "joint margin"]}), [given_away], False
+        cell.replace(law={"limits": {"order": ["view", "singularity", "joint margin"]}}),
+        [given_away],
+        False,
     )
     assert given_away.pictures > 20
     assert kept.pictures == 0

@@ -53,7 +53,7 @@ def record_at(time: float, rng: np.random.Generator) -> TickRecord:
     )
     target = TargetState(time, pose, rng.normal(size=6), rng.normal(size=(12, 12)), True)
     command = JointCommand(
-        rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",), given_up={"view": 0.5}
+        rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",), slack={"view": 0.5}
     )
     return TickRecord(
         time,
@@ -101,7 +101,7 @@ def test_numbers_of_an_arm_read_back_exactly(tmp_path: Path, records: list[TickR
     assert set(arm.manipulability) == {0.4}
     assert set(arm.penalty) == {0.9}
     assert set(arm.active) == {("rate of turn",)}
-    assert all(bent == {"view": 0.5} for bent in arm.given_up)
+    assert all(bent == {"view": 0.5} for bent in arm.slack)
 
 
 def test_points_of_a_camera_read_back_exactly(tmp_path: Path, records: list[TickRecord]) -> None:

@@ -89,7 +89,7 @@ def test_through_rendered_images_both_pictures_come_out_as_wanted():
 
 def test_the_constrained_law_serves_both_within_its_margins():
     ends = Ends()
-    law = {"kind": "constrained", "gain": 2.0, "view_margin_px": 40.0}
+    law = {"solver": "quadratic_program", "limits": {"view_margin_px": 40.0}}
     result = run_cell(load_cell("wrist_and_wall").replace(law=law), [ends], images=False)
     assert result.outcome.succeeded
     assert max(ends.error_px.values()) < 0.5
@@ -109,8 +109,7 @@ def test_a_wall_camera_that_goes_blind_is_told_of_and_leaves_the_rest_to_the_wri
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"law": {"kind": "optimal_tracking"}}, r"law\.kind.*plain or constrained"),
-        ({"law": {"objective": "optimal_tracking"}}, r"law\.objective.*image_based"),
+        ({"law": {"objectives": [{"kind": "image_based", "camera": "ceiling"}]}}, "ceiling"),
         ({"cameras": {"wall": {"arm": "puma"}}}, r"task\.tool\.camera.*a fixed camera"),
         ({"task": {"tool": {"camera": "walls"}}}, r"task\.tool\.camera.*wall"),
         ({"task": {"tool": {"desired": [[1, 1]]}}}, r"task\.tool\.desired.*2 points"),

@@ -42,15 +42,15 @@ def test_progress_only_goes_forward(result):
 
 def test_wrong_sign_of_the_first_entry_of_B_fails_the_checks(monkeypatch):
     """[Nelson1995] eq. (13) as printed: two-axis tracking cannot hold the feature."""
-    from vergence.control import optimal_tracking as law
+    from vergence.control import Servo
 
-    right = law.OptimalTrackingLaw.command
+    right = Servo.command
 
     def mirrored(self, observation, reference, joints):
         command = right(self, observation, reference, joints)
         return type(command)(-command.velocity, -command.v_camera)
 
-    monkeypatch.setattr(law.OptimalTrackingLaw, "command", mirrored)
+    monkeypatch.setattr(Servo, "command", mirrored)
     cell = nelson1995.load_cell("puma560").replace(law=nelson1995.STRATEGIES["two_axis"])
     trial = nelson1995.run(nelson1995.moving(cell, 1), True)
     assert not trial.outcome.succeeded

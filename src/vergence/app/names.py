@@ -13,6 +13,7 @@ LAWS = (  # the cell's own, and those that `vergence.experiments` knows
     "optimal_tracking",
     "constrained",
     "constrained_tracking",
+    "constrained_pose",
 )
 PLANNERS = ("optimised", "potential_field")
 OVER = ("places", "headings")

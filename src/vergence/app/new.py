@@ -71,7 +71,7 @@ camera = "wrist"
 feature_count = 4  # picked in the first picture
 
 [law]
-kind = "constrained"  # joint limits, view and singularities are kept
+kind = "image_based"  # joint limits, view and singularities are kept by the default solver
 gain = 3.0
 """
 

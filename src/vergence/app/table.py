@@ -85,7 +85,7 @@ def constraint_rows(trace: ArmTrace) -> list[Row]:
 
 
 def _constraint_row(trace: ArmTrace, name: str) -> Row:
-    bent = np.array([given_up.get(name, 0.0) for given_up in trace.given_up])
+    bent = np.array([slack.get(name, 0.0) for slack in trace.slack])
     shaped = np.array([name in active for active in trace.active]) | (bent > 0.0)
     note = "of the time"
     if bent.any():

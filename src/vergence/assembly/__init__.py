@@ -1,8 +1,17 @@
 """From a cell and a driver to a running loop: one file a kind of task."""
 
 from vergence.assembly.assemble import assemble_parts
-from vergence.assembly.laws import build_law
+from vergence.assembly.build_law import build_law
+from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.assembly.run_cell import RunResult, run_cell, run_driver
 
-__all__ = ["Parts", "RunResult", "assemble_parts", "build_law", "run_cell", "run_driver"]
+__all__ = [
+    "LawContext",
+    "Parts",
+    "RunResult",
+    "assemble_parts",
+    "build_law",
+    "run_cell",
+    "run_driver",
+]

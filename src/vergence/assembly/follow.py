@@ -1,7 +1,8 @@
 """The task `follow`: the hand kept at a wanted pose relative to the target."""
 
 from vergence.arrays import FloatArray
-from vergence.assembly.laws import build_law
+from vergence.assembly.build_law import build_law
+from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.assembly.pose import follow_pose, target_shape
 from vergence.cell import Cell
@@ -24,7 +25,8 @@ def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images:
     _require_sight(cell, driver)
     planner = FixedReference(Reference(0.0, T_camera_target=_wanted_pose(task, driver)))
     perception = follow_pose(cell, driver, model, images)
-    return Parts(perception, planner, build_law(cell, driver))
+    context = LawContext.of(cell, driver)
+    return Parts(perception, planner, build_law(context), context)
 
 
 def _wanted_pose(task: FollowTable, driver: SimulatedDriver) -> FloatArray:

@@ -12,7 +12,7 @@ from vergence.camera import Camera
 from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.geometry import se3_compose, se3_inverse, transform_points
-from vergence.robot import Arm, reverse_arm
+from vergence.robot import Arm
 from vergence.runtime.driver import Driver
 from vergence.simulation.cell_model import CellModel
 from vergence.simulation.solids import Solids
@@ -82,21 +82,9 @@ class LawContext:
         return self.cell.cameras[self.camera_name].arm is None
 
     @property
-    def start(self) -> FloatArray:
-        """Joint positions at the start, (n,), in the order of `arm`."""
-        q = self.joints[self.cell.task.arm]
-        return q[::-1] if self.is_fixed else q
-
-    @property
     def arm(self) -> Arm:
-        """The arm with the task's camera as its tip.
-
-        For a fixed camera it is the arm that holds the target, reversed: from the target to the
-        camera, see `vergence.robot.reverse_arm`.
-        """
-        if not self.is_fixed:
-            return self.arm_to_camera(self.camera_name)
-        return reverse_arm(self.arm_to_target, self._fixed_pose(self.camera_name))
+        """The task's arm: with the task's camera as its tip, or the target that it holds."""
+        return self.arm_to_target if self.is_fixed else self.arm_to_camera(self.camera_name)
 
     @property
     def arm_to_target(self) -> Arm:

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from vergence.assembly.law_context import LawContext
 from vergence.control import Law
 from vergence.runtime.stages import Perception, Planner
 
@@ -12,4 +13,5 @@ class Parts(NamedTuple):
     perception: Perception
     planner: Planner
     law: Law
+    context: LawContext  # what the law was made for
     duration_s: float | None = None  # how long the task takes; as long as the cell says if None

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.laws import build_law
+from vergence.assembly.build_law import build_law
+from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
@@ -38,7 +39,8 @@ def reach_parts(
     cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool
 ) -> Parts | Outcome:
     """Put together what plans a path in the image and tracks it; or why there is none."""
-    law = build_law(cell, driver)
+    context = LawContext.of(cell, driver)
+    law = build_law(context)
     pictures = look_twice(cell, task, driver, images)
     if isinstance(pictures, PlanFailure):
         return pictures.outcome(0.0)
@@ -52,7 +54,7 @@ def reach_parts(
     if duration > cell.duration_s:
         reason = f"the way takes {duration:.1f} s, duration_s is {cell.duration_s:g}"
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
-    return Parts(pictures.perception, trajectory, law, duration)
+    return Parts(pictures.perception, trajectory, law, context, duration)
 
 
 def plan_reach(

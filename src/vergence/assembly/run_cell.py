@@ -47,7 +47,7 @@ def run_driver(
     images: bool,
     *,
     duration_s: float | None = None,
-    attend: Callable[[Loop], None] | None = None,
+    attend: Callable[[Loop, Parts], None] | None = None,
 ) -> RunResult:
     """Run a cell with a driver that stands already, and stays open.
 
@@ -57,7 +57,7 @@ def run_driver(
         listeners: hear of every tick.
         images: whether the driver renders images.
         duration_s: in place of the cell's; may be infinite.
-        attend: is given the loop before it runs, for whoever wants to change its law on the way.
+        attend: is given the loop and its parts before it runs, to change the law during the run.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
@@ -73,7 +73,7 @@ def run_driver(
     else:
         loop = _loop(cell, driver, parts, everyone)
         if attend is not None:
-            attend(loop)
+            attend(loop, parts)
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
     values = dict(summary.values)
     values["duration_s"] = outcome.time

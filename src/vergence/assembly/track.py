@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.assembly.laws import build_law
+from vergence.assembly.build_law import build_law
+from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.cell import Cell
 from vergence.cell.schema import ToolTable, TrackTable
@@ -27,12 +28,15 @@ def track_parts(cell: Cell, task: TrackTable, driver: SimulatedDriver, images: b
     points_px, perception = _look(cell, task, driver, images)
     desired = _desired_points(cell, "task.desired", task, driver, points_px)
     reference, tool = Reference(0.0, desired), task.tool
+    seen_px = {task.camera: points_px}
     if tool is not None:
         points_px, second = _follow(cell, "task.tool", tool.camera, driver, images)
         desired = _desired_points(cell, "task.tool.desired", tool, driver, points_px)
+        seen_px[tool.camera] = points_px
         reference = replace(reference, elsewhere_px={tool.camera: desired})
         perception = SeveralCameras((perception, second))
-    return Parts(perception, FixedReference(reference), build_law(cell, driver))
+    context = LawContext.of(cell, driver, seen_px)
+    return Parts(perception, FixedReference(reference), build_law(context), context)
 
 
 def _look(

@@ -1,19 +1,16 @@
 """A work cell as its file describes it."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import Field, PlainSerializer, PrivateAttr, ValidationError
 
 from vergence.cell.schema import (
     TABLES,
     ArmTable,
     CameraTable,
     Duration,
-    Law,
     Name,
     PerceptionTable,
     SceneTable,
@@ -25,7 +22,13 @@ from vergence.cell.schema import (
 )
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
+from vergence.loading import Place
 from vergence.places import find_cell
+from vergence.registry import find
+from vergence.validation import explain
+
+# The law as its part reads it; this room knows no law.
+LawSettings = Annotated[Any, PlainSerializer(lambda law: law.table())]
 
 
 class Cell(Table):
@@ -41,8 +44,8 @@ class Cell(Table):
     target: TargetTable  # what is looked at
     task: Task  # what is to be done about it
     perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
-    law: Law  # how the arm is moved
-    laws: dict[Name, Law] = Field(  # others, by name, to compare it with
+    law: LawSettings  # how the arm is moved
+    laws: dict[Name, LawSettings] = Field(  # others, by name, to compare it with
         default_factory=dict, max_length=64
     )
     _path: Path = PrivateAttr(default=Path())
@@ -97,12 +100,32 @@ def load_cell(
     path = find_cell(name_or_path)
     text, values = read_toml(path)
     for key, value in (overrides or {}).items():
-        values = _merge(values, setting(key, value))
+        values = _with(values, *setting(key, value))
         text += f"\n# set: {key} = {value}"
     if seed is not None:
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
     return _validate(values, path, text)
+
+
+def _with(values: Any, keys: list[str], value: Any) -> Any:
+    """Return tables with the value at a place replaced, or removed where it is None.
+
+    What stands beside it stays, so a table that becomes one of another kind keeps its keys.
+    """
+    key, *deeper = keys
+    if isinstance(values, list) and key.isdigit() and int(key) < len(values):
+        changed = list(values)
+        changed[int(key)] = _with(values[int(key)], deeper, value) if deeper else value
+        return changed
+    table = dict(values) if isinstance(values, Mapping) else {}
+    if deeper:
+        table[key] = _with(table.get(key), deeper, value)
+    elif value is None:
+        table.pop(key, None)
+    else:
+        table[key] = value
+    return table
 
 
 def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -121,14 +144,35 @@ def _other_kind(old: Mapping[str, Any], change: Mapping[str, Any]) -> bool:
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = _with_calibrations(values, path)
+    values = _with_laws(_with_calibrations(values, path), path)
     try:
         cell = Cell.model_validate(values)
     except ValidationError as error:
-        raise _explain(error, str(path), values) from None
+        raise explain(error, str(path), values, _known_keys) from None
     cell._path, cell._text = path, text
     _check_names(cell)
     return cell
+
+
+def _with_laws(values: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Put in the laws that the tables describe."""
+    if "law" not in values:
+        return values
+    settings = find("law", "servo")
+
+    def law(key: str, table: Any) -> Any:
+        if not isinstance(table, Mapping):
+            raise InputError(str(path), key, table, "a table")
+        return settings.from_table(table, Place(str(path), key, path.parent))
+
+    laws = values.get("laws", {})
+    if not isinstance(laws, Mapping):
+        raise InputError(str(path), "laws", laws, "a table")
+    return {
+        **values,
+        "law": law("law", values["law"]),
+        "laws": {name: law(f"laws.{name}", table) for name, table in laws.items()},
+    }
 
 
 def _with_calibrations(values: dict[str, Any], path: Path) -> dict[str, Any]:
@@ -160,82 +204,6 @@ def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, A
         "principal_px": (camera.cx, camera.cy),
         "distortion": tuple(camera.distortion.tolist()),
     }
-
-
-def _explain(error: ValidationError, source: str, values: Any) -> InputError:
-    """Turn pydantic's first complaint into ours: file, key, given, allowed."""
-    first = _deepest(error.errors(), values)
-    key = ".".join(_in_file(first, values))
-    if first["type"] == "extra_forbidden":
-        parts = [str(part) for part in first["loc"]]
-        return InputError(
-            source, key, "a key that is not known", nearest(parts[-1], _known_keys(parts[:-1]))
-        )
-    without_kind = first["type"] == "union_tag_not_found" and isinstance(first["input"], Mapping)
-    if first["type"] == "missing" or without_kind:
-        key += ".kind" if without_kind else ""
-        return InputError(source, key, "nothing", "a value; this key is required")
-    if first["type"] == "union_tag_invalid":
-        given, tags = first["ctx"]["tag"], first["ctx"]["expected_tags"].replace("'", "")
-        return InputError(source, f"{key}.kind", given, nearest(given, tags.split(", ")))
-    if first["type"] == "literal_error":
-        choices = re.findall(r"'([^']*)'", first["ctx"]["expected"])
-        return InputError(source, key, first["input"], nearest(str(first["input"]), choices))
-    return InputError(source, key, first["input"], _allowed(first))
-
-
-def _allowed(complaint: ErrorDetails) -> str:
-    """Say what may stand there in the words of the file's format, not of pydantic's types."""
-    match complaint["type"]:
-        case "dict_type" | "model_type" | "model_attributes_type" | "union_tag_not_found":
-            return "a table"
-        case "tuple_type":
-            return "a list"
-        case "path_type":
-            return "a file's path"
-        case "greater_than":
-            return f"greater than {complaint['ctx']['gt']:g}"
-        case "greater_than_equal":
-            return f"at least {complaint['ctx']['ge']:g}"
-        case "less_than":
-            return f"less than {complaint['ctx']['lt']:g}"
-        case "less_than_equal":
-            return f"at most {complaint['ctx']['le']:g}"
-        case "string_pattern_mismatch":
-            return "a letter or digit, then at most 63 letters, digits, spaces, and . _ -"
-        case "too_long":
-            return f"at most {complaint['ctx']['max_length']} values"
-        case "too_short":
-            fewest = complaint["ctx"]["min_length"]
-            return f"at least {fewest} value{'s' if fewest > 1 else ''}"
-    message = complaint["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    return message.partition(", unable to parse")[0]
-
-
-def _deepest(complaints: list[ErrorDetails], values: Any) -> ErrorDetails:
-    """Return the complaint about the first bad key that says most exactly where in it.
-
-    Where a key may hold one thing or another, pydantic complains once for each.
-    """
-    places = [_in_file(complaint, values) for complaint in complaints]
-    rivals = [i for i, place in enumerate(places) if place[: len(places[0])] == places[0]]
-    return complaints[max(rivals, key=lambda i: len(places[i]))]
-
-
-def _in_file(complaint: ErrorDetails, values: Any) -> list[str]:
-    """Leave out of a place what is no key of the file: the names pydantic has for its kinds."""
-    kept = []
-    about_keys = complaint["type"] in ("missing", "extra_forbidden")
-    parts = [str(part) for part in complaint["loc"]]
-    for i, part in enumerate(parts):
-        absent = about_keys and i == len(parts) - 1
-        if isinstance(values, Mapping) and (part in values or absent):
-            kept.append(part)
-            values = values.get(part)
-        elif isinstance(values, list | tuple) and part.isdigit():
-            kept.append(part)
-            values = dict(enumerate(values)).get(int(part))
-    return kept
 
 
 def _known_keys(parts: list[str]) -> list[str]:
@@ -277,8 +245,6 @@ def _check_tool(cell: Cell, tool: ToolTable) -> None:
         refuse("task.tool.camera", f"{tool.camera}, which {carrier} carries", "a fixed camera")
     if cell.cameras[cell.task.camera].arm is None:
         refuse("task.tool", "a second fixed camera", "a task.camera that the arm carries")
-    if cell.law.kind not in ("plain", "constrained"):
-        refuse("law.kind", cell.law.kind, "plain or constrained, which serve two cameras at once")
 
 
 def _check_sight(cell: Cell) -> None:

@@ -40,8 +40,8 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     return text, values
 
 
-def setting(key: str, text: str) -> dict[str, Any]:
-    """Return a dotted key and its value, TOML or a bare word, as nested tables.
+def setting(key: str, text: str) -> tuple[list[str], Any]:
+    """Return the parts of a dotted key and its value: TOML, a bare word, or None for nothing.
 
     Raises:
         InputError: if either is larger than any that is meant.
@@ -52,11 +52,9 @@ def setting(key: str, text: str) -> dict[str, Any]:
     parts = key.split(".")
     if len(parts) > _DEEPEST:
         raise InputError("--set", key, "a key of too many parts", f"at most {_DEEPEST} parts")
-    value = _value(key, text)
-    for part in reversed(parts):
-        value = {part: value}
-    _check(value, "--set", "")
-    return dict(value)
+    value = _value(key, text) if text.strip() else None
+    _check(value, "--set", key)
+    return parts, value
 
 
 def _value(key: str, text: str) -> Any:

@@ -1,6 +1,5 @@
-"""Control: the laws, how a camera twist becomes joint rates, and the guard behind them."""
+"""Control: objectives, limits, solvers, the servo that sums them, and the guard behind it."""
 
-from vergence.control.camera_share import CameraShare
 from vergence.control.conditioning import (
     CameraDirections,
     Resolvability,
@@ -9,9 +8,6 @@ from vergence.control.conditioning import (
     has_full_rank,
     resolvability,
 )
-from vergence.control.constrained import ConstrainedLaw
-from vergence.control.constrained_solver import ConstrainedSolver
-from vergence.control.eye_to_hand import EyeToHandLaw
 from vergence.control.guard import (
     Guard,
     closing_rates,
@@ -19,85 +15,93 @@ from vergence.control.guard import (
     guarded_steps,
     stoppable_speed,
 )
-from vergence.control.held_target_keeper import HeldTargetKeeper
-from vergence.control.image_based import ImageBased
-from vergence.control.image_motion import FeatureState, ImageMotion
+from vergence.control.image_motion import FeatureState, ImageMotion, MotionSettings
 from vergence.control.inner import InnerLaw
-from vergence.control.interpolator import MovingPose, interpolate, moved, pose_difference
 from vergence.control.law import Law
-from vergence.control.objective import Objective, TwistObjective
-from vergence.control.optimal_objective import OptimalTracking
-from vergence.control.optimal_tracking import AXES, OptimalTrackingLaw, axis_mask
-from vergence.control.path_tracking import PathTrackingLaw
-from vergence.control.plain import PlainLaw
-from vergence.control.position_based import PositionBasedLaw, hand_rates
-from vergence.control.redundancy import resolve_redundant
-from vergence.control.resolve import resolve_twist
-from vergence.control.several_cameras import SeveralCamerasLaw
-from vergence.control.target_keeper import TargetKeeper
-from vergence.control.tracking_kernels import (
-    PackedSetup,
-    TrackingGains,
+from vergence.control.limits import Limit, Limits, TargetView
+from vergence.control.mounting import CameraMounting
+from vergence.control.moving_pose import MovingPose, moved, pose_difference
+from vergence.control.objectives import (
+    AXES,
+    CameraState,
+    ImageBased,
+    InteractionModel,
+    JointQuadratic,
+    Objective,
+    OptimalTracking,
+    PointPose,
+    PositionBased,
+    Posture,
+    Quadratic,
     TrackingSetup,
-    TrackingTick,
-    image_model,
-    image_square,
+    axis_mask,
+    least_squares,
     optimal_tracking_tick,
     pack_setup,
-    tracking_displacement,
-    tracking_twist,
-    unpack_tick,
 )
+from vergence.control.pose_servo import PoseServo
+from vergence.control.servo import Servo, Situation
+from vergence.control.servo_settings import ServoSettings, WeightedObjective
+from vergence.control.solvers import (
+    DampedPseudoInverse,
+    PseudoInverse,
+    QuadraticProgram,
+    Solver,
+    resolve_redundant,
+    singular_fault,
+)
+from vergence.control.term import Term
 
 __all__ = [
     "AXES",
-    "HeldTargetKeeper",
-    "TargetKeeper",
-    "axis_mask",
-    "CameraShare",
-    "ConstrainedLaw",
-    "ConstrainedSolver",
-    "EyeToHandLaw",
+    "CameraDirections",
+    "CameraMounting",
+    "CameraState",
+    "DampedPseudoInverse",
     "FeatureState",
+    "Guard",
     "ImageBased",
     "ImageMotion",
+    "InnerLaw",
+    "InteractionModel",
+    "JointQuadratic",
+    "Law",
+    "Limit",
+    "Limits",
+    "MotionSettings",
+    "MovingPose",
     "Objective",
     "OptimalTracking",
-    "PathTrackingLaw",
-    "PlainLaw",
-    "SeveralCamerasLaw",
-    "TwistObjective",
-    "CameraDirections",
+    "PointPose",
+    "PoseServo",
+    "PositionBased",
+    "Posture",
+    "PseudoInverse",
+    "Quadratic",
+    "QuadraticProgram",
     "Resolvability",
-    "camera_directions",
-    "gain_matrix",
-    "has_full_rank",
-    "resolvability",
-    "Guard",
-    "InnerLaw",
-    "Law",
-    "MovingPose",
-    "OptimalTrackingLaw",
-    "PackedSetup",
-    "PositionBasedLaw",
-    "TrackingGains",
+    "Servo",
+    "ServoSettings",
+    "Situation",
+    "Solver",
+    "TargetView",
+    "Term",
     "TrackingSetup",
-    "TrackingTick",
+    "WeightedObjective",
+    "axis_mask",
+    "camera_directions",
     "closing_rates",
+    "gain_matrix",
     "guarded_step",
     "guarded_steps",
-    "hand_rates",
-    "image_model",
-    "image_square",
-    "interpolate",
+    "has_full_rank",
+    "least_squares",
     "moved",
     "optimal_tracking_tick",
     "pack_setup",
     "pose_difference",
+    "resolvability",
     "resolve_redundant",
-    "resolve_twist",
+    "singular_fault",
     "stoppable_speed",
-    "tracking_displacement",
-    "tracking_twist",
-    "unpack_tick",
 ]

@@ -1,13 +1,13 @@
 """Where the features are now, and how fast the target moves them: latency and motion undone."""
 
 from collections import deque
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera
+from vergence.control.mounting import CameraMounting
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import Arm, forward_kinematics
 from vergence.signals import ImagePoints, JointState
@@ -23,45 +23,55 @@ class FeatureState(NamedTuple):
     depth: FloatArray  # (M,) m, as believed
 
 
+class MotionSettings(NamedTuple):
+    """What is assumed of the features between their exposure and now.
+
+    Attributes:
+        feed_forward: whether the target's own motion is estimated and fed forward; else the target
+            is taken for stationary.
+        prediction: whether features are carried from their exposure to now; else they are taken as
+            they are, late.
+        flow_smoothing_s: time constant of the target's motion in the image, s.
+        carries_depth: whether the depth of the start is updated from the camera's motion, which is
+            right for a stationary target; else it stays as given.
+    """
+
+    feed_forward: bool = True
+    prediction: bool = True
+    flow_smoothing_s: float = 0.1
+    carries_depth: bool = False
+
+
 class ImageMotion:
     """Carries measured features from their exposure to now, through the camera's known motion.
 
     A feature seen at exposure is lifted to its depth, moved with the camera's motion since, which
-    the joints tell, and projected again; what consecutive pictures then leave unexplained is the
-    target's own motion, smoothed to a flow and extrapolated. So a law acts on the present although
-    pictures are late, and can feed the target's motion forward.
+    the joints tell, and projected again; what consecutive images then leave unexplained is the
+    target's own motion, smoothed to a flow and extrapolated. So a servo acts on the present
+    although images are late, and can feed the target's motion forward.
 
     Args:
-        arm: up to the camera.
-        camera: its intrinsics.
-        smoothing_s: time constant of the flow; 0 takes every difference at face value, and
-            infinity believes in a motionless target.
+        arm: up to its tip.
+        mounting: of the camera.
+        settings: what is assumed.
         memory_s: how far back the joints are remembered; more than the latency.
-        carries_depth: whether the depth of the start is carried on by the camera's motion, which is
-            right for a target that stands; else it stays as it is given.
     """
 
     def __init__(
         self,
         arm: Arm,
-        camera: Camera,
-        smoothing_s: float = 0.1,
+        mounting: CameraMounting,
+        settings: MotionSettings | None = None,
         memory_s: float = 2.0,
-        *,
-        carries_depth: bool = False,
     ) -> None:
-        self._arm, self._camera = arm, camera
-        self._smoothing_s, self._memory_s = smoothing_s, memory_s
+        settings = settings or MotionSettings()
+        self._arm, self._mounting, self._memory_s = arm, mounting, memory_s
+        self._smoothing_s = settings.flow_smoothing_s if settings.feed_forward else np.inf
+        self._prediction, self._carries_depth = settings.prediction, settings.carries_depth
         self._history: deque[tuple[float, FloatArray]] = deque()
         self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, q, points
         self._flow: FloatArray | None = None
-        self._carries_depth = carries_depth
         self._depth: FloatArray | None = None  # at the last exposure
-
-    @classmethod
-    def of(cls, arm: Arm, camera: Camera, smoothing_s: float | None) -> Self | None:
-        """Return one for a law that acts on pictures as they are unless a smoothing is given."""
-        return None if smoothing_s is None else cls(arm, camera, smoothing_s)
 
     def update(self, view: ImagePoints, depth: FloatArray, joints: JointState) -> FeatureState:
         """Take in a view and return the features now.
@@ -73,9 +83,11 @@ class ImageMotion:
         """
         self._remember(joints)
         q_exposed = self._joints_at(view.time)
-        points = self._camera.normalize(view.points_px)
+        points = self._mounting.camera.normalize(view.points_px)
         flow, exposed_depth = self._update(view, points, depth, q_exposed)
-        now = _seen_from(self._arm, points, exposed_depth, q_exposed, joints.position)
+        if not self._prediction:
+            return FeatureState(points, flow, exposed_depth)
+        now = self._seen_from(points, exposed_depth, q_exposed, joints.position)
         ahead = now[:, :2] + flow * (joints.time - view.time)
         return FeatureState(ahead, flow, _least(now[:, 2], depth) if self._carries_depth else depth)
 
@@ -90,16 +102,27 @@ class ImageMotion:
         if self._last is not None and view.time > self._last[0]:
             time, q_last, points_last = self._last
             elapsed = view.time - time
-            still = _seen_from(self._arm, points_last, self._depth, q_last, q)
+            stationary = self._seen_from(points_last, self._depth, q_last, q)
             share = elapsed / (elapsed + self._smoothing_s)
-            change = share * ((points - still[:, :2]) / elapsed - self._flow)
+            change = share * ((points - stationary[:, :2]) / elapsed - self._flow)
             known = view.found & np.isfinite(change).all(axis=1)
             self._flow = self._flow + np.where(known[:, None], change, 0.0)
             if self._carries_depth:
-                carried = np.where(np.isfinite(still[:, 2]), still[:, 2], self._depth)
+                carried = np.where(np.isfinite(stationary[:, 2]), stationary[:, 2], self._depth)
                 self._depth = _least(carried, depth)
         self._last = (view.time, q, points)
         return self._flow, self._depth
+
+    def _seen_from(
+        self, points: FloatArray, depth: FloatArray, q_from: FloatArray, q_to: FloatArray
+    ) -> FloatArray:
+        """Return stationary points (M, 3), seen at one configuration, as they look at another."""
+        there, here = (
+            self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q))
+            for q in (q_to, q_from)
+        )
+        seen: FloatArray = reproject(se3_compose(there, se3_inverse(here)), points, depth)
+        return seen
 
     def _remember(self, joints: JointState) -> None:
         self._history.append((joints.time, joints.position))
@@ -118,16 +141,6 @@ class ImageMotion:
         return later[1]
 
 
-def _seen_from(
-    arm: Arm, points: FloatArray, depth: FloatArray, q_from: FloatArray, q_to: FloatArray
-) -> FloatArray:
-    T_to_from = se3_compose(
-        se3_inverse(forward_kinematics(arm.chain, q_to)), forward_kinematics(arm.chain, q_from)
-    )
-    seen: FloatArray = reproject(T_to_from, points, depth)
-    return seen
-
-
 def _least(carried: FloatArray, believed: FloatArray) -> FloatArray:
     """Keep a carried depth (M,) in front of the camera, though it was believed too small."""
     return np.maximum(carried, _LEAST_DEPTH * believed)
@@ -135,7 +148,7 @@ def _least(carried: FloatArray, believed: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return motionless points as another camera pose sees them: x, y and their depth, (M, 3).
+    """Return stationary points as another camera pose sees them: x, y and their depth, (M, 3).
 
     Args:
         T_to_from: pose of the first camera in the second, (4, 4).

@@ -3,28 +3,37 @@
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from vergence.cell import Cell
-from vergence.cell.schema import Law
+from vergence.control import ServoSettings
 from vergence.errors import InputError, nearest
+from vergence.loading import Place, part_class
+from vergence.parts import field_names
 
 OWN = "own"
 PRESETS: Mapping[str, Mapping[str, Any]] = {
-    "image_based": {"kind": "plain"},
-    "image_based_desired": {"kind": "plain", "interaction": "desired"},
-    "image_based_mean": {"kind": "plain", "interaction": "mean"},
-    "optimal_tracking": {"kind": "optimal_tracking"},
-    "constrained": {"kind": "constrained"},
-    "constrained_tracking": {"kind": "constrained", "objective": "optimal_tracking"},
-}
-_SHARED = ("gain", "axes", "Q", "R", "depth_m", "flow_smoothing_s")
+    "image_based": {"kind": "image_based", "solver": "pseudo_inverse"},
+    "image_based_desired": {
+        "kind": "image_based", "solver": "pseudo_inverse", "interaction": "desired",
+    },
+    "image_based_mean": {"kind": "image_based", "solver": "pseudo_inverse", "interaction": "mean"},
+    "optimal_tracking": {"kind": "optimal_tracking", "solver": "pseudo_inverse"},
+    "constrained": {"kind": "image_based", "solver": "quadratic_program"},
+    "constrained_tracking": {"kind": "optimal_tracking", "solver": "quadratic_program"},
+    "constrained_pose": {"kind": "position_based", "solver": "quadratic_program"},
+}  # fmt: skip
+# What a preset takes from the cell's own law, so that the laws differ in nothing else.
+_SHARED = (
+    "gain", "axes", "Q", "R", "depth_m", "carries_depth", "feed_forward", "prediction",
+    "flow_smoothing_s", "filter_hz", "closed_loop_hz",
+)  # fmt: skip
 
 
 def usual_laws(cell: Cell) -> tuple[str, ...]:
     """Return the laws to hold against each other: those of the file, or some that suit its task."""
     if cell.laws:
         return (OWN, *cell.laws)
+    if cell.task.kind == "follow":
+        return OWN, "constrained_pose"
     return (
         (OWN, "image_based", "constrained") if cell.task.kind == "track" else (OWN, "constrained")
     )
@@ -33,27 +42,25 @@ def usual_laws(cell: Cell) -> tuple[str, ...]:
 def law_table(cell: Cell, name: str) -> dict[str, Any]:
     """Return the table of a law, complete, as JSON values.
 
-    A preset takes gain, weights, axes, believed depth and smoothing from the cell's own law where
-    both have them, so that the laws differ in nothing else.
-
     Args:
         cell: the cell.
-        name: "own", one of the file's `[laws.NAME]`, or one of `PRESETS`.
+        name: "own", one of the file's `[laws.NAME]`, one of `PRESETS`, or ``module:Class`` of an
+            objective.
 
     Raises:
         InputError: if there is no such law.
     """
     if name == OWN:
-        return cell.law.model_dump(mode="json")
+        return dict(cell.law.table())
     if name in cell.laws:
-        return cell.laws[name].model_dump(mode="json")
-    if name not in PRESETS:
-        raise InputError("laws", "", name, nearest(name, {OWN, *cell.laws, *PRESETS}))
-    own = cell.law.model_dump(mode="json", exclude_none=True)
-    adapter: TypeAdapter[Any] = TypeAdapter(Law)
-    fields = set(type(adapter.validate_python(PRESETS[name])).model_fields)
-    shared = {key: own[key] for key in _SHARED if key in own and key in fields}
-    table: dict[str, Any] = adapter.validate_python({**shared, **PRESETS[name]}).model_dump(
-        mode="json"
-    )
-    return table
+        return dict(cell.laws[name].table())
+    if ":" not in name and name not in PRESETS:
+        allowed = f"{nearest(name, {OWN, *cell.laws, *PRESETS})}, or module:Class"
+        raise InputError("laws", "", name, allowed)
+    asked = PRESETS.get(name, {"kind": name})
+    place = Place(str(cell.path), f"laws.{name}", cell.path.parent)
+    known = {*field_names(part_class("objective", asked["kind"], place))}
+    known |= {*field_names(ServoSettings)}
+    own = cell.law.table()
+    shared = {key: own[key] for key in _SHARED if key in own and key in known}
+    return ServoSettings.from_table({**shared, **asked}, place).table()

@@ -1,7 +1,6 @@
 """Visual features: what is seen, and how it moves when the camera does."""
 
-from vergence.features.points import interaction_matrix_points
+from vergence.features.feature import Feature
+from vergence.features.points import Points, interaction_matrix_points
 
-__all__ = [
-    "interaction_matrix_points",
-]
+__all__ = ["Feature", "Points", "interaction_matrix_points"]

@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
+from vergence.features.feature import Feature
+from vergence.parts import as_part
 
 Row = tuple[float, float, float, float, float, float]
 
@@ -39,3 +41,21 @@ def point_rows(x: float, y: float, depth: float) -> tuple[Row, Row]:
         (-near, 0.0, x * near, x * y, -(1.0 + x * x), y),
         (0.0, -near, y * near, 1.0 + y * y, -x * y, -x),
     )
+
+
+@as_part("feature", "points")
+class Points(Feature):
+    """Image points themselves: s = (x1, y1, x2, y2, …)."""
+
+    def value(self) -> FloatArray:
+        """Return the coordinates, (2M,)."""
+        return self.points.ravel()
+
+    def interaction(self) -> FloatArray:
+        """Return L (2M, 6), see `interaction_matrix_points`."""
+        L: FloatArray = interaction_matrix_points(self.points, self.depth_m)
+        return L
+
+    def drift(self, flow: FloatArray, step_s: float = 1e-4) -> FloatArray:
+        """Return the flow itself, (2M,)."""
+        return flow.ravel()

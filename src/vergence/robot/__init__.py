@@ -22,7 +22,6 @@ from vergence.robot.manipulability import (
     transmissibility_measure,
     yoshikawa_measure,
 )
-from vergence.robot.reversal import reverse_arm
 
 __all__ = [
     "goal_configurations",
@@ -40,7 +39,6 @@ __all__ = [
     "numeric_camera_gradient",
     "per_joint_limit_penalty",
     "relative_manipulability",
-    "reverse_arm",
     "transmissibility_measure",
     "world_jacobian",
     "yoshikawa_measure",

@@ -19,4 +19,4 @@ class JointCommand:
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command
     fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
-    given_up: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much
+    slack: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much

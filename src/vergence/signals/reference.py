@@ -1,4 +1,4 @@
-"""What the law should reach now."""
+"""What the servo should reach now."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,15 +9,16 @@ from vergence.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The wanted features, or the wanted relative pose, at one instant; unused parts are None."""
+    """The desired features, or the desired relative pose, at one instant; unused parts are None."""
 
     time: float  # s
     points_px: FloatArray | None = None  # (M, 2) s*
     velocity_px: FloatArray | None = None  # (M, 2) ds*/dt, px/s
     depth_m: FloatArray | None = None  # (M,) depth of the points as the planner knows it
-    T_camera_target: FloatArray | None = None  # (4, 4) wanted relative pose
+    desired_depth_m: FloatArray | None = None  # (M,) depth of the points at the goal
+    T_camera_target: FloatArray | None = None  # (4, 4) desired relative pose
     joint_rates: FloatArray | None = None  # (n,) at which the planner would get there
-    # Wanted features (M, 2) in the pictures of further cameras, by their names.
+    # Desired features (M, 2) in the images of further cameras, by their names.
     elsewhere_px: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def at(self, time: float) -> Self:

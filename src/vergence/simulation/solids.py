@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control.sight_lines import AXES, COLUMNS, HALF, MIDDLE, RADIUS
+from vergence.control.limits import AXES, COLUMNS, HALF, MIDDLE, RADIUS
 
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
@@ -42,7 +42,7 @@ class Solids:
             self._solids[row, HALF : HALF + 3], self._solids[row, RADIUS] = half, radius
 
     def __call__(self) -> FloatArray:
-        """Return the solids now, (K, 16); see `vergence.control.sight_lines`."""
+        """Return the solids now, (K, 16); see `vergence.control.limits`."""
         axes = self._data.geom_xmat[self._geoms]
         self._solids[:, AXES : AXES + 9] = axes
         turned = (axes.reshape(-1, 3, 3) @ self._offset[:, :, None])[:, :, 0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control.constraints import SOFT
+from vergence.control.limits import RELAXED
 from vergence.robot import Arm
 from vergence.runtime import Summary
 from vergence.runtime.recording import TickRecord
@@ -173,7 +173,7 @@ class _Watch:
     def __init__(self) -> None:
         self.q: list[FloatArray] = []
         self.error_px: list[float] = []
-        self.given_up: list[Mapping[str, float]] = []
+        self.slack: list[Mapping[str, float]] = []
 
     def tick(self, record: TickRecord) -> None:
         if record.observation is None or record.reference is None:
@@ -182,7 +182,7 @@ class _Watch:
         assert wanted is not None
         self.q.append(record.sample.joints["arm"].position)
         self.error_px.append(float(np.abs(view.points_px - wanted).max()))
-        self.given_up += [command.given_up for command in record.commands.values()]
+        self.slack += [command.slack for command in record.commands.values()]
 
     def begin(self, info: object) -> None: ...
 
@@ -251,7 +251,7 @@ def _conflict(arm: Arm) -> Check:
     cell = replace(cell, features=_SQUARE, start=start)
     watch = _Watch()
     excess, outcome = run_ideal(cell, "constrained image-based", 1.0, listeners=(watch,))
-    named = {name for tick in watch.given_up for name in tick}
+    named = {name for tick in watch.slack for name in tick}
     kept = excess.rate <= 1e-12 and excess.position <= 0.0
     lost = outcome.kind in (OutcomeKind.TARGET_LOST, OutcomeKind.COMPLETED)
     return Check(
@@ -259,6 +259,6 @@ def _conflict(arm: Arm) -> Check:
         "what was given up is named; joint limits are not in it",
         len(named),
         "constraints",
-        kept and lost and "view" in named and named <= set(SOFT),
+        kept and lost and "view" in named and named <= set(RELAXED),
         ", ".join(sorted(named)) or "nothing was named",
     )

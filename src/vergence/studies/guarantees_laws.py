@@ -1,25 +1,26 @@
 """A camera brought from a start to a goal before four points: laws plain, constrained, planned."""
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
-from vergence.camera import Camera
+from vergence.arrays import FloatArray
 from vergence.control import (
-    ConstrainedLaw,
-    ConstrainedSolver,
     ImageBased,
     Law,
+    Limits,
+    MotionSettings,
+    Objective,
     OptimalTracking,
-    PlainLaw,
+    PointPose,
+    PseudoInverse,
+    QuadraticProgram,
+    Servo,
+    Situation,
 )
-from vergence.control.image_motion import FeatureState
-from vergence.control.objective import Objective, TwistObjective
 from vergence.estimation import ExactPoints
-from vergence.geometry import se3_inverse, so3_log, transform_points
+from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajectory
 from vergence.runtime import Loop, Patience
 from vergence.runtime.stages import Planner
@@ -39,49 +40,19 @@ REST_S = (
 )
 CAMERA_SPEED = 0.25  # m/s, of a plan
 SETTLE_S = 4.0  # after a plan's end
+SITUATION = Situation(1.0 / RATE_HZ, MotionSettings(feed_forward=False))  # a stationary target
 
 PLANNED = "planned, constrained"
 PLAIN, CONSTRAINED = "plain", "constrained"
 VIEW_MARGIN_PX, JOINT_MARGIN = 10.0, 0.01  # kept without a plan; less than starts and goals have
 
 
-class PositionBased:
-    """Takes the camera straight to where it should be: v = -λ (Rᵀ t, θu) of its pose in the goal.
-
-    The pose is that which brings the points where they are, by their depths, onto those at the
-    goal.
-
-    Args:
-        points_goal: the points in the camera's frame at the goal, (N, 3), m.
-        gain: λ, 1/s.
-    """
-
-    def __init__(self, points_goal: FloatArray, gain: float) -> None:
-        self._goal, self._gain = points_goal, gain
-
-    def twist_objective(
-        self, features: FeatureState, found: BoolArray, depth: FloatArray, reference: Reference
-    ) -> TwistObjective:
-        """Return the quadratic for this tick."""
-        rays = np.column_stack((features.points, np.ones(len(depth))))
-        seen = rays * depth[:, None]
-        U, _, Vt = np.linalg.svd((seen - seen.mean(0)).T @ (self._goal - self._goal.mean(0)))
-        mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-        R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
-        t = self._goal.mean(0) - R @ seen.mean(0)
-        return TwistObjective(np.eye(6), -self._gain * np.concatenate((R.T @ t, so3_log(R))))
-
-
-OBJECTIVES: dict[str, Callable[[Camera, FloatArray], Objective]] = {
-    "image-based, current L": lambda camera, _: ImageBased(camera, GAIN),
-    "image-based, desired L": lambda camera, goal: ImageBased(
-        camera, GAIN, "desired", goal_depth_m=goal[:, 2]
-    ),
-    "image-based, mean L": lambda camera, goal: ImageBased(
-        camera, GAIN, "mean", goal_depth_m=goal[:, 2]
-    ),
-    "optimal tracking": lambda camera, _: OptimalTracking(camera, R=1.0, period=1.0 / RATE_HZ),
-    "position-based": lambda _, goal: PositionBased(goal, GAIN),
+OBJECTIVES: dict[str, Objective] = {
+    "image-based, current L": ImageBased(gain=GAIN),
+    "image-based, desired L": ImageBased(gain=GAIN, interaction="desired"),
+    "image-based, mean L": ImageBased(gain=GAIN, interaction="mean"),
+    "optimal tracking": OptimalTracking(Q=8e-6, R=1.0),
+    "position-based": PointPose(gain=GAIN),
 }
 LAWS = (*((name, how) for name in OBJECTIVES for how in (PLAIN, CONSTRAINED)), (PLANNED, ""))
 
@@ -101,15 +72,17 @@ class _StrictView:
 
 
 class _KnownTarget:
-    """Wants the goal's picture, and knows how far away the points are now."""
+    """Wants the goal's image, and knows how far away the points are now and at the goal."""
 
-    def __init__(self, driver: IdealDriver, goal_px: FloatArray) -> None:
-        self._driver, self._goal_px = driver, goal_px
+    def __init__(self, driver: IdealDriver, goal_px: FloatArray, goal_depth_m: FloatArray) -> None:
+        self._driver, self._goal_px, self._goal_depth_m = driver, goal_px, goal_depth_m
 
     def reference(self, time: float) -> Reference:
         truth = self._driver.frame().truth
         assert truth is not None
-        return Reference(time, self._goal_px, depth_m=truth.depth_m)
+        return Reference(
+            time, self._goal_px, depth_m=truth.depth_m, desired_depth_m=self._goal_depth_m
+        )
 
 
 class _UntilRest:
@@ -135,13 +108,20 @@ def servo(scene: Scene, name: str, how: str) -> Ending:
         return _planned(scene)
     driver = _driver(scene)
     goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
-    objective = OBJECTIVES[name](scene.camera, goal)
     depth = goal[:, 2].copy()
-    built: Law = PlainLaw(scene.arm, scene.camera, objective, depth, singular_below=0.0)
     if how == CONSTRAINED:
-        built = _constrained(scene, objective, depth, VIEW_MARGIN_PX, JOINT_MARGIN)
+        built = _constrained(scene, OBJECTIVES[name], depth, VIEW_MARGIN_PX, JOINT_MARGIN)
+    else:
+        built = Servo(
+            scene.arm,
+            scene.camera,
+            OBJECTIVES[name],
+            solver=PseudoInverse(singular_below=0.0),
+            depth_m=depth,
+            situation=SITUATION,
+        )
     law = _UntilRest(built, scene.arm.rate_max)
-    return _run(scene, driver, law, _KnownTarget(driver, scene.goal_px), SERVO_S)
+    return _run(scene, driver, law, _KnownTarget(driver, scene.goal_px, depth), SERVO_S)
 
 
 def _planned(scene: Scene) -> Ending:
@@ -149,7 +129,7 @@ def _planned(scene: Scene) -> Ending:
     if plan is None:
         return Ending.NO_PLAN
     trajectory = Trajectory.of(plan, CAMERA_SPEED)
-    objective = ImageBased(scene.camera, 2.0 * GAIN, "desired")
+    objective = ImageBased(gain=2.0 * GAIN, interaction="desired")
     kept = 0.5 * plan.image_margin_px, 0.5 * plan.joint_margin
     # The plan keeps clear of borders by itself: near them it is not to be slowed, and where the
     # image says little the joints are to go the plan's way.
@@ -190,19 +170,24 @@ def _constrained(
     margin_joint: float,
     approach_rate: float = 2.0,
     damping: float = 1e-6,
-) -> ConstrainedLaw:
+) -> Servo:
     """Return the law with margins to the image's border and, of half the range, to joint limits."""
-    solver = ConstrainedSolver(
-        scene.arm,
-        scene.camera,
-        period=1.0 / RATE_HZ,
+    limits = Limits(
         view_margin_px=margin_px,
         joint_margin=0.5 * margin_joint,
         depth_range=(0.9, 1.1),
-        approach_rate=approach_rate,
-        damping=damping,
+        approach_rate_hz=approach_rate,
+        manipulability_share=0.0,
     )
-    return ConstrainedLaw(solver, objective, depth, flow_smoothing_s=np.inf)
+    return Servo(
+        scene.arm,
+        scene.camera,
+        objective,
+        limits=limits,
+        solver=QuadraticProgram(damping=damping),
+        depth_m=depth,
+        situation=SITUATION,
+    )
 
 
 def _run(

@@ -9,15 +9,22 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.control import Law, OptimalTrackingLaw
-from vergence.control.constrained import ConstrainedLaw
-from vergence.control.constrained_solver import ConstrainedSolver
-from vergence.control.image_based import ImageBased
-from vergence.control.optimal_objective import OptimalTracking
-from vergence.control.path_tracking import PathTrackingLaw
-from vergence.control.plain import PlainLaw
-from vergence.control.position_based import PositionBasedLaw
-from vergence.control.target_keeper import TargetKeeper
+from vergence.control import (
+    CameraMounting,
+    DampedPseudoInverse,
+    ImageBased,
+    Law,
+    Limits,
+    MotionSettings,
+    Objective,
+    OptimalTracking,
+    PoseServo,
+    PositionBased,
+    PseudoInverse,
+    QuadraticProgram,
+    Servo,
+    Situation,
+)
 from vergence.estimation import ExactPoints
 from vergence.geometry import se3, se3_inverse, so3_exp
 from vergence.planning import FixedReference
@@ -43,6 +50,7 @@ LAWS = (
 # Six turning joints, seven with a track, three that slide and three that turn, six, seven.
 CELLS = ("puma560", "lippiello2005", "gantry", "ur5", "panda")
 RUN_S = 2.0
+LIMITS = Limits(manipulability_share=0.0)  # a random start may be singular
 
 
 class Excess(NamedTuple):
@@ -154,36 +162,56 @@ def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray)
 
 def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
     """Make one of `LAWS`."""
+    if "position-based" in law:
+        return _pose_servo(law, cell)
     arm, camera, period = cell.arm, cell.camera, 1.0 / cell.rate_hz
-    inner = 1.0 / cell.inner_rate_hz
-    solver = ConstrainedSolver(arm, camera, period=period, S=1e-3)
+    as_it_is = MotionSettings(feed_forward=False, prediction=False)
     match law:
         case "plain":
-            return PlainLaw(arm, camera, ImageBased(camera, gain=2.0), depth, singular_below=0.0)
-        case "optimal tracking":
-            axes, avoiding = ("x", "y", "rx", "ry"), ("x", "y")
-            return OptimalTrackingLaw(
-                arm, camera, depth, axes=axes, avoidance_axes=avoiding, S=1e-3, period=period,
-                singular_below=1e-4,
+            stationary = Situation(period, MotionSettings(feed_forward=False))
+            solver = PseudoInverse(singular_below=0.0)
+            return Servo(
+                arm, camera, ImageBased(gain=2.0), solver=solver, depth_m=depth,
+                situation=stationary,
             )  # fmt: skip
-        case "position-based":
-            return PositionBasedLaw(arm, inner)
-        case "constrained position-based":
-            inner_solver = ConstrainedSolver(arm, camera, period=inner, depth_range=(0.9, 1.1))
-            keeper = TargetKeeper(inner_solver, cell.features)
-            return PositionBasedLaw(arm, inner, keeper=keeper)
+        case "optimal tracking":
+            tracking = OptimalTracking(
+                axes=("x", "y", "rx", "ry"), avoidance_axes=("x", "y"), Q=8e-6, S=1e-3
+            )
+            solver = PseudoInverse(singular_below=1e-4)
+            return Servo(
+                arm, camera, tracking, solver=solver, depth_m=depth,
+                situation=Situation(period, as_it_is),
+            )  # fmt: skip
         case "path tracking":
-            return PathTrackingLaw(arm, camera)
-        case "constrained path tracking":
-            return ConstrainedLaw(solver, ImageBased(camera, 2.0, "desired"), depth)
-        case "constrained image-based":
-            objective = ImageBased(camera, gain=2.0)
-            return ConstrainedLaw(solver, objective, depth)
-        case _:
-            # Depth is free as well: where the arm has to look back over its base it moves up.
-            with_depth = ("x", "y", "z", "rx", "ry")
-            tracking = OptimalTracking(camera, with_depth, R=1.0, period=period)
-            return ConstrainedLaw(solver, tracking, depth)
+            return Servo(
+                arm, camera, ImageBased(gain=2.0, interaction="desired"),
+                solver=DampedPseudoInverse(singular_below=1e-2), depth_m=depth,
+                situation=Situation(period, as_it_is, fewest=3),
+            )  # fmt: skip
+    objectives: dict[str, Objective] = {
+        "constrained image-based": ImageBased(gain=2.0),
+        "constrained path tracking": ImageBased(gain=2.0, interaction="desired"),
+        # Depth is free as well: where the arm has to look back over its base it moves up.
+        "constrained tracking": OptimalTracking(axes=("x", "y", "z", "rx", "ry"), Q=8e-6, R=1.0),
+    }
+    return Servo(
+        arm, camera, objectives[law], limits=LIMITS, solver=QuadraticProgram(S=1e-3), depth_m=depth,
+        situation=Situation(period),
+    )  # fmt: skip
+
+
+def _pose_servo(law: str, cell: IdealCell) -> PoseServo:
+    constrained = law.startswith("constrained")
+    return PoseServo(
+        cell.arm,
+        CameraMounting(cell.camera),
+        PositionBased(),
+        limits=LIMITS if constrained else None,
+        solver=QuadraticProgram() if constrained else DampedPseudoInverse(),
+        corners=cell.features if constrained else None,
+        situation=Situation(1.0 / cell.inner_rate_hz, depth_range=(0.9, 1.1)),
+    )
 
 
 def arms() -> tuple[Arm, ...]:

@@ -8,9 +8,17 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.control.path_tracking import PathTrackingLaw, tracking_twist
-from vergence.control.redundancy import resolve_redundant
-from vergence.features import interaction_matrix_points
+from vergence.control import (
+    DampedPseudoInverse,
+    ImageBased,
+    InteractionModel,
+    Law,
+    MotionSettings,
+    Servo,
+    Situation,
+    resolve_redundant,
+)
+from vergence.features import Points
 from vergence.geometry import se3_compose, se3_inverse, so3_log, transform_points
 from vergence.planning import (
     OptimisedPlanner,
@@ -50,6 +58,7 @@ PLANNERS: dict[str, Callable[[], OptimisedPlanner | PotentialFieldPlanner]] = {
 CLASSICAL_GAIN = 0.5  # 1/s; rates are slowed to the joints' limits besides
 CLASSICAL_S = 60.0  # given to the classical laws
 GAIN = 2.0  # of the tracking law, 1/s
+AS_IT_IS = MotionSettings(feed_forward=False, prediction=False)  # no delay, a stationary target
 SETTLE_S = 4.0  # after a plan's end
 PLANS = 6  # at most, one after the other
 ROOM = 0.003  # to a joint limit, of half the range; with less the arm stops and plans again
@@ -106,7 +115,13 @@ def _follow_plans(
             refused = Motion(Ending.NO_PLAN, plan, here.q_start[None], px, np.array([np.inf]))
             return refused if motion is None else motion.then(refused)
         trajectory = Trajectory.of(plan, CAMERA_SPEED)
-        law = PathTrackingLaw(here.arm, belief.camera, GAIN)
+        law = Servo(
+            here.arm,
+            belief.camera,
+            ImageBased(gain=GAIN, interaction="desired"),
+            solver=DampedPseudoInverse(singular_below=1e-2),
+            situation=Situation(PERIOD, AS_IT_IS, fewest=3),
+        )
         time = trajectory.duration
         part = loop.run(
             here.q_start,
@@ -183,28 +198,25 @@ def _true_distance(scene: Scene, normal: FloatArray) -> float:
 
 def image_based(scene: Scene) -> Steer:
     """Return v = -λ L⁺ (s - s*), L at the current points with their true depths."""
-    return _image_based(scene, 1.0)
+    return _image_based(scene, "current")
 
 
 def image_based_mean(scene: Scene) -> Steer:
     """Return the same with the mean of L at the current and at the desired points."""
-    return _image_based(scene, 0.5)
+    return _image_based(scene, "mean")
 
 
-def _image_based(scene: Scene, current: float) -> Steer:
+def _image_based(scene: Scene, interaction: InteractionModel) -> Steer:
     T_goal_world = se3_inverse(scene.T_world_goal.copy())
-    goal = scene.camera.normalize(scene.goal_px)
-    goal_depth = transform_points(T_goal_world, scene.points_world)[:, 2].copy()
-    L_goal = interaction_matrix_points(goal, goal_depth)
-    rest = np.zeros(2 * len(goal))
+    goal_depth = transform_points(T_goal_world, scene.points_world)[:, 2]
+    goal = Points(scene.camera.normalize(scene.goal_px), goal_depth)
+    objective = ImageBased(gain=CLASSICAL_GAIN, interaction=interaction)
 
     def steer(_time: float, q: FloatArray, px: FloatArray) -> FloatArray:
         T_camera_world = se3_inverse(scene.arm.forward_kinematics(q))
-        depth = transform_points(T_camera_world, scene.points_world)[:, 2].copy()
-        seen = scene.camera.normalize(px)
-        L = current * interaction_matrix_points(seen, depth) + (1.0 - current) * L_goal
-        twist = tracking_twist(L, (seen - goal).ravel(), rest, CLASSICAL_GAIN, 1e-6)
-        return _resolved(scene.arm, q, twist)
+        depth = transform_points(T_camera_world, scene.points_world)[:, 2]
+        seen = Points(scene.camera.normalize(px), depth)
+        return _resolved(scene.arm, q, objective.twist(seen, goal))
 
     return steer
 
@@ -253,7 +265,7 @@ CLASSICAL: dict[str, Callable[[Scene], Steer]] = {
 }
 
 
-def tracking(law: PathTrackingLaw, trajectory: Trajectory) -> Steer:
+def tracking(law: Law, trajectory: Trajectory) -> Steer:
     """Return the law of section 5 along a trajectory."""
 
     def steer(time: float, q: FloatArray, px: FloatArray) -> FloatArray:

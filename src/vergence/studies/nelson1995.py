@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.assembly import run_cell
 from vergence.cell import Cell, load_cell
-from vergence.cell.schema import OptimalTrackingTable
+from vergence.control import OptimalTracking
 from vergence.signals import OutcomeKind
 from vergence.studies import nelson1995_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
@@ -177,8 +177,8 @@ def _stability(cell: Cell, quick: bool, progress: Progress) -> Check:
         target={"motion": {"kind": "step", "offset_m": [0.014, 0.0, 0.0], "time_s": 0.5}},
     )
 
-    law = cell.law
-    assert isinstance(law, OptimalTrackingTable)
+    law = cell.law.objective
+    assert isinstance(law, OptimalTracking)
 
     def stable(factor: float) -> bool:
         progress(f"stability at {factor:.2f} Q", 0.45)

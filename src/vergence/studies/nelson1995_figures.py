@@ -7,7 +7,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
-from vergence.cell.schema import OptimalTrackingTable
+from vergence.control import OptimalTracking
 from vergence.drawing import COLORS, curve, figure, legend
 from vergence.robot import Arm, joint_limit_penalty, manipulability
 from vergence.simulation import SimulatedDriver
@@ -28,12 +28,13 @@ def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
     driver = SimulatedDriver(cell, images=False)
     arm = driver.world.arm_to_camera(cell.task.camera)
     start = driver.read().joints[cell.task.arm].position
-    assert isinstance(cell.law, OptimalTrackingTable)
+    objective = cell.law.objective
+    assert isinstance(objective, OptimalTracking)
     two = [trials["two_axis", sign] for sign in (-1, 1)]
     avoiding = [trials["avoidance", sign] for sign in (-1, 1)]
     drawn = {
         "figure_04": (
-            _measures(arm, start, cell.law.penalty_k),
+            _measures(arm, start, objective.penalty_k),
             "Figure 4: Yoshikawa's measure squared and the modified measure w' as joint 5 moves.",
         ),
         "figure_05": (_penalties(arm, start), "Figure 5: the penalty P for various k."),

@@ -19,7 +19,7 @@ def constraints_figure(trace: ArmTrace) -> Panels | None:
     axes = out.axes[0]
     for row, name in enumerate(names):
         pushed = np.array([name in active for active in trace.active])
-        bent = np.array([name in given_up for given_up in trace.given_up])
+        bent = np.array([name in slack for slack in trace.slack])
         for label, when, color in (("pushed", pushed, _PUSHED), ("gave way", bent, _BENT)):
             axes.broken_barh(
                 spans(trace.time, when),
@@ -37,7 +37,7 @@ def constraints_figure(trace: ArmTrace) -> Panels | None:
 
 def constraint_names(trace: ArmTrace) -> list[str]:
     """Return the constraints that ever shaped a command, in the order in which they first did."""
-    ticks = zip(trace.active, trace.given_up, strict=True)
+    ticks = zip(trace.active, trace.slack, strict=True)
     return list(dict.fromkeys(name for tick in ticks for names in tick for name in names))
 
 

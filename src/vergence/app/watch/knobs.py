@@ -1,123 +1,104 @@
-"""The laws that may be chosen while a cell runs, and the numbers of each that may be turned."""
+"""The laws that may be chosen while a cell runs, and the numbers of each that may be changed."""
 
 import json
-from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, get_args, get_origin
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
 
 from vergence.cell import Cell
-from vergence.cell.schema import (
-    ConstrainedTable,
-    OptimalTrackingTable,
-    PathTrackingTable,
-    PlainTable,
-    PositionBasedTable,
-    Table,
-)
+from vergence.control import PositionBased, QuadraticProgram, ServoSettings
 from vergence.errors import InputError
+from vergence.parts import kind_of
+from vergence.registry import kinds
 
-LAWS: dict[str, tuple[type[Table], ...]] = {  # by the kind of the task
-    "track": (OptimalTrackingTable, ConstrainedTable, PlainTable),
-    "follow": (PositionBasedTable, ConstrainedTable),
-    "reach": (PathTrackingTable, ConstrainedTable),
-}
-
-
-class Knob(NamedTuple):
-    """What the page says about a number or a choice of a law."""
-
-    label: str
-    unit: str = ""
-
-
-KNOBS = {
-    "gain": Knob("gain λ", "1/s"),
-    "objective": Knob("objective"),
-    "interaction": Knob("interaction matrix at"),
-    "Q": Knob("weight of the error Q", "1/px²"),
-    "R": Knob("weight of the motion R"),
-    "S": Knob("avoidance S"),
-    "penalty": Knob("joint limit penalty"),
-    "penalty_k": Knob("its steepness k"),
-    "depth_m": Knob("believed depth", "m"),
-    "carries_depth": Knob("carry the depth through the motion"),
-    "avoidance_speed_max_m_s": Knob("fastest avoidance", "m/s"),
-    "singular_below": Knob("singular below"),
-    "filter_hz": Knob("interpolating filter", "Hz"),
-    "damping": Knob("its damping"),
-    "feed_forward": Knob("feed the target's velocity forward"),
-    "prediction": Knob("predict from the exposure to now"),
-    "closed_loop_hz": Knob("closed loop", "Hz"),
-    "null_space": Knob("pull to mid-range", "1/s"),
-    "view_margin_px": Knob("margin of the picture", "px"),
-    "joint_margin": Knob("margin of the joints", "of the range"),
-    "manipulability_share": Knob("least manipulability", "of the start's"),
-    "approach_rate_hz": Knob("approach to a border", "1/s"),
-    "flow_smoothing_s": Knob("smoothing of the flow", "s"),
-}
-
-UNITS = {
-    "_m_s": "m/s",
-    "_deg_s": "°/s",
-    "_hz": "Hz",
-    "_px": "px",
-    "_deg": "°",
-    "_m": "m",
-    "_s": "s",
-}
+# Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
+# others, which act on features in the image.
+_ALWAYS = ("feed_forward", "prediction")
+_ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m", "carries_depth")
 
 
 def law_choices(cell: Cell) -> dict[str, str]:
     """Return the laws that fit the cell's task: names, and the TOML that asks for each."""
-    own = cell.law.kind
-    choices = {f"{own} (as in the cell)": _toml(cell.law)}
-    fitting = LAWS[cell.task.kind]
-    for name, table in cell.laws.items():
-        if isinstance(table, fitting):
-            choices[name] = _toml(table)
-    for kind in fitting:
-        name = get_args(kind.model_fields["kind"].annotation)[0]
-        if name != own and name not in choices and _suits(cell, name):
-            choices[name] = f'{{ kind = "{name}" }}'
+    own: ServoSettings = cell.law
+    choices = {f"{own.kind} (as in the cell)": _toml(own)}
+    for name, settings in cell.laws.items():
+        choices[name] = _toml(settings)
+    for kind in kinds("objective"):
+        if kind != own.kind and kind not in choices and _suits(cell, kind):
+            choices[kind] = f'{{ kind = "{kind}" }}'
+    for kind in kinds("solver"):
+        if kind != kind_of(own.solver):
+            name = f"{own.kind}, {kind}"
+            table = own.table(defaults=False) | {"solver": kind}
+            table.pop("limits", None)
+            choices[name] = _inline(table)
     return choices
 
 
-def knobs(law: Table) -> list[dict[str, Any]]:
-    """Return what may be turned on a law: keys, labels, units, values, and what is allowed."""
+def knobs(law: ServoSettings) -> list[dict[str, Any]]:
+    """Return what may be changed on a law: keys, labels, units, values and ranges.
+
+    Only what acts is there: limits only with a solver that keeps them, the flow's smoothing only
+    where the target's motion is fed forward.
+    """
     found = []
-    for key, about in type(law).model_fields.items():
-        if key == "kind":
+    if len(law.objectives) == 1:
+        found += list(_of_part("", law.objective))
+    found += list(_of_part("solver.", law.solver))
+    if isinstance(law.solver, QuadraticProgram) and law.limits is not None:
+        found += list(_of_part("limits.", law.limits))
+    acting = _ALWAYS if isinstance(law.objective, PositionBased) else _ON_FEATURES
+    for knob in _of_part("", law):
+        if knob["key"] not in acting:
             continue
-        value = getattr(law, key)
-        knob: dict[str, Any] = {"key": key, **_about(key)._asdict(), "value": value}
-        if isinstance(value, bool):
-            knob["kind"] = "switch"
-        elif isinstance(value, int | float):
-            knob["kind"] = "number"
-        elif isinstance(value, str) and get_origin(about.annotation) is Literal:
-            knob |= {"kind": "choice", "choices": list(get_args(about.annotation))}
-        else:
+        if knob["key"] == "flow_smoothing_s" and not law.feed_forward:
             continue
         found.append(knob)
     return found
 
 
 def turned(key: str, value: Any) -> dict[str, str]:
-    """Return the setting of a cell file, key and TOML, that a turned knob stands for."""
+    """Return the setting of a cell file, key and TOML, that a changed knob stands for."""
     return {f"law.{key}": json.dumps(value)}
 
 
-def _about(key: str) -> Knob:
-    """Return what is known of a knob; of one that is new, what its name says."""
-    if key in KNOBS:
-        return KNOBS[key]
-    for suffix, unit in UNITS.items():
-        if key.endswith(suffix):
-            return Knob(key.removesuffix(suffix).replace("_", " "), unit)
-    return Knob(key.replace("_", " "))
+def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
+    """Yield the knobs of a part's fields."""
+    for name, about in type(part).__pydantic_fields__.items():
+        extra = about.json_schema_extra or {}
+        if not extra.get("live", False):
+            continue
+        value = getattr(part, name)
+        knob: dict[str, Any] = {
+            "key": begin + name,
+            "label": (begin + name).replace("_", " ").replace(".", ": "),
+            "unit": extra.get("unit", ""),
+            "value": value,
+        }
+        if isinstance(value, bool):
+            knob["kind"] = "switch"
+        elif isinstance(value, int | float):
+            knob |= {"kind": "number", **_range(about)}
+        elif isinstance(value, str) and get_origin(about.annotation) is Literal:
+            knob |= {"kind": "choice", "choices": list(get_args(about.annotation))}
+        else:
+            continue
+        yield knob
+
+
+def _range(about: Any) -> dict[str, float]:
+    """Return the lowest and the highest value that a field takes."""
+    found = {}
+    for bound in about.metadata:
+        for name, end in (("gt", "low"), ("ge", "low"), ("lt", "high"), ("le", "high")):
+            if (value := getattr(bound, name, None)) is not None:
+                found[end] = float(value)
+    return found
 
 
 def _suits(cell: Cell, kind: str) -> bool:
-    """Whether a cell takes a law with the numbers it has by itself."""
+    """Whether a cell takes an objective with the numbers it has by itself."""
+    if (kind == "position_based") != (cell.task.kind == "follow") or kind == "posture":
+        return False
     try:
         cell.replace(law={"kind": kind})
     except InputError:
@@ -125,7 +106,15 @@ def _suits(cell: Cell, kind: str) -> bool:
     return True
 
 
-def _toml(table: Table) -> str:
-    values: Mapping[str, Any] = table.model_dump(exclude_none=True)
-    pairs = (f"{key} = {json.dumps(value)}" for key, value in values.items())
-    return f"{{ {', '.join(pairs)} }}"
+def _toml(settings: ServoSettings) -> str:
+    return _inline(settings.table())
+
+
+def _inline(value: Any) -> str:
+    """Return a value as TOML on one line."""
+    if isinstance(value, dict):
+        pairs = (f"{key} = {_inline(item)}" for key, item in value.items() if item is not None)
+        return f"{{ {', '.join(pairs)} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_inline, value))}]"
+    return json.dumps(value)

@@ -1,14 +1,14 @@
 """Changes the law of a cell while the cell runs."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from vergence.app.watch.knobs import knobs, law_choices, turned
-from vergence.assembly import build_law
+from vergence.assembly import LawContext, build_law
 from vergence.cell import Cell, load_cell
 from vergence.control import Law
 from vergence.errors import InputError, nearest
-from vergence.simulation import SimulatedDriver
 
 
 class LawEditor:
@@ -30,7 +30,7 @@ class LawEditor:
         self._choices = law_choices(self.cell)
         self._choice = next(iter(self._choices))
 
-    def choose(self, name: str, driver: SimulatedDriver) -> Law:
+    def choose(self, name: str, context: LawContext) -> Law:
         """Return another law, with the numbers it has by itself.
 
         Raises:
@@ -42,11 +42,11 @@ class LawEditor:
         changed = {"law": self._choices[name]}
         if name == next(iter(self._choices)):
             changed = {}
-        law = self._change(changed, driver)
+        law = self._change(changed, context)
         self._choice = name
         return law
 
-    def turn(self, key: str, value: Any, driver: SimulatedDriver) -> Law:
+    def turn(self, key: str, value: Any, context: LawContext) -> Law:
         """Return the same law with one number turned.
 
         Raises:
@@ -56,7 +56,7 @@ class LawEditor:
         keys = [knob["key"] for knob in knobs(self.cell.law)]
         if key not in keys:
             raise InputError("message", "key", key, nearest(key, keys))
-        return self._change(self._changed | turned(key, value), driver)
+        return self._change(self._changed | turned(key, value), context)
 
     def as_json(self) -> dict[str, Any]:
         """Return what the page shows."""
@@ -67,8 +67,8 @@ class LawEditor:
             "settings": [f"{key}={value}" for key, value in self._changed.items()],
         }
 
-    def _change(self, changed: dict[str, str], driver: SimulatedDriver) -> Law:
+    def _change(self, changed: dict[str, str], context: LawContext) -> Law:
         cell = load_cell(self._source, self._given | changed, self._seed)
-        law = build_law(cell, driver)
+        law = build_law(replace(context, cell=cell))
         self.cell, self._changed = cell, changed
         return law

@@ -27,7 +27,7 @@ from vergence.app.watch.publisher import Publisher
 from vergence.app.watch.scene import Scene, world_state
 from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.watched_driver import WatchedDriver
-from vergence.assembly import RunResult, run_driver
+from vergence.assembly import LawContext, Parts, RunResult, run_driver
 from vergence.control import Law
 from vergence.runtime import Loop, Recorder
 from vergence.signals import Outcome, OutcomeKind
@@ -60,6 +60,7 @@ class Live:
         self._driver = WatchedDriver(editor.cell, images)
         self._corners = target_corners(self._driver.world)
         self._loop: Loop | None = None
+        self._context: LawContext | None = None  # of the last run
         self._recorder = Recorder(out, image_every)
         self._runs, self._again = 0, True
         self.view_state = ViewState()
@@ -116,8 +117,8 @@ class Live:
             self._loop = None
             self._driver.between = None
 
-    def _attend(self, loop: Loop) -> None:
-        self._loop = loop
+    def _attend(self, loop: Loop, parts: Parts) -> None:
+        self._loop, self._context = loop, parts.context
         self._driver.between = self._between
 
     def _stand_up(self) -> None:
@@ -182,11 +183,15 @@ class Live:
                 if self._loop is not None:
                     self._loop.stop()
             case ChooseLaw(name=name):
-                self._replace_law(self._editor.choose(name, self._driver))
+                self._replace_law(self._editor.choose(name, self._law_context))
             case TurnKnob(key=key, value=value):
-                self._replace_law(self._editor.turn(key, value, self._driver))
+                self._replace_law(self._editor.turn(key, value, self._law_context))
             case _ if self._driver.world.target_is_free:
                 self._move_target(command)
+
+    @property
+    def _law_context(self) -> LawContext:
+        return self._context or LawContext.of(self._editor.cell, self._driver)
 
     def _replace_law(self, law: Law) -> None:
         if self._loop is not None:

@@ -87,7 +87,7 @@ def look(
 
 @njit(cache=True, error_model="numpy")
 def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, float]:
-    """Run `OptimalTrackingLaw` in the loop, on an arm that moves exactly as it is told.
+    """Run [Nelson1995] in the loop, on an arm that moves exactly as it is told.
 
     It is `vergence.runtime.Loop` on an `IdealDriver`, decision by decision, by the same kernels.
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import picture_times
-from vergence.control import OptimalTrackingLaw, pack_setup
-from vergence.control.singularity import singular_fault
+from vergence.control import Servo, TrackingSetup, pack_setup, singular_fault
 from vergence.estimation.exact_points import OUT_OF_SIGHT
 from vergence.experiments.batch import closed_loop
 from vergence.experiments.batch.closed_loop import (
@@ -39,7 +38,9 @@ class BatchTrace:
 def covers(run: IdealRun) -> bool:
     """Tell whether the kernel knows the law of a run and its camera."""
     law, camera = run.law, run.cell.camera
-    return isinstance(law, OptimalTrackingLaw) and not (law.feeds_forward or camera.distorted)
+    if not isinstance(law, Servo) or law.feeds_forward or camera.distorted:
+        return False
+    return law.tracking is not None
 
 
 def run_batch(runs: Sequence[IdealRun], threads: int | None = None) -> list[BatchTrace]:
@@ -105,7 +106,7 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
         if run.noise_px:
             shape = (int(arrived[r].sum()), features, 2)
             noise_px[r, arrived[r]] = run.noise().normal(0.0, 1.0, shape) * run.noise_px
-    setups = [pack_setup(_law(run).setup) for run in runs]
+    setups = [pack_setup(_setup(run)) for run in runs]
     return LoopInputs(
         np.array([setup.weights for setup in setups]),
         np.array([setup.joints for setup in setups]),
@@ -120,7 +121,7 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
         np.array([(run.cell.inner_rate_hz, run.cell.rate_hz) for run in runs]),
         np.array([[run.cell.latency_frames] for run in runs]),
         np.array([(run.duration_s, run.patience.image_s, run.patience.target_s) for run in runs]),
-        np.array([[_law(run).singular_below] for run in runs]),
+        np.array([[_setup(run).damping] for run in runs]),
     )
 
 
@@ -130,9 +131,11 @@ def _times(run: IdealRun, pictures: int) -> FloatArray:
     return times
 
 
-def _law(run: IdealRun) -> OptimalTrackingLaw:
-    assert isinstance(run.law, OptimalTrackingLaw)
-    return run.law
+def _setup(run: IdealRun) -> TrackingSetup:
+    assert isinstance(run.law, Servo)
+    setup = run.law.tracking
+    assert setup is not None
+    return setup
 
 
 def _limits(run: IdealRun) -> FloatArray:
@@ -141,8 +144,9 @@ def _limits(run: IdealRun) -> FloatArray:
 
 
 def _wanted(run: IdealRun) -> FloatArray:
-    law = _law(run)
-    return np.column_stack((law.camera.normalize(run.wanted_px), law.depth_m))
+    assert isinstance(run.law, Servo)
+    depth = run.law.believed_depth(len(run.wanted_px))
+    return np.column_stack((run.cell.camera.normalize(run.wanted_px), depth))
 
 
 def _camera(run: IdealRun) -> tuple[float, ...]:
@@ -173,7 +177,7 @@ def _outcome(run: IdealRun, records: LoopRecord, r: int) -> Outcome:
         case closed_loop.IMAGE_LATE:
             return endings.image_late(value, time)
         case closed_loop.SINGULAR:
-            fault = singular_fault(value, _law(run).singular_below)
+            fault = singular_fault(value, _setup(run).damping)
             assert fault is not None
             return Outcome(*fault, time)
         case closed_loop.STUCK:

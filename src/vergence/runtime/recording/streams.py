@@ -33,8 +33,8 @@ ARM_SCHEMA = _schema(
     manipulability=_NUMBER,
     penalty=_NUMBER,
     active=_WORDS,
-    given_up=_WORDS,
-    given_up_by=_NUMBERS,
+    slack=_WORDS,
+    slack_by=_NUMBERS,
 )
 
 FEATURES_SCHEMA = _schema(
@@ -81,8 +81,8 @@ def arm_message(time: float, state: JointState, command: JointCommand | None) ->
         message["command"] = numbers(command.velocity)
         message["v_camera"] = numbers(command.v_camera)
         message["active"] = list(command.active)
-        message["given_up"] = list(command.given_up)
-        message["given_up_by"] = numbers(list(command.given_up.values()))
+        message["slack"] = list(command.slack)
+        message["slack_by"] = numbers(list(command.slack.values()))
         measures = (("manipulability", command.manipulability), ("penalty", command.penalty))
         message |= {name: value for name, value in measures if math.isfinite(value)}
     return message

@@ -24,7 +24,7 @@ class ArmTrace:
     manipulability: FloatArray  # (K,) w' of [Nelson1995] eq. (26)
     penalty: FloatArray  # (K,) P of [Nelson1995] eq. (27)
     active: tuple[tuple[str, ...], ...]  # (K,) constraints that shaped the command
-    given_up: tuple[Mapping[str, float], ...]  # (K,) those that bent, and by how much
+    slack: tuple[Mapping[str, float], ...]  # (K,) those that bent, and by how much
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,8 @@ def arm_trace(rows: Sequence[Row], joints: int) -> ArmTrace:
         manipulability=_column(rows, "manipulability"),
         penalty=_column(rows, "penalty"),
         active=tuple(tuple(row.get("active", ())) for row in rows),
-        given_up=tuple(
-            dict(zip(row.get("given_up", ()), row.get("given_up_by", ()), strict=True))
-            for row in rows
+        slack=tuple(
+            dict(zip(row.get("slack", ()), row.get("slack_by", ()), strict=True)) for row in rows
         ),
     )
 

@@ -1,0 +1,171 @@
+"""From the law of a cell file to the servo that runs."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.motion_needed import require_motion
+from vergence.cell.schema import ReachTable
+from vergence.control import (
+    CameraMounting,
+    Law,
+    Limits,
+    OptimalTracking,
+    PoseServo,
+    PositionBased,
+    QuadraticProgram,
+    Servo,
+    ServoSettings,
+    Situation,
+    axis_mask,
+)
+from vergence.errors import InputError
+from vergence.features import interaction_matrix_points
+from vergence.geometry import se3_inverse
+from vergence.parts import kind_of
+from vergence.registry import kinds
+
+_OF_PLAN = 0.5  # share of a plan's margins that is kept: it was made to be followed to within them
+_POINT_DEPTHS, _POSE_DEPTHS = (0.5, 2.0), (0.9, 1.1)  # bounds on true over believed depth
+_FEWEST_OF_PATH = 3  # points that leave no direction of the camera open
+
+
+def build_law(context: LawContext) -> Law:
+    """Make the law that a cell asks for.
+
+    Raises:
+        InputError: if the law does not fit the task, or its numbers do not fit the arm.
+    """
+    cell = context.cell
+    _require_suitable(context)
+    try:
+        law = _pose_servo(context) if _is_pose(cell.law) else _servo(context)
+    except InputError as error:
+        if error.source == str(cell.path):
+            raise
+        # What a part says of its fields is said of the file's keys.
+        key = ".".join(filter(None, ("law", _TABLES.get(error.source), error.key)))
+        raise InputError(str(cell.path), key, error.given, error.allowed) from None
+    _require_motion(context)
+    return law
+
+
+_TABLES = {"Limits": "limits"}  # a part's table below [law]
+
+
+def _is_pose(settings: ServoSettings) -> bool:
+    return len(settings.objectives) == 1 and isinstance(settings.objective, PositionBased)
+
+
+def _require_suitable(context: LawContext) -> None:
+    """Refuse an objective that the task cannot feed."""
+    cell = context.cell
+    follows = cell.task.kind == "follow"
+    for term in cell.law.objectives:
+        needs_pose = isinstance(term.objective, PositionBased)
+        ships = kind_of(term.objective) in kinds("objective")
+        if needs_pose != follows and (needs_pose or ships):
+            fitting = "position_based" if follows else "objectives on image points"
+            allowed = f"for the task {cell.task.kind}: {fitting}"
+            raise InputError(str(cell.path), "law.kind", kind_of(term.objective), allowed)
+
+
+def _servo(context: LawContext) -> Servo:
+    cell, settings = context.cell, context.cell.law
+    names = [context.camera_name]
+    names += [name for term in settings.terms if (name := term.camera) and name not in names]
+    for name in names:
+        if name not in cell.cameras:
+            raise InputError("law", "objectives", name, ", ".join(cell.cameras))
+    reaches = isinstance(cell.task, ReachTable)
+    depth_m = None if reaches else {name: context.depth_m(name, settings.depth_m) for name in names}
+    return Servo(
+        context.arm,
+        {name: _mounting(context, name) for name in names},
+        settings.terms,
+        limits=_limits(context),
+        solver=settings.solver,
+        depth_m=depth_m,
+        situation=Situation(
+            context.period_s(),
+            settings.motion,
+            None if context.is_fixed else context.solids,
+            _POINT_DEPTHS,
+            context.joints[cell.task.arm],
+            _FEWEST_OF_PATH if reaches else 1,
+        ),
+    )
+
+
+def _pose_servo(context: LawContext) -> PoseServo:
+    settings = context.cell.law
+    constrained = isinstance(settings.solver, QuadraticProgram)
+    return PoseServo(
+        context.arm,
+        _mounting(context, context.camera_name),
+        settings.objective,
+        limits=_limits(context),
+        solver=settings.solver,
+        corners=context.target_corners() if constrained else None,
+        situation=Situation(
+            context.inner_period_s,
+            settings.motion,
+            None if context.is_fixed else context.solids,
+            _POSE_DEPTHS,
+            context.joints[context.cell.task.arm],
+        ),
+    )
+
+
+def _mounting(context: LawContext, name: str) -> CameraMounting:
+    """Return where a camera is: the task's at the arm's tip unless it is fixed."""
+    camera = context.camera(name)
+    fixed = context.T_world_camera(name)
+    if fixed is not None:
+        return CameraMounting(camera, T_world_camera=fixed)
+    if name == context.camera_name:
+        return CameraMounting(camera)
+    q = context.joints[context.cell.task.arm]
+    T_world_tip = context.arm.forward_kinematics(q)
+    T_world_camera = context.arm_to_camera(name).forward_kinematics(q)
+    return CameraMounting(camera, T_tip_camera=se3_inverse(T_world_tip) @ T_world_camera)
+
+
+def _limits(context: LawContext) -> Limits | None:
+    """Return the limits, with margins that suit the task where the file gives none."""
+    cell, given = context.cell, context.cell.law.limits
+    if given is None and not isinstance(cell.law.solver, QuadraticProgram):
+        return None
+    limits: Limits = given or Limits()
+    if not isinstance(cell.task, ReachTable):
+        return limits
+    view_px, joint = limits.view_margin_px, limits.joint_margin
+    return replace(
+        limits,
+        view_margin_px=_OF_PLAN * cell.task.margin_px if view_px is None else view_px,
+        # The plan's margin is a share of half a range.
+        joint_margin=_OF_PLAN * cell.task.margin_joint / 2.0 if joint is None else joint,
+    )
+
+
+def _require_motion(context: LawContext) -> None:
+    """Refuse an arm that cannot do with its camera what the law asks of it."""
+    cell, name = context.cell, context.camera_name
+    L = np.eye(6)
+    if cell.task.kind == "track":
+        depth = context.depth_m(name, cell.law.depth_m)
+        L = interaction_matrix_points(context.camera().normalize(context.points_px[name]), depth)
+    objective = cell.law.objective
+    axes = objective.axes if isinstance(objective, OptimalTracking) else None
+    mask = np.ones(6, dtype=np.bool_) if axes is None else axis_mask(axes)
+    arm, q = context.arm, context.joints[cell.task.arm]
+    mounting = _mounting(context, name)
+
+    def jacobian(posture: FloatArray) -> FloatArray:
+        A = mounting.twist_map(arm.forward_kinematics(posture))
+        J: FloatArray = A @ arm.jacobian(posture)
+        return J
+
+    require_motion(str(cell.path), name, jacobian, q, L, mask)

@@ -1,0 +1,27 @@
+"""Limits: constraint rows that the quadratic program keeps, hard or by priority."""
+
+from vergence.control.limits._rows import (
+    KIND_NAMES,
+    RELAXED,
+    ConstraintSettings,
+    pack_features,
+)
+from vergence.control.limits.limits import Limit, Limits
+from vergence.control.limits.occlusion import AXES, COLUMNS, HALF, MIDDLE, NO_SOLIDS, RADIUS
+from vergence.control.limits.target_view import TargetView
+
+__all__ = [
+    "AXES",
+    "COLUMNS",
+    "ConstraintSettings",
+    "HALF",
+    "KIND_NAMES",
+    "Limit",
+    "Limits",
+    "MIDDLE",
+    "NO_SOLIDS",
+    "RADIUS",
+    "RELAXED",
+    "TargetView",
+    "pack_features",
+]

@@ -1,0 +1,62 @@
+"""The limits of a servo: margins, and which of them are relaxed first when they conflict."""
+
+from typing import Annotated, Literal, Protocol, runtime_checkable
+
+from pydantic import Field
+
+from vergence.arrays import FloatArray
+from vergence.control.limits._rows import KIND_NAMES, RELAXED
+from vergence.errors import InputError
+from vergence.parts import knob, part, slot
+from vergence.robot import Arm
+
+Relaxed = Literal["view", "occlusion", "singularity", "joint margin"]
+_Share = Annotated[float, Field(gt=0, le=1)]
+_Factor = Annotated[float, Field(ge=1, le=1e3)]
+
+
+@runtime_checkable
+class Limit(Protocol):
+    """A limit of a user's own, as rows C q̇ ≥ d."""
+
+    def rows(
+        self, arm: Arm, q: FloatArray, velocity: FloatArray, period_s: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return C (m, n) and d (m,) for this tick.
+
+        Args:
+            arm: up to its tip.
+            q: joint positions, (n,).
+            velocity: joint rates now, (n,).
+            period_s: how long the command will act.
+        """
+        ...
+
+
+@part("limits", "limits")
+class Limits:
+    """What the quadratic program keeps. Joint positions, rates and accelerations are hard.
+
+    The others are relaxed when they conflict, the last of `order` first, then a user's own; the
+    slack is reported. A limit that is not in `order` is not kept.
+    """
+
+    order: tuple[Relaxed, ...] = knob(RELAXED)  # highest priority first
+    view_margin_px: float | None = knob(None, "px", least=0, upto=1e4)  # 10, or half of a plan's
+    joint_margin: float | None = knob(
+        None, least=0, below=0.5
+    )  # of a range: 0.03, or half a plan's
+    clearance_m: float = knob(0.02, "m", least=0, upto=10)  # between sight lines and obstacles
+    manipulability_share: float = knob(0.2, least=0, below=1)  # of √det(J Jᵀ) at the start
+    approach_rate_hz: float = knob(2.0, "1/s", above=0, upto=1e3)  # of the room left to a border
+    depth_range: tuple[_Share, _Factor] | None = knob(None)  # bounds on true over believed depth
+    own: tuple[Limit, ...] = slot("limit", (), many=True)  # a user's own, relaxed before all others
+
+    def __post_init__(self) -> None:
+        if len(set(self.order)) != len(self.order):
+            raise InputError(type(self).__name__, "order", list(self.order), "each limit once")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the kinds of limits, the user's own last."""
+        return (*KIND_NAMES, *(type(limit).__name__ for limit in self.own))

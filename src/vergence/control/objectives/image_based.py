@@ -1,0 +1,80 @@
+"""Image-based visual servoing as an objective."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.objectives.objective import (
+    CameraState,
+    Quadratic,
+    least_squares_kernel,
+    state_of,
+)
+from vergence.features import Feature, Points, interaction_matrix_points
+from vergence.parts import knob, part, slot
+
+InteractionModel = Literal["current", "desired", "mean"]
+
+
+@part("objective", "image_based")
+class ImageBased:
+    """Lets the error of a feature decay exponentially: L v = -λ (s - s_star) + ∂s_star/∂t - ∂s/∂t.
+
+    L is taken at the feature as it is, as it should be, or as the mean of both
+    [Chaumette2006] section 5.
+    """
+
+    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    interaction: InteractionModel = knob("current")  # where L is taken
+    feature: type[Feature] = slot("feature", Points, by_class=True)  # made of the image points
+    damping: float = knob(1e-6, above=0, upto=1, live=False)  # on the twist: closes open directions
+
+    def quadratic(self, state: CameraState) -> Quadratic:
+        """Return the quadratic for this tick."""
+        desired = state.desired_points
+        assert desired is not None
+        desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
+        if self.feature is Points:
+            change = -self.gain * (state.points - desired) - state.flow
+            if state.desired_velocity is not None:
+                change = change + state.desired_velocity
+            L = self._interaction(
+                lambda: interaction_matrix_points(state.points, state.depth_m),
+                lambda: interaction_matrix_points(desired, desired_depth),
+            )
+            rows = change.ravel()
+        else:
+            now = self.feature(state.points, state.depth_m)
+            goal = self.feature(desired, desired_depth)
+            rows = -self.gain * now.error(goal) - now.drift(state.flow)
+            if state.desired_velocity is not None:
+                rows = rows + goal.drift(state.desired_velocity)
+            L = np.ascontiguousarray(
+                self._interaction(now.interaction, goal.interaction), dtype=np.float64
+            )
+        result: Quadratic = least_squares_kernel(L, rows, np.ones(len(L)), np.full(6, self.damping))
+        return result
+
+    def twist(self, features: Points, desired: Points) -> FloatArray:
+        """Return v_camera (6,) that this objective alone asks for, for a stationary target.
+
+        Args:
+            features: as they are.
+            desired: as they should be.
+        """
+        H, g = self.quadratic(state_of(features, desired))
+        v_camera: FloatArray = np.linalg.solve(H, g).astype(np.float64)
+        return v_camera
+
+    def _interaction(
+        self, now: Callable[[], FloatArray], desired: Callable[[], FloatArray]
+    ) -> FloatArray:
+        if self.interaction == "current":
+            L: FloatArray = now()
+        elif self.interaction == "desired":
+            L = desired()
+        else:
+            L = 0.5 * (now() + desired())
+        return L

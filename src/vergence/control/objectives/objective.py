@@ -1,0 +1,166 @@
+"""What an objective knows, and what it answers: a quadratic in the camera's twist or the joints."""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.control.mounting import CameraMounting
+from vergence.features import Points
+from vergence.robot import Arm
+from vergence.signals import TargetState
+
+
+class Quadratic(NamedTuple):
+    """Minimise ½ vᵀ H v - gᵀ v over the camera's twist v = v_camera."""
+
+    H: FloatArray  # (6, 6) positive semi-definite
+    g: FloatArray  # (6,)
+
+
+class JointQuadratic(NamedTuple):
+    """Minimise ½ q̇ᵀ H q̇ - gᵀ q̇ over the joint rates."""
+
+    H: FloatArray  # (n, n) positive semi-definite
+    g: FloatArray  # (n,)
+
+
+@dataclass(slots=True)
+class CameraState:
+    """What an objective knows of one camera at one tick; features that were not found are left out.
+
+    Attributes:
+        mounting: the camera and where it is; None for an objective asked without an arm.
+        points: of the features now, normalized coordinates, (M, 2).
+        depth_m: of the features, (M,).
+        flow: their motion by the target's own, (M, 2), 1/s.
+        desired_points: s_star, normalized coordinates, (M, 2); None where none is given.
+        desired_velocity: of s_star, (M, 2), 1/s; None for a stationary one.
+        desired_depth_m: depth of the features at the goal, (M,); None where it is not known.
+        count: how many features there are, found or not.
+        period_s: between two images, s.
+        arm: up to its tip; None for an objective asked without an arm.
+        q: joint positions, (n,).
+        A: v_camera = A v_tip, (6, 6); None for a camera at the tip.
+        T_world_tip: pose of the arm's tip, (4, 4).
+        target: pose and velocity of the target; None where no filter estimates it.
+        T_camera_target: desired pose of the target, (4, 4); None where none is given.
+        time: now, s.
+    """
+
+    mounting: CameraMounting | None
+    points: FloatArray
+    depth_m: FloatArray
+    flow: FloatArray
+    desired_points: FloatArray | None = None
+    desired_velocity: FloatArray | None = None
+    desired_depth_m: FloatArray | None = None
+    count: int = 0
+    period_s: float = 1 / 30
+    arm: Arm | None = None
+    q: FloatArray | None = None
+    A: FloatArray | None = None
+    T_world_tip: FloatArray | None = None
+    target: TargetState | None = None
+    T_camera_target: FloatArray | None = None
+    time: float = 0.0
+
+    @property
+    def camera(self) -> Camera:
+        """The camera's intrinsics."""
+        assert self.mounting is not None
+        return self.mounting.camera
+
+    @property
+    def features(self) -> Points:
+        """The features now."""
+        return Points(self.points, self.depth_m)
+
+    @property
+    def desired(self) -> Points:
+        """The features at the goal; as deep as they are now where their depth there is unknown."""
+        assert self.desired_points is not None
+        depth = self.depth_m if self.desired_depth_m is None else self.desired_depth_m
+        return Points(self.desired_points, depth)
+
+    @property
+    def J_camera(self) -> FloatArray:
+        """The camera's Jacobian, (6, n): v_camera = J q̇."""
+        assert self.arm is not None
+        assert self.q is not None
+        J = self.arm.jacobian(self.q)
+        return J if self.A is None else self.A @ J
+
+
+def state_of(features: Points, desired: Points) -> CameraState:
+    """Return the state of a camera without an arm that sees features and should see others."""
+    return CameraState(
+        None,
+        features.points,
+        features.depth_m,
+        np.zeros_like(features.points),
+        desired.points,
+        desired_depth_m=desired.depth_m,
+        count=len(features.points),
+    )
+
+
+@runtime_checkable
+class Objective(Protocol):
+    """What the camera, or the arm, should do."""
+
+    def quadratic(self, state: CameraState) -> Quadratic | JointQuadratic:
+        """Return the quadratic for this tick."""
+        ...
+
+
+def least_squares(
+    E: FloatArray,
+    desired: FloatArray,
+    weight: FloatArray | float = 1.0,
+    damping: FloatArray | float = 1e-6,
+) -> Quadratic:
+    """Return the quadratic of ½ Σ wᵣ (E v - ė)ᵣ² + ½ vᵀ diag(μ) v.
+
+    Args:
+        E: (k, 6).
+        desired: ė, what E v should be, (k,).
+        weight: w of each row, (k,), or one number.
+        damping: μ of each axis, (6,), or one number.
+    """
+    E = np.ascontiguousarray(E, dtype=np.float64)
+    rows = np.ascontiguousarray(desired, dtype=np.float64)
+    result: Quadratic = least_squares_kernel(
+        E,
+        rows,
+        np.full(len(E), weight) if np.ndim(weight) == 0 else np.asarray(weight, dtype=np.float64),
+        np.full(6, damping) if np.ndim(damping) == 0 else np.asarray(damping, dtype=np.float64),
+    )
+    return result
+
+
+@njit(cache=True, error_model="numpy")
+def least_squares_kernel(
+    E: FloatArray, desired: FloatArray, weight: FloatArray, R: FloatArray
+) -> Quadratic:
+    """Return the quadratic of ‖E v - desired‖² weighted by rows, plus vᵀ diag(R) v.
+
+    Args:
+        E: (m, 6).
+        desired: (m,).
+        weight: (m,).
+        R: (6,).
+    """
+    H, g = np.zeros((6, 6)), np.zeros(6)
+    for i in range(6):
+        for r in range(len(E)):
+            g[i] += weight[r] * E[r, i] * desired[r]
+        for j in range(i + 1):
+            total = R[i] if i == j else 0.0
+            for r in range(len(E)):
+                total += weight[r] * E[r, i] * E[r, j]
+            H[i, j] = H[j, i] = total
+    return Quadratic(H, g)

@@ -1,0 +1,35 @@
+"""Position-based servoing on points of known depth, without a filter of the pose."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.objectives.objective import CameraState, Quadratic
+from vergence.geometry import so3_log
+from vergence.parts import knob, part
+
+
+@part("objective", "point_pose")
+class PointPose:
+    """Takes the camera straight to where it should be: v = -λ (Rᵀ t, θu) of its pose in the goal.
+
+    The pose is the one that brings the points, by their depths, onto those at the goal
+    [Chaumette2006] section 3.
+    """
+
+    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+
+    def quadratic(self, state: CameraState) -> Quadratic:
+        """Return the quadratic for this tick."""
+        seen = _lifted(state.points, state.depth_m)
+        goal = _lifted(state.desired.points, state.desired.depth_m)
+        U, _, Vt = np.linalg.svd((seen - seen.mean(0)).T @ (goal - goal.mean(0)))
+        mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
+        R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
+        t = goal.mean(0) - R @ seen.mean(0)
+        return Quadratic(np.eye(6), -self.gain * np.concatenate((R.T @ t, so3_log(R))))
+
+
+def _lifted(points: FloatArray, depth_m: FloatArray) -> FloatArray:
+    """Return points (M, 3) in the camera, m."""
+    lifted: FloatArray = np.column_stack((points, np.ones(len(points)))) * depth_m[:, None]
+    return lifted

@@ -1,0 +1,154 @@
+"""Position-based visual servoing: the target kept at a desired pose in the camera."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.mounting import CameraMounting
+from vergence.control.moving_pose import MovingPose, moved, pose_difference
+from vergence.control.objectives._interpolator import interpolate
+from vergence.control.objectives._pose_goal import tip_goal_beside, tip_goal_of_holder
+from vergence.control.objectives.objective import CameraState, Quadratic
+from vergence.errors import InputError
+from vergence.geometry import se3_compose
+from vergence.parts import knob, part
+from vergence.robot import Arm, forward_kinematics, jacobian
+from vergence.signals import TargetState
+
+
+@part("objective", "position_based")
+class PositionBased:
+    """Moves the arm's tip so that the target keeps a desired pose in a camera.
+
+    The camera is on the arm, [Lippiello2005] section IV, or it is fixed and the arm holds the
+    target. Alone in a servo, it works at the inner rate: each image gives a goal, a second-order
+    filter makes a trajectory of it, and closed-loop inverse kinematics gives the tip's twist.
+    Beside others, the pose error decays at `closed_loop_hz`.
+    """
+
+    filter_hz: float = knob(5.0, "Hz", above=0, upto=100)  # natural frequency of the filter
+    damping: float = knob(1.0, above=0, upto=100)  # of the filter
+    closed_loop_hz: float = knob(5.0, "Hz", above=0, upto=100)  # how fast the tip catches up
+    # Of redundant joints at their limits, towards the middle of their range.
+    null_space_rate: float = knob(0.5, "rad/s or m/s", least=0, upto=10)  # of redundant joints
+
+    def quadratic(self, state: CameraState) -> Quadratic:
+        """Return the quadratic of ½ ‖v_tip - twist‖², at the image rate."""
+        if state.target is None or state.T_camera_target is None:
+            raise InputError("position_based", "", "no pose of the target", "a task with a filter")
+        assert state.arm is not None
+        assert state.q is not None
+        assert state.mounting is not None
+        goal = tip_goal(state.target, state.T_camera_target, state.mounting, state.time)
+        twist = tip_twist(state.arm, state.q, goal, 2 * np.pi * self.closed_loop_hz)
+        if state.A is None:
+            return Quadratic(np.eye(6), twist)
+        inverse = np.linalg.inv(state.A)
+        return Quadratic(inverse.T @ inverse, inverse.T @ twist)
+
+
+def tip_goal(
+    target: TargetState, T_camera_target: FloatArray, mounting: CameraMounting, now: float | None
+) -> MovingPose:
+    """Return where the arm's tip should be, and how fast that place moves.
+
+    Args:
+        target: as estimated.
+        T_camera_target: desired, (4, 4).
+        mounting: of the camera.
+        now: time that the target is extrapolated to, s; that of its image if None.
+    """
+    if now is not None:
+        seen = MovingPose(target.T_world_target, target.velocity)
+        T_target = moved(seen, now - target.time)
+        target = replace(target, time=now, T_world_target=T_target)
+    if mounting.T_world_camera is not None:
+        return tip_goal_of_holder(target, se3_compose(mounting.T_world_camera, T_camera_target))
+    if mounting.T_tip_camera is not None:
+        return tip_goal_beside(target, se3_compose(mounting.T_tip_camera, T_camera_target))
+    return tip_goal_beside(target, T_camera_target)
+
+
+def tip_twist(arm: Arm, q: FloatArray, reference: MovingPose, gain: float) -> FloatArray:
+    """Return the twist (6,) that keeps the tip on a reference trajectory, in its own axes.
+
+    twist + gain · Δ(reference, tip), of the closed-loop inverse kinematics.
+
+    Args:
+        arm: up to the tip.
+        q: joint set-points, (n,).
+        reference: where the tip should be, and how fast it should move.
+        gain: 1/s.
+    """
+    T = forward_kinematics(arm.chain, q)
+    twist = reference.twist + gain * pose_difference(reference.T, T)
+    R = np.ascontiguousarray(T[:3, :3].T)
+    return np.concatenate((R @ twist[:3], R @ twist[3:]))
+
+
+class PoseTrajectory:
+    """A trajectory of the arm's tip at the inner rate, from one goal to the next.
+
+    Args:
+        objective: its numbers.
+        arm: up to the tip.
+        period_s: the inner one.
+    """
+
+    def __init__(self, objective: PositionBased, arm: Arm, period_s: float) -> None:
+        self._arm, self._period_s = arm, period_s
+        self._frequency, self._damping = 2 * np.pi * objective.filter_hz, objective.damping
+        self._gain = 2 * np.pi * objective.closed_loop_hz
+        self._goal: MovingPose | None = None
+        self._reference: MovingPose | None = None
+        self._ahead: MovingPose | None = None
+
+    @property
+    def planned(self) -> bool:
+        """Whether there is a goal."""
+        return self._goal is not None
+
+    def aim(self, goal: MovingPose, q: FloatArray) -> None:
+        """Take a new goal; the trajectory begins where the arm is, q (n,), if there is none."""
+        self._goal = goal
+        if self._reference is None:
+            self._reference = MovingPose(forward_kinematics(self._arm.chain, q), np.zeros(6))
+
+    def clear(self) -> None:
+        """Forget the goal and the trajectory."""
+        self._goal = self._reference = self._ahead = None
+
+    def twist(self, q: FloatArray) -> FloatArray:
+        """Return the tip's twist (6,) now, at joint positions q (n,)."""
+        assert self._reference is not None
+        return tip_twist(self._arm, q, self._reference, self._gain)
+
+    def next_twist(self, q: FloatArray) -> FloatArray:
+        """Return the twist (6,) that leads on: the place of now, the velocity to the next one."""
+        assert self._goal is not None
+        assert self._reference is not None
+        self._ahead = interpolate(
+            self._reference, self._goal, self._frequency, self._damping, self._period_s
+        )
+        leading = MovingPose(self._reference.T, self._ahead.twist)
+        return tip_twist(self._arm, q, leading, self._gain)
+
+    def advance(self, q: FloatArray, rates: FloatArray, held_back: bool) -> None:
+        """Go on by one inner period.
+
+        Args:
+            q: joint set-points, (n,).
+            rates: that were commanded, (n,).
+            held_back: whether they do something else than the twist; then the trajectory goes on
+                from where the tip will be.
+        """
+        assert self._goal is not None
+        self._reference = self._moving_tip(q, rates) if held_back else self._ahead
+        self._goal = MovingPose(moved(self._goal, self._period_s), self._goal.twist)
+
+    def _moving_tip(self, q: FloatArray, rates: FloatArray) -> MovingPose:
+        after = q + self._period_s * rates
+        T = forward_kinematics(self._arm.chain, after)
+        v = jacobian(self._arm.chain, after) @ rates
+        return MovingPose(T, np.concatenate((T[:3, :3] @ v[:3], T[:3, :3] @ v[3:])))

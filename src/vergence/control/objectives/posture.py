@@ -1,0 +1,42 @@
+"""Joints drawn to a posture, where the other objectives leave a choice."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.objectives.objective import CameraState, JointQuadratic
+from vergence.errors import InputError
+from vergence.parts import knob, part
+
+
+@part("objective", "posture")
+class Posture:
+    """Draws the joints to a posture: q̇ = -λ (q - q_star), with a weight small beside the others'.
+
+    With the pseudo-inverse it acts in the null space of the other objectives.
+    """
+
+    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    position: tuple[float, ...] | None = knob(None)  # q_star, rad or m; mid-range if absent
+    strength: float = knob(1e-4, above=0, upto=1e3)  # weight of its quadratic
+
+    def quadratic(self, state: CameraState) -> JointQuadratic:
+        """Return the quadratic for this tick."""
+        assert state.arm is not None
+        assert state.q is not None
+        n = state.arm.joint_count
+        rates = -self.gain * (state.q - self._desired(state))
+        return JointQuadratic(self.strength * np.eye(n), self.strength * rates)
+
+    def _desired(self, state: CameraState) -> FloatArray:
+        arm = state.arm
+        assert arm is not None
+        assert state.q is not None
+        if self.position is None:
+            limited = np.isfinite(arm.q_max - arm.q_min)
+            low, high = np.where(limited, arm.q_min, 0.0), np.where(limited, arm.q_max, 0.0)
+            middle: FloatArray = np.where(limited, 0.5 * (low + high), state.q)
+            return middle
+        if len(self.position) != arm.joint_count:
+            given = f"{len(self.position)} values"
+            raise InputError("Posture", "position", given, f"{arm.joint_count}, one a joint")
+        return np.array(self.position)

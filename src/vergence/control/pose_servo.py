@@ -1,0 +1,147 @@
+"""Position-based servoing at the inner rate."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.limits import Limits, TargetView
+from vergence.control.mounting import CameraMounting
+from vergence.control.moving_pose import MovingPose
+from vergence.control.objectives import PoseTrajectory, PositionBased, tip_goal
+from vergence.control.servo import AT_TIP, NO_FEATURES, Situation
+from vergence.control.solvers import (
+    Problem,
+    QuadraticProgram,
+    Setting,
+    Solution,
+    Solver,
+    describe,
+)
+from vergence.control.solvers.solver import NO_JOINTS
+from vergence.robot import Arm
+from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
+
+_ONSET_S = 0.5  # of the motion of redundant joints, so that no joint meets its acceleration limit
+_HELD_BACK = 1e-3  # m/s and rad/s of the desired twist that is not reached
+
+
+class PoseServo:
+    """Serves one position-based objective: a goal an image, joint rates at the inner rate.
+
+    Between images a trajectory leads the arm's tip to the goal, see `PoseTrajectory`; where limits
+    hold the tip back, the trajectory goes on from where the tip is.
+
+    Args:
+        arm: up to its tip: the camera, the link that carries it, or the link that holds the target.
+        mounting: of the camera.
+        objective: the numbers of the trajectory.
+        limits: what is kept; those of `Limits` if None and the solver keeps limits.
+        solver: the quadratic program if None.
+        corners: of the target, (M, 3), m, which have to stay in view; None for none.
+        situation: what else is known; its period is the inner one.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        mounting: CameraMounting,
+        objective: PositionBased,
+        *,
+        limits: Limits | None = None,
+        solver: Solver | None = None,
+        corners: FloatArray | None = None,
+        situation: Situation,
+    ) -> None:
+        self._arm, self._mounting, self._situation = arm, mounting, situation
+        setting = Setting(
+            arm, mounting, limits, situation.period_s, situation.obstacles,
+            situation.depth_range, situation.start,
+        )  # fmt: skip
+        self._solver = (QuadraticProgram() if solver is None else solver).bind(setting)
+        self._trajectory = PoseTrajectory(objective, arm, situation.period_s)
+        self._null_space_rate = objective.null_space_rate
+        self._null_space = np.zeros(arm.joint_count)  # rates of redundant joints, gently begun
+        self._view: TargetView | None = None
+        if corners is not None and self._solver.keeps_limits:
+            self._view = TargetView(mounting, corners, *self._solver.view)
+        count = len(self._solver.names)
+        self._active, self._slack, self._solved = np.zeros(count), np.zeros(count), True
+
+    def command(
+        self, observation: Observation, reference: Reference, joints: JointState
+    ) -> JointCommand:
+        """Take the target's new pose as the goal; return the rates to set out with."""
+        target, desired = observation.target, reference.T_camera_target
+        if target is None or desired is None:
+            self.hold()
+            return JointCommand(np.zeros(self._arm.joint_count), np.zeros(6))
+        motion = self._situation.motion
+        goal = tip_goal(target, desired, self._mounting, joints.time if motion.prediction else None)
+        if not motion.feed_forward:
+            goal = MovingPose(goal.T, np.zeros(6))
+        self._trajectory.aim(goal, joints.position)
+        if self._view is not None:
+            self._view.see(target, desired, joints.time)
+        pressure = describe(self._active, self._slack, self._solved, self._solver.names)
+        self._active, self._slack, self._solved = 0 * self._active, 0 * self._slack, True
+        solution = self._solve(joints, self._trajectory.twist(joints.position))
+        A = self._twist_map(joints.position)
+        return JointCommand(
+            solution.rates,
+            solution.v_tip if len(A) == 0 else A @ solution.v_tip,
+            solution.manipulability,
+            solution.penalty,
+            pressure.active,
+            solution.fault,
+            slack=pressure.slack,
+        )
+
+    def follow(self, setpoint: Setpoint) -> FloatArray:
+        """Return joint rates (n,) for the next inner period from the last set-point."""
+        if not self._trajectory.planned:
+            return np.zeros(self._arm.joint_count)
+        twist = self._trajectory.next_twist(setpoint.position)
+        solution = self._solve(setpoint, twist)
+        differs = bool(np.abs(solution.v_tip - twist).max() > _HELD_BACK)
+        held_back = self._solver.keeps_limits and differs
+        self._trajectory.advance(setpoint.position, solution.rates, held_back)
+        if self._view is not None:
+            self._view.advance(self._situation.period_s)
+        return solution.rates
+
+    def hold(self) -> None:
+        """Forget the goal and the trajectory."""
+        self._trajectory.clear()
+        self._null_space = np.zeros(self._arm.joint_count)
+
+    def _solve(self, joints: JointState | Setpoint, twist: FloatArray) -> Solution:
+        features = NO_FEATURES
+        if self._view is not None:
+            features = self._view.features(self._arm.forward_kinematics(joints.position))
+        problem = Problem(
+            joints.position,
+            joints.velocity,
+            np.eye(6),
+            twist,
+            features,
+            self._null_space_rates(joints.position),
+            *NO_JOINTS,
+            self._twist_map(joints.position),
+        )
+        solution = self._solver.solve(problem)
+        self._active = np.maximum(self._active, solution.active)
+        self._slack = np.maximum(self._slack, solution.slack)
+        self._solved = self._solved and solution.solved
+        return solution
+
+    def _twist_map(self, q: FloatArray) -> FloatArray:
+        """Return A (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip."""
+        if self._mounting.at_tip:
+            return AT_TIP
+        return self._mounting.twist_map(self._arm.forward_kinematics(q))
+
+    def _null_space_rates(self, q: FloatArray) -> FloatArray:
+        """Return the rates of redundant joints towards mid-range, (n,), gently begun."""
+        away = -self._null_space_rate * self._arm.normalized(q)
+        share = self._situation.period_s / _ONSET_S
+        self._null_space = self._null_space + share * (away - self._null_space)
+        return self._null_space

@@ -1,0 +1,141 @@
+"""The servo as a cell file declares it."""
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+from vergence.control.image_motion import MotionSettings
+from vergence.control.limits import Limits
+from vergence.control.objectives import Objective
+from vergence.control.solvers import QuadraticProgram, Solver
+from vergence.control.term import Term
+from vergence.errors import InputError, nearest
+from vergence.loading import Place, load_part, make_part, part_class
+from vergence.parts import field_names, kind_of, knob, part, slot, table_of
+
+
+@part("term", "term")
+class WeightedObjective:
+    """One objective of a stack."""
+
+    objective: Objective = slot("objective")  # what to do
+    weight: float = knob(1.0, above=0, upto=1e6)  # of its quadratic in the sum
+    camera: str = knob("", live=False)  # that it is about; the task's if empty
+
+
+@part("law", "servo")
+class ServoSettings:
+    """Objectives, limits and solver, and what is assumed of the features between images.
+
+    In a cell file, a table with a `kind` is a servo with that one objective, whose keys stand in
+    the same table; several stand in `objectives`.
+    """
+
+    objectives: tuple[WeightedObjective, ...] = slot("term", many=True)  # each with its weight
+    limits: Limits | None = slot("limits", None)  # those of the solver's own defaults if absent
+    solver: Solver = slot("solver", QuadraticProgram)  # from objectives to joint rates
+    depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # believed of the features
+    carries_depth: bool = knob(False)  # update the depth from the camera's motion
+    feed_forward: bool = knob(True)  # the target's own motion is estimated and fed forward
+    prediction: bool = knob(True)  # features are carried from their exposure to now
+    flow_smoothing_s: float = knob(
+        0.1, "s", least=0, upto=10
+    )  # of the target's motion in the image
+
+    def __post_init__(self) -> None:
+        if not self.objectives:
+            raise InputError("law", "objectives", "none", "one objective or more")
+
+    @property
+    def kind(self) -> str:
+        """The kind of its one objective, or all kinds joined by "+"."""
+        return "+".join(kind_of(term.objective) for term in self.objectives)
+
+    @property
+    def objective(self) -> Objective:
+        """The first objective."""
+        return self.objectives[0].objective
+
+    @property
+    def motion(self) -> MotionSettings:
+        """What is assumed of the features between their exposure and now."""
+        return MotionSettings(
+            self.feed_forward, self.prediction, self.flow_smoothing_s, self.carries_depth
+        )
+
+    @property
+    def terms(self) -> list[Term]:
+        """The objectives with weights and cameras."""
+        return [Term(term.objective, term.weight, term.camera) for term in self.objectives]
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], place: Place) -> Self:
+        """Return the settings that a table of a cell file describes.
+
+        Raises:
+            InputError: that names file and key, what was given and what is allowed.
+        """
+        own = {key: value for key, value in table.items() if key in field_names(cls)}
+        rest = {key: value for key, value in table.items() if key not in own}
+        if "objectives" in own:
+            if rest:
+                key, value = next(iter(rest.items()))
+                allowed = f"beside objectives: {nearest(key, field_names(cls))}"
+                raise InputError(place.source, f"{place.key}.{key}", value, allowed)
+            listed = own["objectives"]
+            if not isinstance(listed, list | tuple):
+                key = f"{place.key}.objectives"
+                raise InputError(place.source, key, listed, "a list of tables")
+            own["objectives"] = tuple(
+                _term(item, place.at("objectives").at(str(i))) for i, item in enumerate(listed)
+            )
+        else:
+            own["objectives"] = (_term(rest, place),)
+        made: Self = make_part(cls, own, place)
+        return made
+
+    def table(self, *, defaults: bool = True) -> dict[str, Any]:
+        """Return the table that `from_table` reads, as JSON values."""
+        own = table_of(self, defaults=defaults)
+        del own["kind"]
+        terms = [_flat(term) for term in own.pop("objectives")]
+        if len(terms) == 1 and not terms[0].keys() & own.keys():
+            if terms[0].get("weight") == 1.0:
+                del terms[0]["weight"]
+            if not terms[0].get("camera"):
+                terms[0].pop("camera", None)
+            return terms[0] | own
+        return {"objectives": terms, **own}
+
+
+def _term(given: Any, place: Place) -> WeightedObjective:
+    """Return an objective from its table, its weight and camera beside its own keys."""
+    if isinstance(given, WeightedObjective):
+        return given
+    if not isinstance(given, Mapping):
+        term: WeightedObjective = WeightedObjective(objective=load_part("objective", given, place))
+        return term
+    beside = {key: given[key] for key in ("weight", "camera") if key in given}
+    rest = {key: value for key, value in given.items() if key not in beside}
+    if "kind" not in rest:
+        key = f"{place.key}.kind"
+        raise InputError(place.source, key, "nothing", "a value; this key is required")
+    objective = part_class("objective", rest.pop("kind"), place)
+    known = {*field_names(objective), *field_names(ServoSettings)}
+    for key in rest:
+        if key not in known:
+            full = f"{place.key}.{key}"
+            given_text = f"a key that {kind_of(objective)} does not have"
+            allowed = f"{nearest(key, known)}; --set {full}= removes it"
+            raise InputError(place.source, full, given_text, allowed)
+    made: WeightedObjective = make_part(
+        WeightedObjective, {"objective": make_part(objective, rest, place), **beside}, place
+    )
+    return made
+
+
+def _flat(term: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table of a term: its objective's with weight and camera beside."""
+    return {
+        **term["objective"],
+        **{key: term[key] for key in ("weight", "camera") if key in term},
+    }

@@ -1,0 +1,126 @@
+"""Joint rates by the pseudo-inverse of the Jacobian, as textbooks have it: no limits are kept."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control._rates import resolve_twist
+from vergence.control.limits import KIND_NAMES
+from vergence.control.solvers._redundancy import resolve_redundant
+from vergence.control.solvers.solver import (
+    UNBOUNDED,
+    BoundSolver,
+    Problem,
+    Setting,
+    Solution,
+)
+from vergence.errors import InputError
+from vergence.parts import knob, part
+from vergence.robot import Arm, manipulability_measure
+from vergence.signals import OutcomeKind
+
+_RATES = KIND_NAMES.index("joint rates")
+
+
+def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, str] | None:
+    """Return the fault of an arm too near a singularity, if it is.
+
+    Args:
+        sigma: smallest singular value of its Jacobian.
+        singular_below: below which the solver gives up.
+    """
+    if not sigma < singular_below:
+        return None
+    reason = (
+        f"the smallest singular value of the Jacobian fell to {sigma:.3g} "
+        f"(limit {singular_below:g})"
+    )
+    return OutcomeKind.SINGULARITY, reason
+
+
+@part("solver", "pseudo_inverse")
+class PseudoInverse:
+    """v = H⁻¹ g, q̇ = J⁺ v + (I - J⁺ J) q̇_null, all rates slowed alike to keep their limits.
+
+    Ends the run near a singularity.
+    """
+
+    singular_below: float = knob(0.02, least=0, upto=10)  # smallest singular value of J
+
+    def bind(self, setting: Setting) -> BoundSolver:
+        """Return the solver for one arm."""
+        _require_no_limits(setting, "pseudo_inverse")
+        return _BoundPseudoInverse(self, setting.arm)
+
+
+class _BoundPseudoInverse:
+    names: tuple[str, ...] = KIND_NAMES
+    keeps_limits = False
+    view = UNBOUNDED
+
+    def __init__(self, numbers: PseudoInverse, arm: Arm) -> None:
+        self._numbers, self._arm = numbers, arm
+
+    def solve(self, problem: Problem) -> Solution:
+        """Return the joint rates for one tick."""
+        twist = np.linalg.solve(problem.H, problem.g).astype(np.float64)
+        J = self._arm.jacobian(problem.q)
+        smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
+        J_inverse = np.linalg.pinv(J).astype(np.float64)
+        rates, scale = resolve_twist(J_inverse, twist, self._arm.rate_max)
+        secondary = secondary_rates(problem)
+        if secondary.any():
+            rates = rates + secondary - J_inverse @ (J @ secondary)
+        active = np.zeros(len(KIND_NAMES))
+        active[_RATES] = scale < 1.0
+        fault = singular_fault(smallest, self._numbers.singular_below)
+        measure = manipulability_measure(J) ** 2
+        none = np.zeros(len(KIND_NAMES))
+        return Solution(rates, scale * twist, measure, np.nan, active, none, True, fault)
+
+
+@part("solver", "damped_pseudo_inverse")
+class DampedPseudoInverse:
+    """The pseudo-inverse weighted by the rate limits and damped near singularities.
+
+    Weighting lets metres and radians, slow and fast joints share the work; see `resolve_redundant`.
+    """
+
+    singular_below: float = knob(0.02, least=0, upto=1)  # damped below it, of the largest value
+
+    def bind(self, setting: Setting) -> BoundSolver:
+        """Return the solver for one arm."""
+        _require_no_limits(setting, "damped_pseudo_inverse")
+        return _BoundDampedPseudoInverse(self, setting.arm)
+
+
+class _BoundDampedPseudoInverse:
+    names: tuple[str, ...] = KIND_NAMES
+    keeps_limits = False
+    view = UNBOUNDED
+
+    def __init__(self, numbers: DampedPseudoInverse, arm: Arm) -> None:
+        self._numbers, self._arm = numbers, arm
+
+    def solve(self, problem: Problem) -> Solution:
+        """Return the joint rates for one tick."""
+        twist = np.linalg.solve(problem.H, problem.g).astype(np.float64)
+        J = self._arm.jacobian(problem.q)
+        rates: FloatArray = resolve_redundant(
+            J, twist, secondary_rates(problem), self._arm.rate_max, self._numbers.singular_below
+        )
+        none = np.zeros(len(KIND_NAMES))
+        return Solution(rates, J @ rates, np.nan, np.nan, none, none, True)
+
+
+def secondary_rates(problem: Problem) -> FloatArray:
+    """Return the joint rates (n,) desired in the null space of the objectives."""
+    if len(problem.g_joints) == 0:
+        return problem.null_space_rates
+    asked = np.linalg.lstsq(problem.H_joints, problem.g_joints, rcond=None)[0]
+    return problem.null_space_rates + asked.astype(np.float64)
+
+
+def _require_no_limits(setting: Setting, kind: str) -> None:
+    if setting.limits is not None:
+        raise InputError("Servo", "limits", f"limits beside solver {kind}, which keeps none",
+                         "solver quadratic_program, or no limits")  # fmt: skip

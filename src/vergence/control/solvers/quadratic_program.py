@@ -1,0 +1,157 @@
+"""The prioritised quadratic program: any objectives, served as well as the limits allow."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray, IntArray
+from vergence.control.limits import (
+    KIND_NAMES,
+    NO_SOLIDS,
+    ConstraintSettings,
+    Limits,
+)
+from vergence.control.solvers._constrained_rates import (
+    Avoidance,
+    Scene,
+    Task,
+    constrained_rates,
+)
+from vergence.control.solvers.solver import BoundSolver, Problem, Setting, Solution
+from vergence.errors import InputError
+from vergence.parts import knob, part
+from vergence.robot import manipulability_measure
+
+_VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.03
+_PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
+
+
+@part("solver", "quadratic_program")
+class QuadraticProgram:
+    """Minimises the objectives subject to the limits, by priority.
+
+    minimise Σ ½ vᵀ H v - gᵀ v + ½ μ ‖q̇ - q̇_null‖² + ½ S / w'(q + T q̇)  subject to  C q̇ ≥ d.
+    """
+
+    S: float = knob(0.0, least=0, upto=1e3)  # on 1/w', the penalty taken joint by joint
+    avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100)  # joint rates S alone causes
+    damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, on the joint rates
+
+    def bind(self, setting: Setting) -> BoundSolver:
+        """Return the program for one arm.
+
+        Raises:
+            InputError: if the margins do not suit the arm or its camera.
+        """
+        return BoundProgram(self, setting)
+
+
+class BoundProgram:
+    """The quadratic program for one arm.
+
+    Args:
+        program: its numbers.
+        setting: what it is made for.
+    """
+
+    keeps_limits = True
+
+    def __init__(self, program: QuadraticProgram, setting: Setting) -> None:
+        self._setting = setting
+        self._limits = setting.limits or Limits()
+        self.names = self._limits.names
+        self.settings = constraint_settings(setting, self._limits)
+        self.view = self.settings.view_low, self.settings.view_high
+        arm = setting.arm
+        self._joint_limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+        self._avoidance = Avoidance(
+            program.S, program.avoidance_rate_max, _PENALTY_K, program.damping
+        )
+        sees = "occlusion" in self._limits.order and not setting.mounting.is_fixed
+        self._obstacles = setting.obstacles if sees else None
+        T = setting.mounting.T_tip_camera
+        self._T_tip_camera = np.eye(4) if T is None else np.array(T)
+        self._no_rows = np.empty((0, arm.joint_count)), np.empty(0), np.empty(0, dtype=np.int64)
+        self._started = self._starts_at(setting.start)
+
+    def solve(self, problem: Problem) -> Solution:
+        """Return the joint rates for one tick."""
+        if not self._started:
+            self._started = self._starts_at(problem.q)
+        obstacles = NO_SOLIDS if self._obstacles is None else self._obstacles()
+        scene = Scene(
+            problem.features, obstacles, problem.A, self._T_tip_camera, *self._own_rows(problem)
+        )
+        answer = constrained_rates(
+            self._setting.arm.chain,
+            self._joint_limits,
+            problem.q,
+            problem.velocity,
+            Task(problem.H, problem.g, problem.H_joints, problem.g_joints,
+                 problem.null_space_rates),
+            scene,
+            self._setting.period_s,
+            self.settings,
+            self._avoidance,
+        )  # fmt: skip
+        return Solution(*answer)
+
+    def _starts_at(self, q: FloatArray | None) -> bool:
+        """Take the manipulability to keep from a configuration, if it is known."""
+        if q is None or "singularity" not in self._limits.order:
+            return q is not None
+        least = self._limits.manipulability_share * manipulability_measure(
+            self._setting.arm.jacobian(q)
+        )
+        self.settings = self.settings._replace(manipulability_min=least)
+        return True
+
+    def _own_rows(self, problem: Problem) -> tuple[FloatArray, FloatArray, IntArray]:
+        if not self._limits.own:
+            return self._no_rows
+        arm, period = self._setting.arm, self._setting.period_s
+        found = [limit.rows(arm, problem.q, problem.velocity, period) for limit in self._limits.own]
+        C = np.ascontiguousarray(np.vstack([rows for rows, _ in found]), dtype=np.float64)
+        d = np.concatenate([np.asarray(right, dtype=np.float64) for _, right in found])
+        kind = np.repeat(len(KIND_NAMES) + np.arange(len(found)), [len(r) for _, r in found])
+        return C, d, kind
+
+
+def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:
+    """Return the margins and priorities of limits for one arm and camera.
+
+    Raises:
+        InputError: if they do not suit these.
+    """
+    camera, order = setting.mounting.camera, limits.order
+    view_px = _VIEW_MARGIN_PX if limits.view_margin_px is None else limits.view_margin_px
+    half = 0.5 * (min(camera.width, camera.height) - 1)
+    if not view_px < half:
+        allowed = f"from 0 to less than half the image, {half:g}"
+        raise InputError("Limits", "view_margin_px", view_px, allowed)
+    if not limits.approach_rate_hz * setting.period_s <= 1:
+        # Faster, and one command would use up more room than there is.
+        allowed = f"above 0, up to one command's share, {1 / setting.period_s:g}"
+        raise InputError("Limits", "approach_rate_hz", limits.approach_rate_hz, allowed)
+    x_min, x_max, y_min, y_max = camera.rectangle(view_px + 0.5)
+    low, high = np.array([x_min, y_min]), np.array([x_max, y_max])
+    joint_margin = _JOINT_MARGIN if limits.joint_margin is None else limits.joint_margin
+    return ConstraintSettings(
+        limits.approach_rate_hz,
+        joint_margin if "joint margin" in order else 0.0,
+        low if "view" in order else np.full(2, -np.inf),
+        high if "view" in order else np.full(2, np.inf),
+        *(limits.depth_range or setting.depth_range),
+        0.0,
+        limits.clearance_m,
+        _priorities(limits),
+    )
+
+
+def _priorities(limits: Limits) -> IntArray:
+    """Return the priority of each kind, (K,): 0 for hard ones, 1 for the highest."""
+    priorities = np.zeros(len(limits.names), dtype=np.int64)
+    for place, name in enumerate(limits.order, start=1):
+        priorities[KIND_NAMES.index(name)] = place
+    own = len(limits.own)
+    if own:
+        priorities[-own:] = len(limits.order) + 1 + np.arange(own)
+    return priorities

@@ -1,0 +1,112 @@
+"""What a servo asks of a solver: joint rates for a quadratic in the twist of the arm's tip."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.limits import KIND_NAMES, Limits
+from vergence.control.mounting import CameraMounting
+from vergence.robot import Arm
+from vergence.signals import OutcomeKind
+
+Obstacles: TypeAlias = Callable[[], FloatArray]  # what may hide the features now, (K, 16)
+
+
+class Problem(NamedTuple):
+    """What is asked at one tick."""
+
+    q: FloatArray  # (n,) joint positions
+    velocity: FloatArray  # (n,) joint rates now
+    H: FloatArray  # (6, 6) of ½ vᵀ H v - gᵀ v over the twist of the arm's tip
+    g: FloatArray  # (6,)
+    features: FloatArray  # (M, 7) what has to stay in view, of `pack_features`
+    null_space_rates: FloatArray  # (n,) desired where the objectives leave a choice
+    H_joints: FloatArray  # (n, n) of a quadratic in the joint rates; (0, 0) for none
+    g_joints: FloatArray  # (n,); (0,) for none
+    A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
+
+
+class Solution(NamedTuple):
+    """Joint rates, and how they came about."""
+
+    rates: FloatArray  # (n,) rad/s or m/s
+    v_tip: FloatArray  # (6,) what they do to the arm's tip, m/s and rad/s
+    manipulability: float  # w'
+    penalty: float  # P
+    active: FloatArray  # (K,) by kind of limit: how many rows push
+    slack: FloatArray  # (K,) by kind: the largest slack, in the row's own unit
+    solved: bool
+    fault: tuple[OutcomeKind, str] | None = None  # why the servo cannot go on
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a solver is made for.
+
+    Attributes:
+        arm: up to its tip.
+        mounting: of the camera whose features have to stay in view.
+        limits: what is kept; None for a solver that keeps no limits.
+        period_s: how long a command acts.
+        obstacles: gives what may come between camera and features; None for nothing.
+        depth_range: bounds on true over believed depth, where the limits give none.
+        start: joint positions at the start, (n,); those of the first tick if None.
+    """
+
+    arm: Arm
+    mounting: CameraMounting
+    limits: Limits | None
+    period_s: float
+    obstacles: Obstacles | None = None
+    depth_range: tuple[float, float] = (0.5, 2.0)
+    start: FloatArray | None = None
+
+
+class BoundSolver(Protocol):
+    """A solver for one arm."""
+
+    names: tuple[str, ...]  # of the kinds of limits
+    keeps_limits: bool
+    view: tuple[FloatArray, FloatArray]  # lower and upper bounds, normalized, (2,) each
+
+    def solve(self, problem: Problem) -> Solution:
+        """Return the joint rates for one tick."""
+        ...
+
+
+@runtime_checkable
+class Solver(Protocol):
+    """Turns objectives into joint rates."""
+
+    def bind(self, setting: Setting) -> BoundSolver:
+        """Return the solver for one arm.
+
+        Raises:
+            InputError: if the numbers contradict each other or do not suit the arm.
+        """
+        ...
+
+
+UNBOUNDED = (np.full(2, -np.inf), np.full(2, np.inf))
+NO_JOINTS = (np.empty((0, 0)), np.empty(0))
+
+
+class Pressure(NamedTuple):
+    """Which limits shaped a command, as `JointCommand` has it."""
+
+    active: tuple[str, ...]  # those that pushed
+    slack: dict[str, float]  # those that were relaxed: by how much, in the unit of their rows
+
+
+def describe(
+    active: FloatArray, slack: FloatArray, solved: bool, names: tuple[str, ...] = KIND_NAMES
+) -> Pressure:
+    """Name what pushed and what was relaxed, by kind of limit."""
+    if not solved:
+        return Pressure(("no solution: braking",), {})
+    pushed = tuple(name for name, count in zip(names, active, strict=True) if count)
+    relaxed = {name: float(amount) for name, amount in zip(names, slack, strict=True) if amount > 0}
+    return Pressure(pushed, relaxed)

@@ -1,0 +1,64 @@
+"""What every visual feature has."""
+
+from abc import ABC, abstractmethod
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vergence.arrays import FloatArray, frozen
+from vergence.errors import InputError
+
+
+class Feature(ABC):
+    """A visual feature of image points: its value, and how that moves when the camera does.
+
+    Args:
+        points: normalized coordinates of the points that it is made of, (M, 2).
+        depth_m: of each point along the optical axis, (M,), or one number for all.
+
+    Attributes:
+        points: (M, 2).
+        depth_m: (M,).
+
+    Raises:
+        InputError: if a depth is not above zero.
+    """
+
+    def __init__(self, points: ArrayLike, depth_m: ArrayLike = 1.0) -> None:
+        self.points = frozen(points, (None, 2), "points")
+        depth = np.asarray(depth_m, dtype=np.float64)
+        self.depth_m = frozen(np.full(len(self.points), depth) if depth.ndim == 0 else depth,
+                              (len(self.points),), "depth_m")  # fmt: skip
+        if not (self.depth_m > 0).all():
+            raise InputError(type(self).__name__, "depth_m", depth_m, "depths above zero")
+
+    @abstractmethod
+    def value(self) -> FloatArray:
+        """Return s, (k,)."""
+
+    @abstractmethod
+    def interaction(self) -> FloatArray:
+        """Return L (k, 6) with ṡ = L v_camera for a stationary target."""
+
+    def error(self, desired: Self) -> FloatArray:
+        """Return e = s - s_star, (k,); a feature of angles wraps them here."""
+        difference: FloatArray = self.value() - desired.value()
+        return difference
+
+    def outline(self) -> FloatArray:
+        """Return the points that have to stay in view, (M, 2)."""
+        return self.points
+
+    def drift(self, flow: FloatArray, step_s: float = 1e-4) -> FloatArray:
+        """Return ∂s/∂t by the target's own motion, (k,), by a central difference.
+
+        Args:
+            flow: of the points, by the target's own motion, (M, 2), 1/s.
+            step_s: of the difference, s.
+        """
+        before, after = (
+            type(self)(self.points + sign * step_s * flow, self.depth_m) for sign in (-1, 1)
+        )
+        change: FloatArray = after.error(before) / (2 * step_s)
+        return change

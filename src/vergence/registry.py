@@ -1,0 +1,134 @@
+"""Parts by role and name: those that ship, those of installed packages, and a user's own.
+
+Nothing is imported before it is asked for.
+"""
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Mapping
+from hashlib import sha256
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from vergence.errors import InputError, nearest
+
+ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.centre"
+
+_CONTROL = "vergence.control"
+BUILT_IN: Mapping[str, Mapping[str, str]] = {
+    "feature": {"points": "vergence.features:Points"},
+    "objective": {
+        "image_based": f"{_CONTROL}.objectives:ImageBased",
+        "optimal_tracking": f"{_CONTROL}.objectives:OptimalTracking",
+        "position_based": f"{_CONTROL}.objectives:PositionBased",
+        "point_pose": f"{_CONTROL}.objectives:PointPose",
+        "posture": f"{_CONTROL}.objectives:Posture",
+    },
+    "limit": {},
+    "limits": {"limits": f"{_CONTROL}.limits:Limits"},
+    "law": {"servo": f"{_CONTROL}:ServoSettings"},
+    "term": {"term": f"{_CONTROL}:WeightedObjective"},
+    "solver": {
+        "quadratic_program": f"{_CONTROL}.solvers:QuadraticProgram",
+        "pseudo_inverse": f"{_CONTROL}.solvers:PseudoInverse",
+        "damped_pseudo_inverse": f"{_CONTROL}.solvers:DampedPseudoInverse",
+    },
+}
+# What a part must have, by its role.
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "feature": ("value", "interaction"),
+    "objective": ("quadratic",),
+    "limit": ("rows",),
+}
+
+
+def kinds(role: str) -> tuple[str, ...]:
+    """Return the names of the parts of a role that ship or are installed."""
+    return tuple(sorted({*BUILT_IN.get(role, {}), *_installed(role)}))
+
+
+def find(
+    role: str, kind: str, *, folder: Path | None = None, source: str = "part", key: str = "kind"
+) -> Any:
+    """Return the class of a part.
+
+    Args:
+        role: what it is for.
+        kind: its name, or ``module:Class`` for one of a user's own: in a file beside the cell or
+            in an installed package.
+        folder: where the cell lies.
+        source: the file that names it, for messages.
+        key: where in that file.
+
+    Raises:
+        InputError: if there is no such part, it cannot be imported or does not fit the role.
+    """
+    dotted = BUILT_IN.get(role, {}).get(kind) or _installed(role).get(kind) or kind
+    if ":" not in dotted:
+        allowed = f"{nearest(kind, kinds(role))}, or module:Class"
+        raise InputError(source, key, kind, allowed)
+    name, _, attribute = dotted.partition(":")
+
+    def refuse(why: str) -> InputError:
+        return InputError(source, key, f"{kind}, {why}", f"a class declared as {role}")
+
+    try:
+        module = _own_module(name, folder) or importlib.import_module(name)
+    except ImportError as error:
+        raise refuse(f"which cannot be imported ({error})") from None
+    except Exception as error:
+        why = f"whose module raised {type(error).__name__}: {error}"
+        raise refuse(why) from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        raise refuse(f"but {name} has no {attribute}")
+    if not isinstance(found, type):
+        raise refuse("which is no class")
+    declared = getattr(found, "__part_role__", None)
+    if declared != role:
+        what = "declared as nothing" if declared is None else f"declared as {declared}"
+        raise refuse(f"which is {what}")
+    missing = [method for method in METHODS.get(role, ()) if not hasattr(found, method)]
+    if missing:
+        raise refuse(f"which has no method {missing[0]}")
+    if ":" in kind:
+        found.__part_kind__ = kind  # type: ignore[attr-defined]
+    return found
+
+
+def _installed(role: str) -> dict[str, str]:
+    begin = f"{role}."
+    return {
+        point.name.removeprefix(begin): point.value
+        for point in entry_points(group=ENTRY_POINTS)
+        if point.name.startswith(begin)
+    }
+
+
+def _own_module(name: str, folder: Path | None) -> Any:
+    """Return the module in a file beside the cell, None if there is none.
+
+    It is kept under a name of its own, so that two cells may each have their ``mine.py``.
+    """
+    if folder is None:
+        return None
+    file = folder.joinpath(*name.split(".")).with_suffix(".py")
+    if not file.is_file():
+        return None
+    text = file.read_bytes()
+    label = f"vergence_beside_{sha256(str(file.resolve()).encode() + text).hexdigest()[:16]}_{name}"
+    if label in sys.modules:
+        return sys.modules[label]
+    spec = importlib.util.spec_from_file_location(label, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[label] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[label]
+        raise
+    return module
