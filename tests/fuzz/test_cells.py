@@ -10,8 +10,11 @@ from untrusted import ends_well, mutants
 
 from vergence.cell import load_cell
 from vergence.cell.schema import TABLES
+from vergence.control import ServoSettings
 from vergence.errors import InputError
+from vergence.parts import field_names
 from vergence.places import CELL, CELLS
+from vergence.registry import find, kinds
 
 GOOD = (CELLS / "four_cameras" / CELL).read_bytes()
 NUMBERS = (
@@ -53,7 +56,11 @@ def keys() -> list[str]:
     for camera in cell.cameras:
         found += [f"cameras.{camera}.{key}" for key in TABLES["cameras"].model_fields]
     found += [f"task.{key}" for key in TABLES["follow"].model_fields]
-    found += [f"law.{key}" for key in TABLES["constrained"].model_fields]
+    for role in ("objective", "solver", "limits"):
+        below = "" if role == "objective" else f"{role}."
+        for kind in kinds(role):
+            found += [f"law.{below}{key}" for key in field_names(find(role, kind))]
+    found += [f"law.{key}" for key in (*field_names(ServoSettings), "kind", "weight", "camera")]
     found += [f"target.motion.{key}" for key in TABLES["random"].model_fields]
     odd = ["", ".", "a..b", "$\\bad{$", "laws.$\\bad{$", "x" * 30_000, ".".join("a" * 9000)]
     return [*found, *load_cell("four_cameras").model_dump(), *odd]
@@ -86,7 +93,7 @@ def test_a_file_without_end_is_not_read(tmp_path: Path) -> None:
 )
 def test_what_is_named_oddly_is_refused(name: str) -> None:
     quoted = name.encode("unicode_escape").decode().replace('"', '\\"')
-    law = f'laws = {{ "{quoted}" = {{ kind = "plain" }} }}'.partition(" = ")[2]
+    law = f'laws = {{ "{quoted}" = {{ kind = "image_based" }} }}'.partition(" = ")[2]
     with pytest.raises(InputError):
         load_cell("puma560", {"laws": law})
 

@@ -12,6 +12,8 @@ from vergence.errors import InputError, nearest
 from vergence.loading import Place, load_part, make_part, part_class
 from vergence.parts import field_names, kind_of, knob, part, slot, table_of
 
+_MOST_OBJECTIVES = 32
+
 
 @part("term", "term")
 class WeightedObjective:
@@ -82,9 +84,11 @@ class ServoSettings:
                 allowed = f"beside objectives: {nearest(key, field_names(cls))}"
                 raise InputError(place.source, f"{place.key}.{key}", value, allowed)
             listed = own["objectives"]
-            if not isinstance(listed, list | tuple):
+            if not isinstance(listed, list | tuple) or len(listed) > _MOST_OBJECTIVES:
                 key = f"{place.key}.objectives"
-                raise InputError(place.source, key, listed, "a list of tables")
+                raise InputError(
+                    place.source, key, listed, f"a list of up to {_MOST_OBJECTIVES} tables"
+                )
             own["objectives"] = tuple(
                 _term(item, place.at("objectives").at(str(i))) for i, item in enumerate(listed)
             )
