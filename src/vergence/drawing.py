@@ -61,5 +61,14 @@ def save(drawn: "Figure", path: Any) -> None:
     import matplotlib as mpl
 
     metadata = {"Date": None} if str(path).endswith(".svg") else None
+    draw_names_as_written(drawn)
     with mpl.rc_context(SETTINGS):
         drawn.savefig(path, dpi=150, metadata=metadata)
+
+
+def draw_names_as_written(drawn: "Figure") -> None:
+    """Draw dollar signs in a figure as such: names that users choose are no formulas."""
+    from matplotlib.text import Text
+
+    for text in drawn.findobj(Text):
+        text.set_parse_math(False)

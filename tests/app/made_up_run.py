@@ -1,6 +1,7 @@
 """A run that never was: a textured square wanders through a camera's picture, an arm sways."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,21 @@ def record(folder: Path, outcome: Outcome = COMPLETED, **choices: object) -> Pat
     recorder.event(4.0, "feature lost", "point 4 of wrist: the residual is too large")
     recorder.close(outcome, {"duration_s": 6.0, "real_time_factor": 5.5})
     return folder
+
+
+def renamed(tick: TickRecord, arm: str, camera: str) -> TickRecord:
+    """Return a tick of an arm of two joints and a camera with other names."""
+    (state,), (frame,) = tick.sample.joints.values(), tick.sample.frames
+    assert tick.observation is not None
+    (view,) = tick.observation.views
+    two = JointState(state.time, state.position[:2], state.velocity[:2])
+    command = replace(tick.commands["puma"], velocity=state.velocity[:2])
+    return replace(
+        tick,
+        sample=Sample(tick.time, {arm: two}, (replace(frame, camera=camera, joints={}),)),
+        observation=Observation(tick.time, (replace(view, camera=camera),)),
+        commands={arm: command},
+    )
 
 
 def _tick(

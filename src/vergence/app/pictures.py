@@ -25,6 +25,7 @@ _LOG = logging.getLogger(__name__)
 # set by its size and length.
 _FILM_FRAMES = 160
 _FILM_WIDTH_PX = 400
+_FASTEST_HZ = 1000.0
 _KEY_FRAMES = 4
 _KEY_FRAME_WIDTH_PX = 640
 
@@ -43,7 +44,10 @@ def film(recording: Recording, camera: str) -> bytes | None:
     shown = range(0, len(times), max(1, -(-len(times) // _FILM_FRAMES)))
     if len(shown) < 2:
         return None
-    rate = (len(shown) - 1) / float(times[shown[-1]] - times[0])
+    length = float(times[shown[-1]] - times[0])
+    if length <= 0.0:  # times that no camera has
+        return None
+    rate = min((len(shown) - 1) / length, _FASTEST_HZ)
     trace = recording.cameras[camera]
     frames = (
         draw(image, Marks.at(trace, time), _FILM_WIDTH_PX)
@@ -55,7 +59,9 @@ def film(recording: Recording, camera: str) -> bytes | None:
 def encode(frames: Iterable[NDArray[np.uint8]], rate_hz: float) -> bytes | None:
     """Return colour frames of one size as a VP8 film; None if this OpenCV cannot write one."""
     rest = iter(frames)
-    first = next(rest)
+    first = next(rest, None)
+    if first is None:
+        return None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.webm"
         height, width = (side - side % 2 for side in first.shape[:2])  # VP8 wants them even

@@ -190,6 +190,9 @@ def _cell(recording: Recording) -> str:
 
 def _footer(recording: Recording) -> str:
     cut = "" if recording.complete else "The recording was cut off; this is what had been written. "
+    if recording.skipped:
+        messages = "message" if recording.skipped == 1 else "messages"
+        cut += f"{recording.skipped} {messages} could not be read. "
     return (
         f"<footer>{cut}Made by vergence {escape(recording.version)} from recording.mcap, which "
         "also opens in Foxglove and Rerun.</footer>"

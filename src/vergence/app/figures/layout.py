@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from vergence.drawing import SETTINGS, figure
+from vergence.drawing import SETTINGS, draw_names_as_written, figure
 from vergence.runtime.recording import Event
 
 if TYPE_CHECKING:
@@ -34,7 +34,12 @@ def panels(count: int, x_label: str = "time (s)", height: float = _PANEL_HEIGHT)
 def mark_events(on: Panels, events: Sequence[Event]) -> None:
     """Draw a numbered line at every event, in the order of the report's list of events."""
     start, end = on.axes[0].get_xlim()
-    for numbers, time in _close_together([event.time for event in events], 0.02 * (end - start)):
+    shown = [
+        (number, event.time)
+        for number, event in enumerate(events, start=1)
+        if start <= event.time <= end
+    ]
+    for numbers, time in _close_together(shown, 0.02 * (end - start)):
         for axes in on.axes:
             axes.axvline(time, color="#444", linewidth=0.9, linestyle=(0, (5, 3)), zorder=2.1)
         on.axes[0].annotate(
@@ -49,10 +54,12 @@ def mark_events(on: Panels, events: Sequence[Event]) -> None:
         )
 
 
-def _close_together(times: Sequence[float], gap: float) -> list[tuple[list[int], float]]:
+def _close_together(
+    events: Sequence[tuple[int, float]], gap: float
+) -> list[tuple[list[int], float]]:
     """Return the numbers of events that would be drawn over each other, and their first time."""
     groups: list[tuple[list[int], float]] = []
-    for number, time in enumerate(times, start=1):
+    for number, time in events:
         if groups and time - groups[-1][1] < gap:
             groups[-1][0].append(number)
         else:
@@ -65,6 +72,7 @@ def svg(drawn: "Figure") -> bytes:
     import matplotlib as mpl
 
     out = io.BytesIO()
+    draw_names_as_written(drawn)
     with mpl.rc_context(SETTINGS):
         drawn.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()

@@ -1,18 +1,20 @@
 """Reads a run back from its folder."""
 
-import json
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import ConfigDict, Field, StringConstraints, TypeAdapter
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.errors import InputError
+from vergence.errors import InputError, echo
 from vergence.places import find_recording
-from vergence.runtime.recording import wire
+from vergence.runtime.recording import streams, wire
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
+from vergence.runtime.recording.rows import rows
 from vergence.runtime.recording.run_info import RunInfo
 from vergence.runtime.recording.traces import (
     ArmTrace,
@@ -26,6 +28,12 @@ from vergence.runtime.recording.traces import (
 from vergence.signals import Outcome, OutcomeKind
 
 _PICTURES = "/image"  # how the topics end that are read one by one
+_MOST_EVENTS = 100_000
+_Text = Annotated[str, StringConstraints(max_length=1000)]
+_SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
+    Annotated[dict[_Text, float | _Text | None], Field(max_length=1000)],
+    config=ConfigDict(allow_inf_nan=False),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +59,7 @@ class Recording:
     outcome: Outcome | None  # None if the run was cut off before it could say
     summary: Mapping[str, float | str | None]
     complete: bool  # whether the file ends as it should
+    skipped: int  # messages that could not be read
 
     @classmethod
     def open(cls, run: str | Path) -> Self:
@@ -65,25 +74,33 @@ class Recording:
         path = find_recording(run)
         contents = McapContents.read(path, leave_out=_PICTURES)
         info, version = _introduction(path, contents)
-        target = _rows(contents, "/target")
-        end = contents.metadata.get("outcome")
+        read = _Messages(contents)
+        target = read.rows("/target", streams.TARGET_SCHEMA, ("time",))
+        outcome, summary = _end(contents.metadata.get("outcome"))
         return cls(
             path=path,
             info=info,
             version=version,
             arms={
-                name: arm_trace(_rows(contents, f"/arm/{name}/state"), len(arm.names))
+                name: arm_trace(
+                    read.rows(f"/arm/{name}/state", streams.ARM_SCHEMA, ("time",)), len(arm.names)
+                )
                 for name, arm in info.arms.items()
             },
             cameras={
-                name: camera_trace(_rows(contents, f"/camera/{name}/features"))
+                name: camera_trace(
+                    read.rows(
+                        f"/camera/{name}/features", streams.FEATURES_SCHEMA, ("time", "received")
+                    )
+                )
                 for name in info.cameras
             },
             target=target_trace(target) if target else None,
-            events=tuple(_event(message) for message in contents.messages.get("/events", ())),
-            outcome=_outcome(end) if end else None,
-            summary=json.loads(end["summary"]) if end else {},
-            complete=contents.complete and end is not None,
+            events=read.events(),
+            outcome=outcome,
+            summary=summary,
+            complete=contents.complete and outcome is not None,
+            skipped=read.skipped,
         )
 
     @property
@@ -100,7 +117,7 @@ class Recording:
 
     def image_times(self, camera: str) -> FloatArray:
         """Return when the kept pictures of a camera were exposed, (P,) s."""
-        return np.array([wire.time_of(parts, 1) for parts in self._pictures(camera)])
+        return np.array([time for time, _ in self.jpegs(camera)])
 
     def images(
         self, camera: str, only: Container[int] | None = None
@@ -111,21 +128,66 @@ class Recording:
             camera: its name.
             only: which of them, counted from 0; all if None. The others are not decoded.
         """
-        import cv2
-
+        size = self.info.cameras[camera]
         for number, (time, jpeg) in enumerate(self.jpegs(camera)):
             if only is None or number in only:
-                image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
-                yield time, np.asarray(image, dtype=np.uint8)
+                image = _decoded(jpeg, size.width, size.height)
+                if image is not None:
+                    yield time, image
 
     def jpegs(self, camera: str) -> Iterator[tuple[float, bytes]]:
-        """Yield the kept pictures of a camera with their time of exposure, in order, as JPEG."""
-        for parts in self._pictures(camera):
-            yield wire.time_of(parts, 1), wire.bytes_of(parts, 2)
+        """Yield the kept images of a camera with their time of exposure, in order, as JPEG."""
+        for message in messages_on(self.path, f"/camera/{camera}{_PICTURES}"):
+            try:
+                parts = wire.fields(message)
+                time, jpeg = wire.time_of(parts, 1), wire.bytes_of(parts, 2)
+            except ValueError:
+                continue
+            if time < 1e9 and jpeg:
+                yield time, jpeg
 
-    def _pictures(self, camera: str) -> Iterator[wire.Fields]:
-        topic = f"/camera/{camera}{_PICTURES}"
-        return map(wire.fields, messages_on(self.path, topic))
+
+def _decoded(jpeg: bytes, width: int, height: int) -> ImageArray | None:
+    """Return an image of a camera; None if it is none, or of another size."""
+    import cv2
+    from PIL import Image
+
+    try:
+        with Image.open(BytesIO(jpeg), formats=("JPEG",)) as header:
+            size = header.size
+    except (OSError, ValueError, SyntaxError):
+        return None
+    if size != (width, height):
+        return None
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+class _Messages:
+    """The messages of a file, and how many of them could not be read."""
+
+    def __init__(self, contents: McapContents) -> None:
+        self._messages = contents.messages
+        self.skipped = 0
+
+    def rows(self, topic: str, schema: Mapping[str, Any], times: Sequence[str]) -> list[Row]:
+        """Return the messages of a numeric stream."""
+        messages = self._messages.get(topic, ())
+        kept = rows(messages, schema, times)
+        self.skipped += len(messages) - len(kept)
+        return kept
+
+    def events(self) -> tuple[Event, ...]:
+        """Return what happened, in order."""
+        kept = []
+        for message in self._messages.get("/events", ())[:_MOST_EVENTS]:
+            try:
+                parts = wire.fields(message)
+                name, text = wire.text_of(parts, 4), wire.text_of(parts, 3)
+                kept.append(Event(wire.time_of(parts, 1), echo(name), echo(text)))
+            except ValueError:
+                self.skipped += 1
+        return tuple(kept)
 
 
 def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
@@ -133,17 +195,21 @@ def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
     about = contents.metadata.get("vergence")
     if about is None:
         raise InputError(str(path), "", "a file that does not begin as one", "a run's recording")
-    return RunInfo.from_json(json.loads(about["info"]), about["text"]), about["version"]
+    try:
+        info = RunInfo.from_json(about["info"], about["text"])
+    except (KeyError, ValueError) as error:
+        given = f"an introduction that cannot be read ({type(error).__name__})"
+        raise InputError(str(path), "", given, "a run's recording") from None
+    return info, echo(about.get("version", ""))
 
 
-def _rows(contents: McapContents, topic: str) -> list[Row]:
-    return [json.loads(message) for message in contents.messages.get(topic, ())]
-
-
-def _event(message: bytes) -> Event:
-    parts = wire.fields(message)
-    return Event(wire.time_of(parts, 1), wire.text_of(parts, 4), wire.text_of(parts, 3))
-
-
-def _outcome(end: Mapping[str, str]) -> Outcome:
-    return Outcome(OutcomeKind(end["kind"]), end["reason"], float(end["time"]))
+def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, float | str | None]]:
+    """Return how the run ended and its summary, if the file has them and they can be read."""
+    try:
+        if end is None:
+            return None, {}
+        outcome = Outcome(OutcomeKind(end["kind"]), end["reason"], float(end["time"]))
+        summary = _SUMMARY.validate_json(end["summary"])
+    except (KeyError, ValueError):
+        return None, {}
+    return (outcome, summary) if 0 <= outcome.time < 1e9 else (None, {})

@@ -2,15 +2,51 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import BaseModel, Field, StringConstraints
 
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.robot import Arm
 from vergence.runtime.driver import Driver
 from vergence.runtime.recording.numbers import array, numbers
+
+_Name = Annotated[str, StringConstraints(max_length=200)]
+_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Numbers = Annotated[tuple[_Number, ...], Field(max_length=14)]
+_Limits = Annotated[tuple[_Number | None, ...], Field(max_length=64)]
+_Side = Annotated[int, Field(ge=1, le=1 << 14)]
+_Focal = Annotated[float, Field(gt=0, le=1e9)]
+
+
+class _ArmData(BaseModel):
+    names: Annotated[tuple[_Name, ...], Field(max_length=64)]
+    q_min: _Limits
+    q_max: _Limits
+    rate_max: _Limits
+
+
+class _CameraData(BaseModel):
+    width: _Side
+    height: _Side
+    fx: _Focal
+    fy: _Focal
+    cx: _Number
+    cy: _Number
+    distortion: _Numbers = ()
+
+
+class _RunData(BaseModel):
+    """What a recording says of its run, in ranges that any run is in."""
+
+    cell: _Name
+    seed: int | None
+    task_camera: _Name
+    path: Annotated[str, StringConstraints(max_length=4096)] = ""
+    arms: Annotated[dict[_Name, _ArmData], Field(max_length=64)]
+    cameras: Annotated[dict[_Name, _CameraData], Field(max_length=64)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +73,12 @@ class ArmInfo:
         return {"names": list(self.names), **limits}
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """Read what `as_json` returned."""
+    def _of(cls, data: "_ArmData") -> Self:
         return cls(
-            tuple(data["names"]),
-            _unlimited(data["q_min"], -np.inf),
-            _unlimited(data["q_max"], np.inf),
-            _unlimited(data["rate_max"], np.inf),
+            data.names,
+            _unlimited(data.q_min, -np.inf),
+            _unlimited(data.q_max, np.inf),
+            _unlimited(data.rate_max, np.inf),
         )
 
 
@@ -89,16 +124,21 @@ class RunInfo:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any], text: str) -> Self:
-        """Read what `as_json` returned."""
+    def from_json(cls, data: str, text: str) -> Self:
+        """Read what `as_json` returned, which may come from anybody.
+
+        Raises:
+            ValueError: if it says anything else.
+        """
+        given = _RunData.model_validate_json(data)
         return cls(
-            data["cell"],
+            given.cell,
             text,
-            data["seed"],
-            {name: ArmInfo.from_json(arm) for name, arm in data["arms"].items()},
-            {name: Camera(**camera) for name, camera in data["cameras"].items()},
-            data["task_camera"],
-            data.get("path", ""),
+            given.seed,
+            {name: ArmInfo._of(arm) for name, arm in given.arms.items()},
+            {name: Camera(**camera.model_dump()) for name, camera in given.cameras.items()},
+            given.task_camera,
+            given.path,
         )
 
 

@@ -84,7 +84,8 @@ def arm_trace(rows: Sequence[Row], joints: int) -> ArmTrace:
         penalty=_column(rows, "penalty"),
         active=tuple(tuple(row.get("active", ())) for row in rows),
         slack=tuple(
-            dict(zip(row.get("slack", ()), row.get("slack_by", ()), strict=True)) for row in rows
+            dict(zip(row.get("slack", ()), array(row.get("slack_by", ())).tolist(), strict=False))
+            for row in rows
         ),
     )
 
@@ -99,7 +100,7 @@ def camera_trace(rows: Sequence[Row]) -> CameraTrace:
         points_px=_points(rows, "", widest),
         covariance_px=_stack(rows, "covariance", 4 * widest).reshape(count, widest, 2, 2),
         found=_stack(rows, "found", widest) == 1.0,
-        reasons=tuple(tuple(row.get("reasons", ())) for row in rows),
+        reasons=tuple(tuple(row.get("reasons", ())[:widest]) for row in rows),
         asked=_asked(rows, widest),
         window_center_px=_points(rows, "window_", widest),
         window_half_px=_points(rows, "window_half_", widest),
@@ -118,7 +119,7 @@ def target_trace(rows: Sequence[Row]) -> TargetTrace:
         T_world_target=_poses(rows, "T_world_target"),
         velocity=_stack(rows, "velocity", 6),
         covariance=_stack(rows, "covariance", 144).reshape(len(rows), 12, 12),
-        consistent=np.array([row["consistent"] for row in rows], dtype=np.bool_),
+        consistent=np.array([row.get("consistent", False) for row in rows], dtype=np.bool_),
     )
 
 
@@ -131,9 +132,9 @@ def _asked(rows: Sequence[Row], width: int) -> BoolArray:
     """Return which points were looked for: those with a window, and all where there are none."""
     out = np.zeros((len(rows), width), dtype=np.bool_)
     for place, row in zip(out, rows, strict=True):
-        found: list[Any] = row.get("found", [])
-        halves: list[Any] = row.get("window_half_u", found)
-        place[: len(found)] = [half is not None for half in halves]
+        found: list[Any] = row.get("found", [])[:width]
+        halves: list[Any] = row.get("window_half_u", found)[: len(found)]
+        place[: len(halves)] = [half is not None for half in halves]
     return out
 
 
@@ -142,10 +143,10 @@ def _column(rows: Sequence[Row], key: str) -> FloatArray:
 
 
 def _stack(rows: Sequence[Row], key: str, width: int) -> FloatArray:
-    """Return one row of `width` numbers a message, NaN where it has fewer."""
+    """Return one row of `width` numbers a message: NaN where it has fewer, the first if more."""
     out = np.full((len(rows), width), np.nan)
     for place, row in zip(out, rows, strict=True):
-        values = row.get(key, ())
+        values = row.get(key, ())[:width]
         place[: len(values)] = array(values)
     return out
 

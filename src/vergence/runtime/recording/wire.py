@@ -9,6 +9,7 @@ from typing import TypeAlias
 Fields: TypeAlias = dict[int, int | bytes]
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
+_LONGEST_VARINT = 63  # bits before the last byte of a number
 _FIXED_SIZES = {_FIXED64: 8, _FIXED32: 4}
 
 
@@ -45,7 +46,7 @@ def bytes_of(message: Fields, number: int) -> bytes:
 
 def text_of(message: Fields, number: int) -> str:
     """Return a field of text."""
-    return bytes_of(message, number).decode()
+    return bytes_of(message, number).decode(errors="replace")
 
 
 def time_of(message: Fields, number: int) -> float:
@@ -69,4 +70,6 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, at
         shift += 7
+        if shift > _LONGEST_VARINT:
+            raise ValueError("no protobuf message: a number of more than 64 bits")
     raise ValueError("no protobuf message: it ends in the middle of a number")
