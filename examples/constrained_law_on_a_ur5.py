@@ -13,8 +13,7 @@ from vergence.cell import load_cell
 from vergence.control import ImageBased, Law, Limits, PseudoInverse, Servo
 from vergence.estimation import ExactPoints
 from vergence.planning import FixedReference
-from vergence.runtime import Loop, Recorder, Recording
-from vergence.runtime.recording import RunInfo
+from vergence.runtime import Loop, Recorder, Recording, RunInfo
 from vergence.signals import Reference
 from vergence.simulation import SimulatedDriver
 

@@ -16,7 +16,6 @@ from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
 from vergence.drawing import SETTINGS, curve  # noqa: E402
 from vergence.studies.nelson1995 import STRATEGIES, moving  # noqa: E402
-from vergence.studies.trace import Trace  # noqa: E402
 
 OUT = Path(__file__).parents[1] / "docs" / "images" / "puma560.png"
 SHOWN_S = 16.0
@@ -41,9 +40,9 @@ class Snapshot:
 
 def run(strategy):
     cell = moving(load_cell("puma560").replace(law=STRATEGIES[strategy]), -1)
-    trace, snapshot = Trace("wrist"), Snapshot(SHOWN_S)
-    result = run_cell(cell, [trace, snapshot])
-    return cell, trace, snapshot.record, result.outcome
+    snapshot = Snapshot(SHOWN_S)
+    done = run_cell(cell, [snapshot])
+    return cell, done.cameras["wrist"], snapshot.record, done.outcome
 
 
 def cell_view(cell, record):
@@ -96,14 +95,12 @@ def main() -> None:
         "avoidance": "four axes with avoidance",
     }
     for index, (name, (_, trace, _, outcome)) in enumerate(runs.items()):
-        moved = trace["T_world_target"][:, 0, 3]
+        moved = trace.T_world_target[:, 0, 3]
         along = moved - moved[0]
         look = {**curve(index), "linewidth": 2.4, "zorder": 9 - index}
-        right.plot(trace["time"], along, label=labels[name], **look)
+        right.plot(trace.time, along, label=labels[name], **look)
         if not outcome.succeeded:
-            right.plot(
-                trace["time"][-1], along[-1], "X", color=look["color"], markersize=9, zorder=9
-            )
+            right.plot(trace.time[-1], along[-1], "X", color=look["color"], markersize=9, zorder=9)
     order = np.arange(len(runs))[::-1]
     handles, texts = right.get_legend_handles_labels()
     right.legend(

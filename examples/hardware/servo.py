@@ -14,8 +14,7 @@ from vergence.control import OptimalTracking, PseudoInverse, Servo
 from vergence.errors import VergenceError
 from vergence.estimation import TrackedPoints
 from vergence.planning import FixedReference
-from vergence.runtime import Driver, Loop, Recorder
-from vergence.runtime.recording import RunInfo
+from vergence.runtime import Driver, Loop, Recorder, RunInfo
 from vergence.signals import Outcome, Reference
 from vergence.simulation import SimulatedDriver
 from vergence.vision import SsdTracker, pick_features

@@ -1,1 +1,52 @@
-"""vergence: visual servoing that keeps the target in view and the arm clear of its limits."""
+"""vergence: visual servoing that keeps the target in view and the arm clear of its limits.
+
+``import vergence as vg`` is the public interface. Its names are loaded when they are first used, so
+that the import itself takes milliseconds; `__init__.pyi` says what each of them is.
+"""
+
+_ROOMS = {
+    "app.report": ("report",),
+    "assembly": ("plan", "run"),
+    "camera": ("Camera", "read_camera", "write_camera"),
+    "cell": ("Cell", "built_in_cells", "load_cell"),
+    "control": ("Guard",),
+    "errors": ("DriverSilent", "InputError", "RenderingError", "ShapeError", "VergenceError"),
+    "experiments": ("Comparison", "compare"),
+    "robot": ("Arm",),
+    "runtime": ("Driver", "Listener", "Loop", "Recorder", "Recording", "Run", "RunRecorder"),
+    "signals": (
+        "Frame",
+        "ImagePoints",
+        "JointCommand",
+        "JointState",
+        "Observation",
+        "Outcome",
+        "OutcomeKind",
+        "Reference",
+        "Sample",
+        "Setpoint",
+        "TargetState",
+    ),
+    "studies": ("StudyResult", "reproduce"),
+}
+_PLACES = {name: room for room, names in _ROOMS.items() for name in names}
+
+__all__ = sorted(_PLACES)
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name, or the room of geometry, when it is first asked for."""
+    from importlib import import_module
+
+    if name == "geometry":
+        return import_module("vergence.geometry")
+    if name not in _PLACES:
+        raise AttributeError(f"module 'vergence' has no attribute {name!r}")
+    value = getattr(import_module(f"vergence.{_PLACES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *__all__, "geometry"})

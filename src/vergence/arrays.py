@@ -1,11 +1,11 @@
 """Array types and the one way values take arrays in."""
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vergence.errors import ShapeError
+from vergence.errors import InputError, ShapeError
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -26,12 +26,47 @@ def frozen(
     Raises:
         ShapeError: if the shape differs.
     """
-    array = np.array(values, dtype=np.float64, order="C")
+    array = np.array(as_floats(values, shape, name))
+    array.flags.writeable = False
+    return array
+
+
+def as_floats(
+    values: ArrayLike, shape: tuple[int | None, ...] | None = None, name: str = "array"
+) -> FloatArray:
+    """Return values as a float64 array in C order: the array itself where it is one already.
+
+    Args:
+        values: anything NumPy turns into an array of numbers.
+        shape: the shape it must have; None stands for any length along that axis.
+        name: what the caller's user calls it, for the message.
+
+    Raises:
+        InputError: if they are not numbers, or lists of different lengths.
+        ShapeError: if the shape differs.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(name, "", values, "an array of numbers") from None
     if shape is not None:
         wrong = array.ndim != len(shape) or any(
             want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
         )
         if wrong:
             raise ShapeError(name, array.shape, shape)
-    array.flags.writeable = False
     return array
+
+
+def pandas_or_error() -> Any:
+    """Return pandas, which only its users have.
+
+    Raises:
+        InputError: if it is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError:
+        given = "a table for pandas, which is not installed"
+        raise InputError("to_frame", "", given, "pip install pandas, or the arrays") from None
+    return pd

@@ -8,7 +8,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.runtime.recording import ArmInfo, Recorder, RunInfo, TickRecord
+from vergence.runtime import ArmInfo, RunInfo, TickRecord
+from vergence.runtime.recording import Recorder
 from vergence.signals import (
     Frame,
     FrameTruth,

@@ -271,7 +271,9 @@ def test_built_in_cells_are_listed(command: Command, capsys: object) -> None:
 def holds(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
     """A study in the place of the paper's whose one check holds or not."""
 
-    def reproduce(out: Path, quick: bool, progress: Callable[[str, float], None]) -> StudyResult:
+    def reproduce(
+        out: Path, quick: bool, progress: Callable[[str, float], None], seed: int
+    ) -> StudyResult:
         progress("half", 0.5)
         path = out / "drift.svg"
         path.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")

@@ -20,7 +20,9 @@ from vergence.app.figures import (
 )
 from vergence.app.figures.arm import normalized
 from vergence.geometry import se3_exp
-from vergence.runtime.recording import ArmInfo, Event, Recording, TargetTrace
+from vergence.runtime import ArmInfo
+from vergence.runtime.recording import Recording
+from vergence.runtime.results import Event, TargetTrace
 
 FIGURES = ["error", "paths", "joints", "twist", "measures", "camera", "target"]
 
@@ -107,7 +109,8 @@ def test_a_filters_error_is_its_distance_from_the_truth(recording: Recording) ->
     covariance = np.tile(1e-6 * np.eye(12), (count, 1, 1))
     sure = np.ones(count, dtype=bool)
     made = estimate_figure(
-        camera, TargetTrace(camera.time, poses, np.zeros((count, 6)), covariance, sure)
+        camera,
+        TargetTrace(camera.time, camera.received, poses, np.zeros((count, 6)), covariance, sure),
     )
     assert made is not None
     position, rotation = made.axes

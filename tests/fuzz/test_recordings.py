@@ -253,7 +253,7 @@ def test_what_is_no_recording_is_refused(file: Path, data: bytes) -> None:
 
 def test_anything_may_be_named_anything(tmp_path: Path) -> None:
     odd: dict[str, Any] = dict.fromkeys(("$\\bad{$", "<b>", "a/b", "\n"), made_up_run.CAMERA)
-    from vergence.runtime.recording import ArmInfo, Recorder, RunInfo
+    from vergence.runtime import ArmInfo, Recorder, RunInfo
 
     limits = np.ones(2)
     arms = {"$\\bad{$": ArmInfo(("$\\bad{$", "_^{"), -limits, limits, limits)}

@@ -1,7 +1,6 @@
 """The batch kernel comes to what the loop comes to, run by run."""
 
 from collections import Counter
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -18,10 +17,10 @@ from vergence.control import (
 )
 from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
 from vergence.geometry import se3, so3_exp
-from vergence.runtime import TickRecord
-from vergence.runtime.recording import RunInfo
-from vergence.signals import Outcome, OutcomeKind
+from vergence.runtime import Run
+from vergence.signals import OutcomeKind
 from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation.ideal_driver import CAMERA as CAMERA_NAME
 from vergence.studies.guarantees_runs import arms
 
 CAMERA = Camera(640, 480, 600.0, 580.0, 319.5, 239.5)
@@ -82,40 +81,18 @@ def drawn_run(seed: int) -> IdealRun:
     return IdealRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
 
 
-class Followed:
-    """What the loop told its listeners of a run."""
-
-    def __init__(self, run: IdealRun) -> None:
-        self.position: list[FloatArray] = []
-        self.times: list[float] = []
-        self.points_px: list[FloatArray] = []
-        self.camera_m: list[FloatArray] = []
-        self.target_m: list[FloatArray] = []
-        self.outcome = run.in_loop([self])
-
-    def begin(self, info: RunInfo) -> None:
-        """Nothing to note."""
-
-    def tick(self, record: TickRecord) -> None:
-        self.position.append(record.sample.joints["arm"].position)
-        for frame in record.sample.frames:
-            assert frame.truth is not None
-            self.times.append(frame.time)
-            self.points_px.append(frame.truth.points_px)
-            self.camera_m.append(frame.truth.T_world_camera[:3, 3])
-            self.target_m.append(frame.truth.T_world_target[:3, 3])
-
-    def event(self, time: float, name: str, text: str) -> None:
-        """Nothing to note."""
-
-    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
-        """Nothing to let go of."""
-
-
-def check_same(trace: BatchTrace, followed: Followed) -> None:
-    assert trace.outcome == followed.outcome
-    for name in ("position", "times", "points_px", "camera_m", "target_m"):
-        given, wanted = getattr(trace, name), np.array(getattr(followed, name))
+def check_same(trace: BatchTrace, run: Run) -> None:
+    assert trace.outcome == run.outcome
+    camera = run.cameras[CAMERA_NAME]
+    looped = {
+        "position": run.arms["arm"].position,
+        "times": camera.time,
+        "points_px": camera.true_px,
+        "camera_m": camera.T_world_camera[:, :3, 3],
+        "target_m": camera.T_world_target[:, :3, 3],
+    }
+    for name, wanted in looped.items():
+        given = getattr(trace, name)
         if wanted.size or given.size:
             np.testing.assert_allclose(given, wanted, rtol=1e-9, atol=1e-9, err_msg=name)
 
@@ -130,7 +107,7 @@ def traces() -> list[BatchTrace]:
 
 @pytest.mark.parametrize("number", range(len(RUNS)))
 def test_a_run_of_the_batch_is_the_run_of_the_loop(traces, number: int) -> None:
-    check_same(traces[number], Followed(RUNS[number]))
+    check_same(traces[number], RUNS[number].in_loop())
 
 
 def test_the_runs_end_in_every_way(traces) -> None:

@@ -11,7 +11,6 @@ from threading import Timer
 import numpy as np
 import pytest
 
-from vergence.assembly import RunResult
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.experiments import (
@@ -37,6 +36,7 @@ from vergence.experiments import (
 )
 from vergence.experiments.batch import IdealRun
 from vergence.parts import kind_of
+from vergence.runtime import Run, RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
 QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
@@ -157,10 +157,11 @@ def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
 
 
 def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
-    stopped = RunResult(Outcome(OutcomeKind.STOPPED, "stopped by the user", 0.5))
+    outcome = Outcome(OutcomeKind.STOPPED, "stopped by the user", 0.5)
+    stopped = Run(RunInfo("puma560"), {}, {}, None, (), outcome, {})
     module = sys.modules[RUN_TRIAL]
     monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
-    monkeypatch.setattr(IdealRun, "in_loop", lambda *_: stopped.outcome)
+    monkeypatch.setattr(IdealRun, "in_loop", lambda *_: stopped)
     for physics in (True, False):
         with pytest.raises(KeyboardInterrupt):
             run_trial(source, trials[0], 2.0, physics=physics)

@@ -68,7 +68,7 @@ def test_the_recording_says_where_the_corners_are_wanted_and_that_they_got_there
     off = np.linalg.norm(trace.desired_px - trace.true_px, axis=-1)
     assert np.nanmax(off[0]) > 50.0
     assert np.nanmax(off[-1]) < 2.0
-    assert np.isfinite(trace.T_camera_target_wanted).all()
+    assert np.isfinite(trace.T_camera_target_desired).all()
 
 
 def test_a_camera_that_moves_with_the_target_is_refused():

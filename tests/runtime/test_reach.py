@@ -7,12 +7,10 @@ from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.signals import OutcomeKind
-from vergence.studies.trace import Trace
 
 
 def test_the_gantry_gets_where_the_picture_was_taken_and_keeps_the_marks_in_view():
-    cell, trace = load_cell("gantry"), Trace("eye")
-    result = run_cell(cell, [trace], images=False)
+    result = run_cell(load_cell("gantry"), images=False)
     assert result.outcome.succeeded
     assert result.summary["final_error_px"] < 0.05
     assert result.summary["max_error_px"] < 5.0
@@ -41,10 +39,8 @@ def test_a_way_that_takes_too_long_is_an_outcome_before_anything_moves():
 
 def test_the_same_seed_gives_the_same_run():
     cell = load_cell("gantry").replace(task={"camera_speed_m_s": 0.6})
-    first, second = Trace("eye"), Trace("eye")
-    run_cell(cell, [first], images=False)
-    run_cell(cell, [second], images=False)
-    np.testing.assert_array_equal(first["T_world_camera"], second["T_world_camera"])
+    first, second = (run_cell(cell, images=False).cameras["eye"] for _ in range(2))
+    np.testing.assert_array_equal(first.T_world_camera, second.T_world_camera)
 
 
 def test_no_translation_between_the_pictures_is_an_outcome_not_a_run():

@@ -8,7 +8,8 @@ import pytest
 
 from vergence.camera import Camera
 from vergence.errors import InputError
-from vergence.runtime.recording import ArmInfo, Recorder, Recording, RunInfo, TickRecord
+from vergence.runtime import ArmInfo, RunInfo, TickRecord
+from vergence.runtime.recording import Recorder, Recording
 from vergence.signals import (
     Frame,
     FrameTruth,
@@ -231,7 +232,7 @@ def test_an_unfinished_recording_reads_to_its_last_second(
     recorder.close(DONE, {})
     recording = Recording.open(cut)
     assert not recording.complete
-    assert recording.outcome is None
+    assert recording.outcome.kind is OutcomeKind.CUT_OFF
     assert recording.duration > records[-1].time - 1.1
 
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, ScriptedLaw, looped
 
-from vergence.runtime import Recorder, Recording
+from vergence.runtime import Recorder, Recording, RunInfo
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.recording import RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
 RATES = np.array([0.4, -0.4])

@@ -67,7 +67,7 @@ def test_both_cameras_know_more_than_the_fixed_one(short: Cell) -> None:
 
 def test_the_same_seed_gives_the_same_run(short: Cell) -> None:
     first, second = (run(short.replace(duration_s=2.0), images=False) for _ in range(2))
-    assert first.trace["target_m"].tolist() == second.trace["target_m"].tolist()
+    assert first.errors.target_m.tolist() == second.errors.target_m.tolist()
 
 
 def test_with_every_camera_blind_the_run_ends_with_the_target_lost(short: Cell) -> None:
@@ -83,9 +83,6 @@ def test_clutter_and_a_swaying_camera_do_no_harm() -> None:
 
 
 def run_four(seconds: float) -> np.ndarray:
-    from vergence.studies.pose_trace import PoseTrace
-
-    trace = PoseTrace("hand")
-    result = run_cell(load_cell("four_cameras").replace(duration_s=seconds), [trace], images=False)
-    assert result.outcome.succeeded
-    return np.linalg.norm(trace["target_m"][trace.between(0.5)], axis=1)
+    run = run_cell(load_cell("four_cameras").replace(duration_s=seconds), images=False)
+    assert run.outcome.succeeded
+    return np.linalg.norm(run.pose_errors.between(0.5).target_m, axis=1)

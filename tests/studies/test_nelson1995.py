@@ -54,7 +54,7 @@ def test_wrong_sign_of_the_first_entry_of_B_fails_the_checks(monkeypatch):
     cell = nelson1995.load_cell("puma560").replace(law=nelson1995.STRATEGIES["two_axis"])
     trial = nelson1995.run(nelson1995.moving(cell, 1), True)
     assert not trial.outcome.succeeded
-    assert trial.trace["time"][-1] < 4.0
+    assert trial.camera.time[-1] < 4.0
 
 
 def test_thresholds_are_bracketed():

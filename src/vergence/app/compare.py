@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Sequence
-from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from vergence.app import markup
@@ -19,7 +18,7 @@ from vergence.app.output import SUCCESS, emit, say
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.experiments import CellSource, Draws, Score, TrialResult
+    from vergence.experiments import CellSource, Comparison, Draws, Score
 
 _REMARK = (
     "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
@@ -47,41 +46,23 @@ def compare(
         how: to run it.
         as_json: whether to answer with one JSON object.
     """
-    from vergence.experiments import scores, start_trials, usual_laws
+    from vergence.experiments import Comparison, start_trials, usual_laws
 
     cell = source.load()
-    results = run(source, start_trials(cell, laws or usual_laws(cell), starts, seed, draws), how)
-    found = scores(results)
-    data = write_table(how.folder / "compare.csv", results)
+    trials = start_trials(cell, laws or usual_laws(cell), starts, seed, draws)
+    found = Comparison(run(source, trials, how))
+    data = write_table(how.folder / "compare.csv", found.runs)
     remark = _REMARK.format(drawn=", ".join(draws.vary), motion=how.motion)
-    report = _write_page(source, results, found, how, remark)
+    report = _write_page(source, found, how, remark)
     if as_json:
         answer = {"command": "compare", "cell": cell.name, "starts": starts, "seed": seed}
-        rows = [_as_json(score) for score in found]
+        rows = [_as_json(score) for score in found.scores]
         emit({**answer, "laws": rows, "run": how.folder, "data": data, "report": report})
         return SUCCESS
     _tell(found)
     say(f"  report  {report}")
     say(f"  data    {data}")
     return SUCCESS
-
-
-def _columns(found: "Sequence[Score]") -> list[Any]:
-    """Return the endings worth a column: the usual ones, and others that occurred."""
-    from vergence.experiments import Ending
-
-    usual = set(Ending) - {Ending.OTHER, Ending.REFUSED}
-    return [e for e in Ending if e in usual or any(score.count(e) for score in found)]
-
-
-def _headings(found: "Sequence[Score]") -> list[str]:
-    return ["law", *(ending.value for ending in _columns(found)), "time (s)", "path (m)"]
-
-
-def _row(score: "Score", found: "Sequence[Score]") -> list[str]:
-    counts = [str(score.count(ending)) for ending in _columns(found)]
-    medians = (score.converged_s, score.path_m)
-    return [score.law, *counts, *("–" if isnan(m) else f"{m:.2f}" for m in medians)]
 
 
 def _as_json(score: "Score") -> dict[str, Any]:
@@ -92,23 +73,15 @@ def _as_json(score: "Score") -> dict[str, Any]:
     return {"law": score.law, "starts": score.trials, **counts, **medians}
 
 
-def _tell(found: "Sequence[Score]") -> None:
-    from rich import box
+def _tell(found: "Comparison") -> None:
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for number, heading in enumerate(_headings(found)):
-        table.add_column(heading, justify="right" if number else "left", no_wrap=not number)
-    for score in found:
-        table.add_row(*_row(score, found))
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    Console(width=None if sys.stdout.isatty() else 120).print(found)
 
 
 def _write_page(
     source: "CellSource",
-    results: "Sequence[TrialResult]",
-    found: "Sequence[Score]",
+    found: "Comparison",
     how: Running,
     remark: str,
 ) -> "Path":
@@ -120,25 +93,25 @@ def _write_page(
     count = len(aim.desired_px)
     middle = tuple(sum(row[axis] for row in aim.desired_px) / count for axis in (0, 1))
     size = cell.cameras[cell.task.camera].resolution
-    tables = html_table(_headings(found), [_row(score, found) for score in found])
+    tables = html_table(found.headings, [found.row(score) for score in found.scores])
     parts = [
         markup.section(
             "Result",
             tables,
             f"<p>Converged: every feature within {how.tolerance_px:g} px at the end. Time until "
             "then and the camera's path are medians over the runs that converged.</p>",
-            markup.figure(scores_figure(found), "How the runs of each law ended."),
+            markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),
         markup.section(
             "Where each fails",
             markup.figure(
-                starts_figure(results, (middle[0], middle[1]), size),
+                starts_figure(found.runs, (middle[0], middle[1]), size),
                 "Each mark is a start, its colour how the run from there ended; the line leads to "
                 "where it ended. Left the camera's place seen from above, right the features' "
                 "middle in the picture, the cross where it should be.",
             ),
         ),
-        markup.section("Why", reasons_table(results, "{law}, start {start}")),
+        markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),
     ]
-    title = f"{cell.name}: {len(found)} laws from {found[0].trials} starts"
+    title = f"{cell.name}: {len(found.scores)} laws from {found.scores[0].trials} starts"
     return write_page(how.folder, "vergence compare", title, remark, parts)

@@ -12,9 +12,9 @@ import typer
 from vergence.app import calibrate_command, campaign_commands, names
 from vergence.app.options import CellName, ImageEvery, Images, Json, Out, Seed, Settings
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
-from vergence.app.reproduce import PAPERS
 from vergence.errors import VergenceError
 from vergence.places import find_recording
+from vergence.studies import PAPERS
 
 app = typer.Typer(
     name="vergence",
@@ -142,13 +142,14 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
     ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of what is drawn by chance.", min=0)] = 0,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Repeat a paper's experiments: figures, and a table of what it says and what we measure."""
     from vergence.app.reproduce import reproduce as command
 
-    raise typer.Exit(command(paper, quick, out, as_json))
+    raise typer.Exit(command(paper, quick, seed, out, as_json))
 
 
 @app.command(

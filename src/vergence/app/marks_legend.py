@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vergence.runtime.recording import CameraTrace
+from vergence.runtime.results import CameraTrace
 
 _INK = {  # as `overlay` draws them
     "tracked": '<circle cx="8" cy="8" r="5" fill="none" stroke="#14e696" stroke-width="2"/>',

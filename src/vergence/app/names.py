@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from vergence.app.reproduce import PAPERS
 from vergence.places import RECORDING, built_in_cells
+from vergence.studies import PAPERS
 
 LAWS = (  # the cell's own, and those that `vergence.experiments` knows
     "own",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.runtime.recording import CameraTrace
+from vergence.runtime.results import CameraTrace
 from vergence.signals import SearchWindows
 
 # Blue, green, red: Okabe and Ito's hues, brightened to stand out from grey textures.

@@ -8,11 +8,8 @@ from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.errors import InputError
 
 if TYPE_CHECKING:
-    from vergence.cell import Cell
-    from vergence.cell.schema import ReachTable
     from vergence.planning import Path as PlannedPath
-    from vergence.planning import PlanFailure, Trajectory
-    from vergence.vision.two_view import TwoViewFailure
+    from vergence.planning import Trajectory
 
 
 class Request(NamedTuple):
@@ -43,11 +40,12 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
         raise InputError(str(cell.path), "task.kind", cell.task.kind, "reach")
     from vergence.app.plan_page import write_plan_page
     from vergence.app.progress import working
+    from vergence.assembly import plan as plan_path
     from vergence.planning import Path as PlannedPath
     from vergence.planning import Trajectory
 
     with working("planning"):
-        found = _planned(cell, cell.task, request.images)
+        found = plan_path(cell, images=request.images)
     answer: dict[str, object] = {"command": "plan", "cell": cell.name, "found": bool(found)}
     if not isinstance(found, PlannedPath):
         reason = str(found)
@@ -63,24 +61,6 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
     else:
         _tell(found, numbers, report)
     return SUCCESS
-
-
-def _planned(
-    cell: "Cell", task: "ReachTable", images: bool
-) -> "PlannedPath | PlanFailure | TwoViewFailure":
-    """Look at the object twice and plan."""
-    from vergence.assembly.reach import look_twice, plan_reach
-    from vergence.planning import PlanFailure
-    from vergence.simulation import SimulatedDriver
-
-    driver = SimulatedDriver(cell, images)
-    try:
-        pictures = look_twice(cell, task, driver, images)
-        if isinstance(pictures, PlanFailure):
-            return pictures
-        return plan_reach(cell, task, driver, pictures)
-    finally:
-        driver.close()
 
 
 def _numbers(path: "PlannedPath", trajectory: "Trajectory") -> Mapping[str, float]:

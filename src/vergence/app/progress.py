@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.runtime import RunInfo, TickRecord
 from vergence.signals import Outcome
 
 if TYPE_CHECKING:

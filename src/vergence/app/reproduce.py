@@ -1,21 +1,20 @@
 """`vergence reproduce`: repeat a paper's experiments and hold them against its numbers."""
 
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.errors import InputError, nearest
+from vergence.studies.reproduce import PAPERS
 
 if TYPE_CHECKING:
     from vergence.studies import StudyResult
 
-PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees")
 QUICK = "quick: on exact projections instead of images"
 
 
-def reproduce(paper: str, quick: bool, out: Path | None, in_json: bool) -> int:
+def reproduce(paper: str, quick: bool, seed: int, out: Path | None, in_json: bool) -> int:
     """Repeat a paper's experiments, write a page about them; return the exit code.
 
     Raises:
@@ -26,34 +25,38 @@ def reproduce(paper: str, quick: bool, out: Path | None, in_json: bool) -> int:
     from vergence.app.study_page import write_study_page
 
     folder = out or new_folder(paper)
-    folder.mkdir(parents=True, exist_ok=True)
-    result = _study(paper, folder, quick)
+    result = _study(paper, folder, quick, seed)
     remark = QUICK if quick else ""
     report = write_study_page(folder, result, remark)
     if in_json:
         from vergence.app.check import as_json
 
         checks = [as_json(check) for check in result.checks]
-        answer = {"command": "reproduce", "paper": paper, "quick": quick, "checks": checks}
+        answer = {
+            "command": "reproduce",
+            "paper": paper,
+            "quick": quick,
+            "seed": seed,
+            "checks": checks,
+        }
         emit({**answer, "report": report})
     else:
         _tell(result, report, remark)
     return SUCCESS if result.holds else FAILURE
 
 
-def _study(paper: str, folder: Path, quick: bool) -> "StudyResult":
+def _study(paper: str, folder: Path, quick: bool, seed: int) -> "StudyResult":
     """Run the study with a progress bar."""
     from vergence.app.progress import bar
+    from vergence.studies import reproduce
 
-    study = import_module(f"vergence.studies.{paper}")
     with bar("{task.percentage:3.0f} %") as progress:
         task = progress.add_task(paper, total=1.0)
 
         def show(part: str, share: float) -> None:
             progress.update(task, description=part, completed=share)
 
-        result: StudyResult = study.reproduce(folder, quick, show)
-    return result
+        return reproduce(paper, quick=quick, seed=seed, folder=folder, progress=show)
 
 
 def _tell(result: "StudyResult", report: Path, remark: str) -> None:

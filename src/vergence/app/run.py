@@ -10,9 +10,8 @@ from vergence.places import RECORDING
 from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
-    from vergence.assembly import RunResult
     from vergence.cell import Cell
-    from vergence.runtime import Recorder
+    from vergence.runtime import Recorder, Run
 
 
 def run(
@@ -60,7 +59,7 @@ def overrides(settings: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
-def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "RunResult":
+def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "Run":
     """Run a cell; whatever happens, the recording is closed."""
     from vergence.app.progress import RunProgress
     from vergence.assembly import run_cell
@@ -84,7 +83,7 @@ def _tell_interrupted(recorder: "Recorder") -> None:
         warn("interrupted before the run began: nothing was recorded")
 
 
-def _answer(name: str, result: "RunResult", folder: Path, report: Path) -> Mapping[str, object]:
+def _answer(name: str, result: "Run", folder: Path, report: Path) -> Mapping[str, object]:
     outcome = result.outcome
     return {
         "command": "run",
@@ -100,7 +99,7 @@ def _answer(name: str, result: "RunResult", folder: Path, report: Path) -> Mappi
     }
 
 
-def _tell(result: "RunResult", folder: Path, report: Path) -> None:
+def _tell(result: "Run", folder: Path, report: Path) -> None:
     summary = result.summary
     say(str(result.outcome))
     off_mm = 1e3 * summary.get("final_hand_error_m", 0.0)

@@ -8,7 +8,8 @@ import numpy as np
 from vergence.app.figures.arm import normalized
 from vergence.app.figures.constraints import constraint_names
 from vergence.arrays import FloatArray
-from vergence.runtime.recording import ArmInfo, ArmTrace, CameraTrace, Recording
+from vergence.runtime import ArmInfo
+from vergence.runtime.results import ArmTrace, CameraTrace, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +22,14 @@ class Row:
     note: str = ""
 
 
-def run_rows(recording: Recording) -> list[Row]:
+def run_rows(run: Run) -> list[Row]:
     """Return what concerns the whole run, with what the loop itself had to say."""
-    rows = [Row("run time", f"{recording.duration:.2f}", "s")]
-    if recording.info.seed is not None:
-        rows.append(Row("seed", str(recording.info.seed)))
+    rows = [Row("run time", f"{run.duration:.2f}", "s")]
+    if run.info.seed is not None:
+        rows.append(Row("seed", str(run.info.seed)))
     return rows + [
         _summary_row(name, value)
-        for name, value in recording.summary.items()
+        for name, value in run.summary.items()
         if name not in _DERIVED and value is not None
     ]
 

@@ -4,14 +4,18 @@ from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.run_cell import RunResult, run_cell, run_driver
+from vergence.assembly.plan import plan
+from vergence.assembly.run import changed_cell, run
+from vergence.assembly.run_cell import run_cell, run_driver
 
 __all__ = [
     "LawContext",
     "Parts",
-    "RunResult",
     "assemble_parts",
     "build_law",
+    "changed_cell",
+    "plan",
+    "run",
     "run_cell",
     "run_driver",
 ]

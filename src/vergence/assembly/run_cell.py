@@ -1,27 +1,16 @@
 """From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 from vergence.assembly import Parts, assemble_parts
 from vergence.cell import Cell
+from vergence.runtime import Listener, Loop, Patience, Run, RunInfo, RunRecorder
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.loop import Loop, Patience
-from vergence.runtime.recording import Listener, RunInfo
-from vergence.runtime.summary import Summary
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
 
 
-@dataclass(frozen=True, slots=True)
-class RunResult:
-    """What came of a run."""
-
-    outcome: Outcome
-    summary: dict[str, float] = field(default_factory=dict)
-
-
-def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> RunResult:
+def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> Run:
     """Run a cell in simulation.
 
     Args:
@@ -48,8 +37,9 @@ def run_driver(
     *,
     duration_s: float | None = None,
     attend: Callable[[Loop, Parts], None] | None = None,
-) -> RunResult:
-    """Run a cell with a driver that stands already, and stays open.
+    most_ticks: int | None = None,
+) -> Run:
+    """Run a cell with a driver that is open already, and stays open.
 
     Args:
         cell: what to run.
@@ -58,13 +48,14 @@ def run_driver(
         images: whether the driver renders images.
         duration_s: in place of the cell's; may be infinite.
         attend: is given the loop and its parts before it runs, to change the law during the run.
+        most_ticks: how many to keep of a run without an end; all if None.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
     """
     parts = assemble_parts(cell, driver, images)
-    summary = Summary(cell.task.camera)
-    everyone = (summary, *listeners)
+    recorder = RunRecorder(most_ticks)
+    everyone = (recorder, *listeners)
     path = str(cell.path)
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path)
     Listeners(everyone).begin(info)
@@ -75,10 +66,10 @@ def run_driver(
         if attend is not None:
             attend(loop, parts)
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
-    values = dict(summary.values)
-    values["duration_s"] = outcome.time
-    Listeners(everyone).close(outcome, values)
-    return RunResult(outcome, values)
+    recorder.close(outcome, {})
+    run = recorder.run()
+    Listeners(listeners).close(outcome, run.summary)
+    return run
 
 
 def _loop(cell: Cell, driver: SimulatedDriver, parts: Parts, listeners: Sequence[Listener]) -> Loop:

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray, as_floats, frozen
 from vergence.camera.distortion import (
     distort_points,
     distortion_reach,
@@ -14,13 +15,18 @@ from vergence.camera.distortion import (
 )
 from vergence.errors import InputError
 
+_NONE = (0.0, 0.0, 0.0, 0.0, 0.0)  # distortion
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, init=False)
 class Camera:
     """A pinhole camera with the distortion model of Brown and Conrady.
 
     x = X/Z, y = Y/Z;  u = fx x_d + cx,  v = fy y_d + cy,  with (x_d, y_d) the distorted (x, y).
     Pixel centres are at integers: the image covers -0.5 <= u < width - 0.5.
+
+    ``Camera(640, 480, focal_px=600)`` has square pixels and the principal point in the middle,
+    (319.5, 239.5).
     """
 
     width: int
@@ -29,14 +35,54 @@ class Camera:
     fy: float  # px
     cx: float  # px
     cy: float  # px
-    distortion: FloatArray = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3
+    distortion: FloatArray  # k1, k2, p1, p2, k3
     reach: float = field(init=False, repr=False, compare=False)  # normalized; see distortion_reach
 
-    def __post_init__(self) -> None:
-        for name in ("width", "height", "fx", "fy"):
-            if not getattr(self, name) > 0:
-                raise InputError("Camera", name, getattr(self, name), "a number above zero")
-        object.__setattr__(self, "distortion", frozen(self.distortion, (5,), "distortion"))
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        fx: float | None = None,
+        fy: float | None = None,
+        cx: float | None = None,
+        cy: float | None = None,
+        distortion: ArrayLike = _NONE,
+        *,
+        focal_px: float | None = None,
+    ) -> None:
+        """Take the intrinsic parameters.
+
+        Args:
+            width: image columns.
+            height: image rows.
+            fx: focal length along u, px.
+            fy: focal length along v, px; fx if None.
+            cx: principal point, px; the middle column, (width - 1) / 2, if None.
+            cy: principal point, px; the middle row if None.
+            distortion: k1, k2, p1, p2, k3.
+            focal_px: stands for both fx and fy.
+
+        Raises:
+            InputError: if a size or a focal length is not above zero, or there is no focal length.
+            ShapeError: if there are not five coefficients.
+        """
+        focal = focal_px if fx is None else fx
+        if focal is None or (fx is not None and focal_px is not None):
+            given = "neither" if focal is None else "both"
+            raise InputError("Camera", "fx, focal_px", given, "one of them")
+        values = {
+            "width": width,
+            "height": height,
+            "fx": float(focal),
+            "fy": float(focal if fy is None else fy),
+            "cx": (width - 1) / 2 if cx is None else float(cx),
+            "cy": (height - 1) / 2 if cy is None else float(cy),
+        }
+        for name, value in values.items():
+            if name not in ("cx", "cy") and not value > 0:
+                raise InputError("Camera", name, value, "a number above zero")
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "distortion", frozen(distortion, (5,), "distortion"))
         reach = distortion_reach(self.distortion) if self.distorted else np.inf
         object.__setattr__(self, "reach", reach)
 
@@ -53,7 +99,7 @@ class Camera:
             height: image rows.
         """
         fx, fy = (focal_mm * 1e3 / size for size in pixel_um)
-        return cls(width, height, fx, fy, (width - 1) / 2, (height - 1) / 2)
+        return cls(width, height, fx, fy)
 
     @property
     def matrix(self) -> FloatArray:
@@ -70,22 +116,23 @@ class Camera:
         """Whether any distortion coefficient differs from zero."""
         return bool(self.distortion.any())
 
-    def project(self, points_camera: FloatArray) -> FloatArray:
+    def project(self, points_camera: ArrayLike) -> FloatArray:
         """Project points (N, 3) in the camera frame to pixels (N, 2)."""
-        points_camera = np.asarray(points_camera, dtype=np.float64)
+        points_camera = as_floats(points_camera, (None, 3), "points_camera")
         return self.to_pixels(points_camera[:, :2] / points_camera[:, 2:])
 
-    def to_pixels(self, normalized: FloatArray) -> FloatArray:
+    def to_pixels(self, normalized: ArrayLike) -> FloatArray:
         """Turn normalized coordinates (N, 2) into pixels (N, 2)."""
-        points = np.asarray(normalized, dtype=np.float64)
+        points = as_floats(normalized, (None, 2), "normalized")
         if self.distorted:
             points = distort_points(points, self.distortion)
         pixels: FloatArray = points * self.focal_px + (self.cx, self.cy)
         return pixels
 
-    def normalize(self, points_px: FloatArray) -> FloatArray:
+    def normalize(self, points_px: ArrayLike) -> FloatArray:
         """Turn pixels (N, 2) into normalized coordinates (N, 2)."""
-        points: FloatArray = (np.asarray(points_px) - (self.cx, self.cy)) / self.focal_px
+        pixels = as_floats(points_px, (None, 2), "points_px")
+        points: FloatArray = (pixels - (self.cx, self.cy)) / self.focal_px
         return undistort_points(points, self.distortion) if self.distorted else points
 
     def normalize_velocity(self, velocity_px: FloatArray, normalized: FloatArray) -> FloatArray:
@@ -137,18 +184,18 @@ class Camera:
         center = -low - 0.5
         return Camera(int(width), int(height), self.fx, self.fy, center[0], center[1])
 
-    def in_view(self, points_camera: FloatArray) -> BoolArray:
-        """Tell which points (N, 3) of the camera's frame project into the picture."""
-        points = np.asarray(points_camera, dtype=np.float64)
+    def in_view(self, points_camera: ArrayLike) -> BoolArray:
+        """Tell which points (N, 3) of the camera's frame project into the image."""
+        points = as_floats(points_camera, (None, 3), "points_camera")
         seen: BoolArray = points[:, 2] > 0.0
         normalized = points[seen, :2] / points[seen, 2:]
         near = np.hypot(*normalized.T) < self.reach
         seen[seen] = near & self.contains(self.to_pixels(normalized))
         return seen
 
-    def contains(self, points_px: FloatArray, margin_px: float = 0.0) -> BoolArray:
+    def contains(self, points_px: ArrayLike, margin_px: float = 0.0) -> BoolArray:
         """Tell which pixels (N, 2) lie in the image, at least the margin from its border."""
-        points_px = np.asarray(points_px)
+        points_px = as_floats(points_px, (None, 2), "points_px")
         low = -0.5 + margin_px
         high = np.array([self.width - 0.5, self.height - 0.5]) - margin_px
         inside: BoolArray = np.all((points_px >= low) & (points_px < high), axis=1)

@@ -20,6 +20,7 @@ from vergence.cell.schema import (
     ToolTable,
     TrackTable,
 )
+from vergence.cell.settings_text import settings_text
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
 from vergence.loading import Place
@@ -80,7 +81,7 @@ class Cell(Table):
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some tables replaced; nested keys by dictionaries, as in the file."""
         values = _merge(self.model_dump(), tables)
-        return _validate(values, self._path, self._text)
+        return _validate(values, self._path, self._text + settings_text(tables, values))
 
 
 def load_cell(

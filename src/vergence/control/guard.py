@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
-from vergence.arrays import BoolArray, FloatArray, frozen
-from vergence.errors import ShapeError
+from vergence.arrays import BoolArray, FloatArray, as_floats
+from vergence.errors import InputError, ShapeError
 from vergence.robot import Arm
 from vergence.signals import Setpoint
 
@@ -169,24 +170,28 @@ def closing_rates(gap: FloatArray, limits: FloatArray, dt: float) -> FloatArray:
 class Guard:
     """Set-points of one arm, stepped at the inner rate and kept inside all its limits.
 
-    From a start outside a position limit the joint is brought back to it at a limited rate.
+    ``guard.step(rates)`` follows any rates as far as the limits allow; call it once a period. From
+    a start outside a position limit the joint is brought back to it at a limited rate.
 
     Args:
         arm: the arm with its limits.
-        start: joint positions at the start, (n,), finite.
-        dt: inner period, s.
+        start: joint positions at the start, (n,) rad or m.
+        period_s: of the steps.
 
     Raises:
-        ShapeError: if the start is not of the arm's length.
-        ValueError: if it is not finite.
+        InputError: if the positions are not finite numbers, or the period is not above zero.
+        ShapeError: if there is not one position a joint.
     """
 
-    def __init__(self, arm: Arm, start: FloatArray, dt: float) -> None:
+    def __init__(self, arm: Arm, start: ArrayLike, period_s: float) -> None:
+        if not 0.0 < period_s < np.inf:
+            raise InputError("Guard", "period_s", period_s, "a number of seconds above zero")
+        position = as_floats(start, (arm.joint_count,), "start")
+        if not np.isfinite(position).all():
+            raise InputError("Guard", "start", position, "finite joint positions")
         self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
-        self._dt = dt
-        self._position: FloatArray = frozen(start, (arm.joint_count,), "start").copy()
-        if not np.isfinite(self._position).all():
-            raise ValueError(f"the start {start} is not finite")
+        self._dt = period_s
+        self._position: FloatArray = position.copy()
         self._velocity: FloatArray = np.zeros(arm.joint_count)
         self._wanted = np.zeros(arm.joint_count)  # writeable and contiguous, as the kernel expects
         self.joint_count = arm.joint_count
@@ -207,15 +212,15 @@ class Guard:
         """Whether the set-point still moves."""
         return bool(np.any(np.abs(self._velocity) > 1e-9))
 
-    def step(self, wanted: FloatArray) -> Setpoint:
-        """Return the next set-point on the way to the wanted rates (n,).
+    def step(self, rates: ArrayLike) -> Setpoint:
+        """Return the next set-point on the way to joint rates (n,), rad/s or m/s.
+
+        A rate that is not a finite number means rest.
 
         Raises:
-            ShapeError: if they are not of the arm's length; no set-point is made.
+            ShapeError: if there is not one rate a joint; no set-point is made.
         """
-        if np.shape(wanted) != self._wanted.shape:
-            raise ShapeError("wanted rates", np.shape(wanted), self._wanted.shape)
-        self._wanted[:] = wanted
+        self._wanted[:] = as_floats(rates, (self.joint_count,), "rates")
         self._position, self._velocity, self.at_limit = guarded_step(
             self._position, self._velocity, self._wanted, self._limits, self._dt
         )

@@ -1,6 +1,7 @@
 """Many runs of a cell: laws from random starts, regions of targets, on all cores or a cluster."""
 
 from vergence.experiments.campaign import run_campaign
+from vergence.experiments.comparison import Comparison, compare
 from vergence.experiments.executor import Crew, WorkersLostError
 from vergence.experiments.goal import Aim
 from vergence.experiments.presets import OWN, PRESETS, law_table, usual_laws
@@ -12,11 +13,11 @@ from vergence.experiments.score import Score, scores
 from vergence.experiments.source import CellSource
 from vergence.experiments.starts import start_trials
 from vergence.experiments.trial import Ending, Trial, TrialResult
-from vergence.experiments.truth_trace import TrialTrace
 
 __all__ = [
     "Aim",
     "CellSource",
+    "Comparison",
     "Crew",
     "Draws",
     "Ending",
@@ -27,8 +28,8 @@ __all__ = [
     "Score",
     "Trial",
     "TrialResult",
-    "TrialTrace",
     "WorkersLostError",
+    "compare",
     "heading_trials",
     "law_table",
     "place_trials",

@@ -1,12 +1,13 @@
-"""What a run truly showed, and what that makes of its trial."""
+"""Ground-truth tracks of a run, and the trial result computed from them."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
 from vergence.experiments.trial import Ending, Trial, TrialResult
+from vergence.runtime.results import CameraTrace, Run, points_at_pose
 from vergence.signals import Outcome, OutcomeKind
 
 _ENDINGS = {
@@ -15,27 +16,41 @@ _ENDINGS = {
 }
 
 
-class Sight(NamedTuple):
-    """The pictures that arrived in a run, a row each."""
+class TrueTracks(NamedTuple):
+    """What the images that arrived in a run truly showed, a row each."""
 
     times: FloatArray  # (F,) s, of exposure
     points_px: FloatArray  # (F, M, 2) true places of the features; NaN behind the camera
     visible: BoolArray  # (F, M)
-    wanted_px: FloatArray  # (F, M, 2) where they should be; NaN if nobody says
+    desired_px: FloatArray  # (F, M, 2) where they should be; NaN if nobody says
     camera_m: FloatArray  # (F, 3) place of the camera in the world
     target_m: FloatArray  # (F, 3) and of the target
+
+    @classmethod
+    def of(cls, run: Run, camera: str) -> Self:
+        """Return what a camera truly saw in a run."""
+        trace = run.cameras[camera]
+        trace = trace.at(np.isfinite(trace.T_world_camera[:, 0, 0]))
+        return cls(
+            trace.time,
+            trace.true_px,
+            trace.visible,
+            _desired_px(trace, run.info.cameras[camera]),
+            trace.T_world_camera[:, :3, 3],
+            trace.T_world_target[:, :3, 3],
+        )
 
     def errors(self) -> FloatArray:
         """Return how far the farthest feature is from its goal, (F,), px; NaN if none is seen.
 
-        A corner on the far side of what is seen has its place in the picture too.
+        A corner on the far side of what is seen has its place in the image too.
         """
-        far = np.linalg.norm(self.points_px - self.wanted_px, axis=2).max(axis=1, initial=0.0)
+        far = np.linalg.norm(self.points_px - self.desired_px, axis=2).max(axis=1, initial=0.0)
         known = self.visible.any(axis=1)
         return np.where(known, far, np.nan)
 
     def middles(self) -> FloatArray:
-        """Return the middle of the features in front of the camera, for pictures with any."""
+        """Return the middle of the features in front of the camera, for images with any."""
         in_front: BoolArray = np.isfinite(self.points_px[:, :, 0])
         count = in_front.sum(axis=1)
         total = np.where(in_front[:, :, None], self.points_px, 0.0).sum(axis=1)
@@ -43,26 +58,26 @@ class Sight(NamedTuple):
         return middles
 
     def outside(self, camera: Camera) -> BoolArray:
-        """Tell which features lie outside of the picture, or behind the camera, (F, M)."""
+        """Tell which features lie outside of the image, or behind the camera, (F, M)."""
         inside = camera.contains(self.points_px.reshape(-1, 2))
         outside: BoolArray = ~inside.reshape(self.visible.shape)
         return outside
 
 
 def trial_result(
-    trial: Trial, outcome: Outcome, sight: Sight, camera: Camera, tolerance_px: float
+    trial: Trial, outcome: Outcome, tracks: TrueTracks, camera: Camera, tolerance_px: float
 ) -> TrialResult:
     """Return what came of a trial.
 
     Args:
         trial: whose run it was.
         outcome: of the run.
-        sight: what it showed.
+        tracks: what it showed.
         camera: through which it was seen.
         tolerance_px: up to which error of the farthest feature a run has converged.
     """
-    errors, middles = sight.errors(), sight.middles()
-    outside = sight.outside(camera)
+    errors, middles = tracks.errors(), tracks.middles()
+    outside = tracks.outside(camera)
     known = errors[np.isfinite(errors)]
     return TrialResult(
         trial.key,
@@ -70,14 +85,14 @@ def trial_result(
         _ending(outcome, errors, outside, tolerance_px),
         outcome.reason,
         outcome.time,
-        _converged(sight.times, errors, tolerance_px),
+        _converged(tracks.times, errors, tolerance_px),
         float(known[-1]) if len(known) else None,
         float(known.max()) if len(known) else None,
-        _way(sight.camera_m),
-        _way(sight.target_m),
+        _way(tracks.camera_m),
+        _way(tracks.target_m),
         bool(outside.any()),
-        _place(sight.camera_m[:1], 3),
-        _place(sight.camera_m[-1:], 3),
+        _place(tracks.camera_m[:1], 3),
+        _place(tracks.camera_m[-1:], 3),
         _place(middles[:1], 2),
         _place(middles[-1:], 2),
     )
@@ -107,3 +122,20 @@ def _way(places: FloatArray) -> float:
 def _place(rows: FloatArray, size: int) -> tuple[float, ...]:
     """Return the only row as numbers; zeros if there is none."""
     return tuple(float(value) for value in rows[0]) if len(rows) else (0.0,) * size
+
+
+def _desired_px(trace: CameraTrace, camera: Camera) -> FloatArray:
+    """Return where the features should be, (F, M, 2): all of them, also where a pose says it."""
+    desired = trace.desired_px.copy()
+    by_pose = trace.desired_by_pose | np.isnan(desired).all(axis=(1, 2))
+    by_pose &= np.isfinite(trace.T_camera_target_desired[:, 0, 0])
+    for row in np.flatnonzero(by_pose):
+        desired[row] = points_at_pose(
+            camera,
+            trace.T_camera_target_desired[row],
+            trace.T_world_camera[row],
+            trace.T_world_target[row],
+            trace.true_px[row],
+            trace.true_depth_m[row],
+        )
+    return desired

@@ -9,12 +9,12 @@ from vergence.camera import picture_times
 from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
-from vergence.experiments.evaluation import Sight, trial_result
+from vergence.experiments.evaluation import TrueTracks, trial_result
 from vergence.experiments.kinematic import IdealBench, is_ideal
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Ending, Trial, TrialResult
-from vergence.experiments.truth_trace import TrialTrace
-from vergence.signals import Outcome, OutcomeKind
+from vergence.runtime import Run
+from vergence.signals import OutcomeKind
 from vergence.simulation.ideal_driver import CAMERA
 
 
@@ -72,21 +72,24 @@ def run_trial(
 
 
 def _in_physics(cell: Cell, trial: Trial, tolerance_px: float) -> TrialResult:
-    trace = TrialTrace(cell.task.camera)
-    outcome = run_cell(cell, [trace], images=False).outcome
-    return trace.result(trial, _not_stopped(outcome), tolerance_px)
+    return _result(run_cell(cell, images=False), trial, cell.task.camera, tolerance_px)
 
 
 def _in_loop(run: IdealRun, trial: Trial, tolerance_px: float) -> TrialResult:
-    trace = TrialTrace(CAMERA, run.cell.camera)
-    outcome = run.in_loop([trace])
-    return trace.result(trial, _not_stopped(outcome), tolerance_px)
+    return _result(run.in_loop(), trial, CAMERA, tolerance_px)
+
+
+def _result(run: Run, trial: Trial, camera: str, tolerance_px: float) -> TrialResult:
+    if run.outcome.kind is OutcomeKind.STOPPED:  # no result of the trial, but Ctrl-C
+        raise KeyboardInterrupt
+    tracks = TrueTracks.of(run, camera)
+    return trial_result(trial, run.outcome, tracks, run.info.cameras[camera], tolerance_px)
 
 
 def _of_batch(run: IdealRun, trace: BatchTrace, trial: Trial, tolerance_px: float) -> TrialResult:
     camera, count = run.cell.camera, len(trace.times)
     inside = camera.contains(trace.points_px.reshape(-1, 2))
-    sight = Sight(
+    tracks = TrueTracks(
         trace.times,
         trace.points_px,
         inside.reshape(count, -1),
@@ -94,7 +97,7 @@ def _of_batch(run: IdealRun, trace: BatchTrace, trial: Trial, tolerance_px: floa
         trace.camera_m,
         trace.target_m,
     )
-    return trial_result(trial, trace.outcome, sight, camera, tolerance_px)
+    return trial_result(trial, trace.outcome, tracks, camera, tolerance_px)
 
 
 def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
@@ -110,12 +113,6 @@ def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
     return any(
         not cell.sees(q, T).all() for q, T in zip(trace.position[::step], poses, strict=True)
     )
-
-
-def _not_stopped(outcome: Outcome) -> Outcome:
-    if outcome.kind is OutcomeKind.STOPPED:  # no result of the trial, but Ctrl-C
-        raise KeyboardInterrupt
-    return outcome
 
 
 def _refused(trial: Trial, reason: str) -> TrialResult:

@@ -1,10 +1,12 @@
 """Where a worker finds the cell."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from vergence.cell import Cell, load_cell
+from vergence.experiments.goal import merged
 from vergence.places import CELLS
 
 
@@ -19,6 +21,7 @@ class CellSource:
     name: str  # of a built-in cell, or an absolute path
     overrides: Mapping[str, str] = field(default_factory=dict)  # dotted keys and TOML values
     seed: int | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)  # tables to replace after those
 
     @classmethod
     def of(
@@ -29,6 +32,15 @@ class CellSource:
         name = path.parent.name if path.parent.parent == CELLS.resolve() else str(path)
         return cls(name, dict(overrides), seed)
 
+    @classmethod
+    def changed(cls, cell: str | Path | Cell, changes: Mapping[str, Any]) -> "CellSource":
+        """Return the source of a cell, given or by its name or file, with tables replaced."""
+        if isinstance(cell, Cell):
+            source = cls.of(cell.path, {}, None)
+            return replace(source, changes=merged(cell.model_dump(mode="json"), changes))
+        return replace(cls.of(cell, {}, None), changes=changes)
+
     def load(self) -> Cell:
         """Return the cell."""
-        return load_cell(self.name, self.overrides, self.seed)
+        cell = load_cell(self.name, self.overrides, self.seed)
+        return cell.replace(**self.changes) if self.changes else cell

@@ -48,6 +48,11 @@ class TrialResult:
     start_px: tuple[float, ...]  # (2,) the features' middle at the start
     end_px: tuple[float, ...]  # (2,) where they were seen last
 
+    @property
+    def outcome(self) -> str:
+        """What the run came to, when and why, on one line."""
+        return f"{self.ending.value} at {self.time_s:.2f} s: {self.reason}"
+
     def as_json(self) -> dict[str, Any]:
         """Return JSON values."""
         return {**asdict(self), "ending": self.ending.value}

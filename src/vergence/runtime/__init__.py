@@ -1,12 +1,16 @@
-"""Runtime: the loop, what it asks of a driver, and the recording of a run."""
+"""Runtime: the loop, what it asks of a driver, and what is kept of a run."""
 
 from vergence.runtime.driver import Driver
+from vergence.runtime.listener import Listener
 from vergence.runtime.loop import Loop, Patience
-from vergence.runtime.recording import Listener, Recorder, Recording, TickRecord
+from vergence.runtime.recording import Recorder, Recording
+from vergence.runtime.results import Run, RunRecorder
+from vergence.runtime.run_info import ArmInfo, RunInfo
 from vergence.runtime.stages import Perception, Planner
-from vergence.runtime.summary import Summary
+from vergence.runtime.tick import TickRecord
 
 __all__ = [
+    "ArmInfo",
     "Driver",
     "Listener",
     "Loop",
@@ -15,6 +19,8 @@ __all__ = [
     "Planner",
     "Recorder",
     "Recording",
-    "Summary",
+    "Run",
+    "RunInfo",
+    "RunRecorder",
     "TickRecord",
 ]

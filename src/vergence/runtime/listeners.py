@@ -3,7 +3,9 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 
-from vergence.runtime.recording import Listener, RunInfo, TickRecord
+from vergence.runtime.listener import Listener
+from vergence.runtime.run_info import RunInfo
+from vergence.runtime.tick import TickRecord
 from vergence.signals import Outcome
 
 _LOG = logging.getLogger(__name__)

@@ -13,10 +13,11 @@ from vergence.errors import DriverSilent
 from vergence.runtime import endings
 from vergence.runtime.driver import Driver
 from vergence.runtime.interrupt import Interrupt
+from vergence.runtime.listener import Listener
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.recording import Listener, TickRecord
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.stopping import brake, raised
+from vergence.runtime.tick import TickRecord
 from vergence.signals import (
     ImagePoints,
     JointCommand,
@@ -234,7 +235,9 @@ class Loop:
         command: JointCommand | None,
     ) -> None:
         commands = {} if command is None else {self._arm: command}
-        self._listeners.tick(TickRecord(sample.time, sample, observation, reference, commands))
+        setpoints = {name: guard.setpoint for name, guard in self._guards.items()}
+        record = TickRecord(sample.time, sample, observation, reference, commands, setpoints)
+        self._listeners.tick(record)
 
     def _report_losses(self, time: float, observation: Observation) -> None:
         lost = not _shows_target(observation)

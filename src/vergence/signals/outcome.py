@@ -16,6 +16,7 @@ class OutcomeKind(StrEnum):
     PART_RAISED = "part raised"
     INFEASIBLE = "infeasible"
     STOPPED = "stopped"
+    CUT_OFF = "cut off"  # a recording that ends before its run did
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from vergence.drawing import save
+from vergence.errors import InputError, nearest
 
 Progress = Callable[[str, float], None]  # what is being done, and the share done so far
 
@@ -21,10 +25,18 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A picture a study made."""
+    """A figure a study made."""
 
-    path: Path
+    path: Path  # of the file it was written to
     caption: str
+    drawing: Any = None  # matplotlib's, None for what was read from a file
+
+    def savefig(self, path: str | Path) -> None:
+        """Write it to another file, in the format that its name ends with."""
+        if self.drawing is None:
+            Path(path).write_bytes(self.path.read_bytes())
+        else:
+            save(self.drawing, path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +46,19 @@ class StudyResult:
     title: str
     checks: tuple[Check, ...]
     figures: tuple[Figure, ...]
+    seed: int = 0  # of what is drawn by chance
+
+    def figure(self, number: int | str) -> Figure:
+        """Return a figure by its number in the paper, or by the name of its file.
+
+        Raises:
+            InputError: if there is no such figure.
+        """
+        name = f"figure_{number:02d}" if isinstance(number, int) else number
+        by_name = {figure.path.stem: figure for figure in self.figures}
+        if name not in by_name:
+            raise InputError("figure", "", number, nearest(name, by_name))
+        return by_name[name]
 
     @property
     def holds(self) -> bool:

@@ -20,5 +20,5 @@ def save_figures(out: Path, drawn: Mapping[str, tuple[Any, str]]) -> tuple[Figur
     for name, (drawing, caption) in drawn.items():
         path = out / f"{name}.svg"
         save(drawing, path)
-        files.append(Figure(path, caption))
+        files.append(Figure(path, caption, drawing))
     return tuple(files)

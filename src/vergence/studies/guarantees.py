@@ -1,7 +1,6 @@
 """What the constrained law and the guard promise, tried on many runs and on the hard cases."""
 
 from collections import Counter
-from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -12,8 +11,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.control.limits import RELAXED
 from vergence.robot import Arm
-from vergence.runtime import Summary
-from vergence.runtime.recording import TickRecord
+from vergence.runtime import Run, RunRecorder
 from vergence.signals import OutcomeKind
 from vergence.simulation import IdealCell
 from vergence.studies import guarantees_figures as figures
@@ -41,7 +39,7 @@ LATENCY_FRAMES = 2
 PUMA_START_DEG = (-125.6, 42.7, -172.7, 0.0, -50.0, 0.0)
 
 
-def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
+def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
     """Try to break every promise; write the figures.
 
     Everything runs on exact projections and joints that move as told, through the loop and the
@@ -51,13 +49,14 @@ def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
         out: folder for the figures.
         quick: fewer attempts.
         progress: told what is being done.
+        seed: of the random runs and pairs.
     """
     puma, _, gantry, *_ = arms()
     count = PAIRS_QUICK if quick else PAIRS
     with processes() as pool:
-        limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, pool, progress)
+        limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, seed, pool, progress)
         pairs = try_all(
-            partial(try_pair, gantry, PAIRS_SEED),
+            partial(try_pair, gantry, PAIRS_SEED + seed),
             count,
             pool,
             lambda done: progress(f"{count} random pairs", 0.4 + 0.4 * done),
@@ -71,23 +70,26 @@ def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
     progress("soft limits", 0.97)
     others = (passed, _outside_start(puma), _conflict(puma))
     checks = (limits, headings, speed, success_check(pairs), *others)
-    return StudyResult(TITLE, checks, figures.draw(out, ends, sigma, pairs))
+    return StudyResult(TITLE, checks, figures.draw(out, ends, sigma, pairs), seed)
 
 
 Ends = Counter[tuple[str, str]]  # how many runs of a law ended how
 
 
-def _try(count: int, batch: int) -> tuple[list[Excess], Ends]:
-    known, seeds = arms(), range(batch * BATCH, min((batch + 1) * BATCH, count))
+def _try(count: int, seed: int, batch: int) -> tuple[list[Excess], Ends]:
+    known, first = arms(), seed * ATTEMPTS
+    seeds = range(first + batch * BATCH, first + min((batch + 1) * BATCH, count))
     tried = [(LAWS[(seed // len(known)) % len(LAWS)], attempt(known, seed).run()) for seed in seeds]
     ends = Counter((law, outcome.kind.value) for law, (_, outcome) in tried)
     return [excess for _, (excess, _) in tried], ends
 
 
-def _limits(count: int, pool: ProcessPoolExecutor | None, progress: Progress) -> tuple[Check, Ends]:
+def _limits(
+    count: int, seed: int, pool: ProcessPoolExecutor | None, progress: Progress
+) -> tuple[Check, Ends]:
     """Run everything at random on every core, in an order that changes nothing."""
     batches = try_all(
-        partial(_try, count),
+        partial(_try, count, seed),
         -(-count // BATCH),
         pool,
         lambda done: progress(f"{count} random runs", 0.4 * done),
@@ -124,11 +126,22 @@ def _line(arm: Arm, speed: float, heading: float) -> IdealCell:
 
 
 def _follows(arm: Arm, law: str, speed: float, heading: float, error_px: float | None) -> bool:
-    summary = Summary("camera")
-    cell = _line(arm, speed, heading)
-    _, outcome = run_ideal(cell, law, RANGE_M / speed + 1.0, listeners=(summary,))
-    close = error_px is None or summary.values["max_error_px"] <= error_px
-    return outcome.succeeded and close
+    _, run = _recorded(_line(arm, speed, heading), law, RANGE_M / speed + 1.0)
+    close = error_px is None or run.summary["max_error_px"] <= error_px
+    return run.outcome.succeeded and close
+
+
+def _recorded(cell: IdealCell, law: str, duration_s: float) -> tuple[Excess, Run]:
+    recorder = RunRecorder()
+    excess, _ = run_ideal(cell, law, duration_s, recorder=recorder)
+    return excess, recorder.run()
+
+
+def _error_px(run: Run) -> FloatArray:
+    """Return the largest coordinate error of each image, (K,)."""
+    camera = run.cameras[run.info.task_camera]
+    error_px: FloatArray = np.abs(camera.points_px - camera.desired_px).max(axis=(1, 2))
+    return error_px
 
 
 def _headings(arm: Arm) -> Check:
@@ -167,30 +180,6 @@ def _speed(arm: Arm) -> Check:
     )
 
 
-class _Watch:
-    """Keeps what a check asks about: joints, errors and what was given up, tick by tick."""
-
-    def __init__(self) -> None:
-        self.q: list[FloatArray] = []
-        self.error_px: list[float] = []
-        self.slack: list[Mapping[str, float]] = []
-
-    def tick(self, record: TickRecord) -> None:
-        if record.observation is None or record.reference is None:
-            return
-        view, wanted = record.observation.views[-1], record.reference.points_px
-        assert wanted is not None
-        self.q.append(record.sample.joints["arm"].position)
-        self.error_px.append(float(np.abs(view.points_px - wanted).max()))
-        self.slack += [command.slack for command in record.commands.values()]
-
-    def begin(self, info: object) -> None: ...
-
-    def event(self, time: float, name: str, text: str) -> None: ...
-
-    def close(self, outcome: object, summary: object) -> None: ...
-
-
 _SQUARE = np.array([[0.08, 0.08, 0], [-0.08, 0.08, 0], [-0.08, -0.08, 0], [0.08, -0.08, 0.0]])
 
 
@@ -206,29 +195,28 @@ def _singularity(arm: Arm) -> tuple[Check, FloatArray]:
     start = np.deg2rad([-90.0, 30.0, -150.0, 0.0, -30.0, 0.0])
     end = start * np.array([1, 1, 1, 1, -1, 1])
     cell = joint_path(_still(arm, start), end, 8.0, facing(0.6))
-    watch = _Watch()
-    excess, outcome = run_ideal(cell, "constrained image-based", 9.0, listeners=(watch,))
-    sigma = np.array([np.linalg.svd(arm.jacobian(q), compute_uv=False)[-1] for q in watch.q])
+    excess, run = _recorded(cell, "constrained image-based", 9.0)
+    joints, error_px = run.arms["arm"].position, _error_px(run)
+    sigma = np.array([np.linalg.svd(arm.jacobian(q), compute_uv=False)[-1] for q in joints])
     crossed = sigma.min() < 0.03
     bounded = excess.rate <= 1e-12 and excess.position <= 0.0
-    final = watch.error_px[-1]
+    final = float(error_px[-1])
     check = Check(
         "singularity.passed",
         "bounded rates and no loss of the target",
-        max(watch.error_px),
+        float(error_px.max()),
         "px at worst",
-        crossed and bounded and outcome.succeeded and final < 5.0,
+        crossed and bounded and run.outcome.succeeded and final < 5.0,
         f"smallest singular value on the way {sigma.min():.3f}, final error {final:.2f} px",
     )
-    return check, np.column_stack((np.arange(len(sigma)) / 30.0, sigma, watch.error_px))
+    return check, np.column_stack((run.times, sigma, error_px))
 
 
 def _outside_start(arm: Arm) -> Check:
     """Start with joint 5 past its soft margin: it has to come back and stay, without a jump."""
     start = np.deg2rad([-90.0, 30.0, -150.0, 0.0, -99.0, 0.0])
-    watch = _Watch()
-    _, outcome = run_ideal(_still(arm, start), "constrained image-based", 4.0, listeners=(watch,))
-    joint = np.array(watch.q)[:, 4]
+    _, run = _recorded(_still(arm, start), "constrained image-based", 4.0)
+    joint = run.arms["arm"].position[:, 4]
     soft = arm.q_min[4] + 0.03 * (arm.q_max[4] - arm.q_min[4])
     back = np.flatnonzero(joint >= soft - 1e-3)
     steps = np.abs(np.diff(joint)) * 30.0
@@ -239,7 +227,10 @@ def _outside_start(arm: Arm) -> Check:
         "brought back inside a soft limit smoothly",
         took,
         "s",
-        outcome.succeeded and within(took, 0.0, 4.0) and smooth and bool(joint[-1] >= soft - 1e-3),
+        run.outcome.succeeded
+        and within(took, 0.0, 4.0)
+        and smooth
+        and bool(joint[-1] >= soft - 1e-3),
         f"joint 5 from {np.rad2deg(joint[0]):.1f} to {np.rad2deg(joint[-1]):.1f} degrees",
     )
 
@@ -249,11 +240,10 @@ def _conflict(arm: Arm) -> Check:
     start = np.deg2rad(PUMA_START_DEG)
     cell = _line(arm, 6.0, 0.0)
     cell = replace(cell, features=_SQUARE, start=start)
-    watch = _Watch()
-    excess, outcome = run_ideal(cell, "constrained image-based", 1.0, listeners=(watch,))
-    named = {name for tick in watch.slack for name in tick}
+    excess, run = _recorded(cell, "constrained image-based", 1.0)
+    named = {name for tick in run.arms["arm"].slack for name in tick}
     kept = excess.rate <= 1e-12 and excess.position <= 0.0
-    lost = outcome.kind in (OutcomeKind.TARGET_LOST, OutcomeKind.COMPLETED)
+    lost = run.outcome.kind in (OutcomeKind.TARGET_LOST, OutcomeKind.COMPLETED)
     return Check(
         "conflict.named",
         "what was given up is named; joint limits are not in it",

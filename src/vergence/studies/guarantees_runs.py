@@ -29,7 +29,7 @@ from vergence.estimation import ExactPoints
 from vergence.geometry import se3, se3_inverse, so3_exp
 from vergence.planning import FixedReference
 from vergence.robot import Arm
-from vergence.runtime import Listener, Loop
+from vergence.runtime import Loop, RunInfo, RunRecorder
 from vergence.runtime.stages import Planner
 from vergence.signals import FrameTruth, Outcome, Reference, Sample, Setpoint
 from vergence.simulation import IdealCell, IdealDriver
@@ -117,9 +117,7 @@ class Attempt:
 
     def run(self, duration_s: float = RUN_S) -> tuple[Excess, Outcome]:
         """Run it; return what was exceeded and how it ended."""
-        return run_ideal(
-            self.cell, self.law, duration_s, self.depth_factor, self.offset_px, listeners=()
-        )
+        return run_ideal(self.cell, self.law, duration_s, self.depth_factor, self.offset_px)
 
 
 def run_ideal(
@@ -128,9 +126,9 @@ def run_ideal(
     duration_s: float,
     depth_factor: float = 1.0,
     offset_px: FloatArray | None = None,
-    listeners: tuple[Listener, ...] = (),
+    recorder: RunRecorder | None = None,
 ) -> tuple[Excess, Outcome]:
-    """Run the real loop on an ideal cell, features wanted where they are at the start."""
+    """Run the real loop on an ideal cell, features desired where they are at the start."""
     driver = IdealDriver(cell)
     truth = driver.frame().truth
     assert truth is not None
@@ -144,9 +142,13 @@ def run_ideal(
         _goal(law, truth, offset, depth),
         build(law, cell, depth),
         outer_rate_hz=cell.rate_hz,
-        listeners=listeners,
+        listeners=[] if recorder is None else [recorder],
     )
+    if recorder is not None:
+        recorder.begin(RunInfo.of(watched, law, "", cell.seed, CAMERA))
     outcome = loop.run(duration_s)
+    if recorder is not None:
+        recorder.close(outcome, {})
     return watched.excess, outcome
 
 

@@ -27,7 +27,7 @@ NOISE_PX = 1.0  # of the exact projections of a quick study
 
 
 def reproduce(
-    out: Path, quick: bool, progress: Progress = lambda _what, _share: None
+    out: Path, quick: bool, progress: Progress = lambda _what, _share: None, seed: int = 0
 ) -> StudyResult:
     """Run section V and what follows from it; write the figures.
 
@@ -35,8 +35,9 @@ def reproduce(
         out: folder for the figures.
         quick: exact projections with noise instead of rendered images.
         progress: told what is being done.
+        seed: of the cell.
     """
-    cell = load_cell("lippiello2005")
+    cell = load_cell("lippiello2005", seed=seed)
     if quick:
         cell = cell.replace(perception={"noise_px": NOISE_PX})
     images = not quick
@@ -61,7 +62,7 @@ def reproduce(
         *_cost(*measure_costs(cell, (2, 64))),
     ]
     progress("figures", 0.97)
-    return StudyResult(TITLE, tuple(checks), figures.draw(out, trials))
+    return StudyResult(TITLE, tuple(checks), figures.draw(out, trials), seed)
 
 
 def variants(cell: Cell) -> Mapping[str, Cell]:

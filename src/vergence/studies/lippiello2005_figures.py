@@ -25,20 +25,20 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
             "Figure 5: the object's trajectory in its first frame, slow then twice as fast.",
         ),
         "figure_06": (
-            _errors(hybrid, "target_m", "target_rad"),
+            _target_errors(hybrid),
             "Figure 6: error of the estimated pose, both cameras, the paper's settings.",
         ),
         "figure_07": (
-            _errors(hybrid, "hand_m", "hand_rad"),
+            _hand_errors(hybrid),
             "Figure 7: error of the slave's hand relative to the object, both cameras, the "
             "paper's settings.",
         ),
         "figure_07_ours": (
-            _errors(ours, "hand_m", "hand_rad"),
+            _hand_errors(ours),
             "The same with the error-state filter, feed-forward and prediction over the latency.",
         ),
         "figure_08": (
-            _errors(fixed, "target_m", "target_rad"),
+            _target_errors(fixed),
             "Figure 8: error of the estimated pose, the fixed camera alone, the paper's settings.",
         ),
     }
@@ -46,23 +46,31 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
 
 
 def _trajectory(trial: Trial) -> Any:
-    poses = trial.trace["T_world_target"]
+    poses = trial.errors.T_world_target
     relative = np.linalg.inv(poses[0]) @ poses
     rpy = np.array([matrix_to_rpy(np.ascontiguousarray(T[:3, :3])) for T in relative])
     drawing, (above, below) = figure(_WIDTH, _HEIGHT, rows=2, sharex=True)
-    time = trial.trace["time"]
+    time = trial.errors.time
     _three(above, time, relative[:, :3, 3], ("x", "y", "z"), "position (m)")
     _three(below, time, np.rad2deg(rpy[:, ::-1]), ("roll", "pitch", "yaw"), "angle (degrees)")
     below.set_xlabel("time (s)")
     return drawing
 
 
-def _errors(trial: Trial, position: str, angle: str) -> Any:
+def _target_errors(trial: Trial) -> Any:
+    errors = trial.errors.between(trial.moving_from / 2)
+    return _errors(errors.time, errors.target_m, errors.target_rad)
+
+
+def _hand_errors(trial: Trial) -> Any:
+    errors = trial.errors.between(trial.moving_from / 2)
+    return _errors(errors.time, errors.camera_m, errors.camera_rad)
+
+
+def _errors(time: FloatArray, metres: FloatArray, radians: FloatArray) -> Any:
     drawing, (above, below) = figure(_WIDTH, _HEIGHT, rows=2, sharex=True)
-    rows = trial.trace.between(trial.moving_from / 2)
-    time = trial.trace["time"][rows]
-    _three(above, time, 1e3 * trial.trace[position][rows], ("x", "y", "z"), "position error (mm)")
-    below.plot(time, np.rad2deg(trial.trace[angle][rows]), **curve(0))
+    _three(above, time, 1e3 * metres, ("x", "y", "z"), "position error (mm)")
+    below.plot(time, np.rad2deg(radians), **curve(0))
     below.set_ylabel("orientation error (degrees)")
     below.set_xlabel("time (s)")
     return drawing

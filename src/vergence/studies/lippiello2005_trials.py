@@ -11,10 +11,9 @@ from vergence.assembly import run_cell
 from vergence.assembly.pose import follow_pose, target_shape
 from vergence.cell import Cell
 from vergence.cell.schema import PoseMotion
-from vergence.runtime.pose_errors import angle_between
+from vergence.runtime.results import PoseErrors, angle_between
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
-from vergence.studies.pose_trace import PoseTrace
 
 # The paper's state, Q and R; trajectory planner without feed-forward or prediction. R = 9 px² is
 # what calibration left, so the cameras' poses are known that well: off by two or three pixels. How
@@ -32,33 +31,33 @@ DIVERGED_M = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run: how it ended and its rows."""
+    """One run: how it ended and its pose errors."""
 
     outcome: Outcome
-    trace: PoseTrace
+    errors: PoseErrors
     moving_from: float  # s, when the object sets off
 
     def position(self, start: float = -np.inf, end: float = np.inf) -> FloatArray:
         """Return the error of the estimated position while the object moves, (K,), m."""
-        rows = self.trace.between(max(start, self.moving_from), end)
-        sizes: FloatArray = np.linalg.norm(self.trace["target_m"][rows], axis=1)
+        moving = self.errors.between(max(start, self.moving_from), end)
+        sizes: FloatArray = np.linalg.norm(moving.target_m, axis=1)
         return sizes
 
     def orientation_deg(self, start: float = -np.inf, end: float = np.inf) -> FloatArray:
         """Return the error of the estimated orientation while the object moves, (K,)."""
-        rows = self.trace.between(max(start, self.moving_from), end)
-        degrees: FloatArray = np.rad2deg(self.trace["target_rad"][rows])
+        moving = self.errors.between(max(start, self.moving_from), end)
+        degrees: FloatArray = np.rad2deg(moving.target_rad)
         return degrees
 
     def hand_m(self) -> FloatArray:
-        """Return how far the object is from its wanted place in the hand, while it moves, (K,)."""
-        sizes = np.linalg.norm(self.trace["hand_m"][self.trace.between(self.moving_from)], axis=1)
+        """Return how far the object is from its desired place in the hand, while it moves, (K,)."""
+        sizes = np.linalg.norm(self.errors.between(self.moving_from).camera_m, axis=1)
         known: FloatArray = sizes[np.isfinite(sizes)]
         return known
 
     def hand_deg(self) -> FloatArray:
-        """Return how far it is from its wanted orientation in the hand, (K,)."""
-        angles = self.trace["hand_rad"][self.trace.between(self.moving_from)]
+        """Return how far it is from its desired orientation in the hand, (K,)."""
+        angles = self.errors.between(self.moving_from).camera_rad
         degrees: FloatArray = np.rad2deg(angles[np.isfinite(angles)])
         return degrees
 
@@ -77,10 +76,9 @@ def passes(cell: Cell) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def run(cell: Cell, images: bool) -> Trial:
-    """Run a cell and keep its rows."""
-    trace = PoseTrace(cell.task.camera)
-    result = run_cell(cell, [trace], images=images)
-    return Trial(result.outcome, trace, passes(cell)[0][0])
+    """Run a cell."""
+    done = run_cell(cell, images=images)
+    return Trial(done.outcome, done.pose_errors, passes(cell)[0][0])
 
 
 def slowed(cell: Cell, speed: float) -> Cell:

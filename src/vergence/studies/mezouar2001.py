@@ -42,6 +42,7 @@ def reproduce(
     out: Path,
     quick: bool,
     progress: Progress = lambda _what, _share: None,
+    seed: int = 0,
     *,
     counts: Mapping[str, int] | None = None,
     workers: int | None = None,
@@ -52,10 +53,11 @@ def reproduce(
         out: folder for the figures.
         quick: exact projections instead of rendered images, fewer random starts.
         progress: told what is being done.
+        seed: of the cell, the random starts and the wrong beliefs.
         counts: random starts and wrong beliefs to try, instead of the usual numbers.
         workers: processes for those; see `processes`.
     """
-    cell = load_cell("gantry")
+    cell = load_cell("gantry", seed=seed)
     counts = counts or (COUNTS_QUICK if quick else COUNTS)
     progress("planning", 0.0)
     section = plan_section6(cell, not quick)
@@ -72,13 +74,15 @@ def reproduce(
 
     scene = section.scene
     with processes(workers) as pool:
-        beliefs = wrong_beliefs(scene, counts["perturbed"], pool, share("wrong beliefs", 0.25, 0.4))
+        beliefs = wrong_beliefs(
+            scene, counts["perturbed"], pool, share("wrong beliefs", 0.25, 0.4), seed
+        )
         starts = {
             "random": random_starts(
-                scene, None, counts["random"], pool, share("random starts", 0.4, 0.7)
+                scene, None, counts["random"], pool, share("random starts", 0.4, 0.7), seed
             ),
             "random_roll": random_starts(
-                scene, ROLL_DEG, counts["random_roll"], pool, share("random rolls", 0.7, 0.95)
+                scene, ROLL_DEG, counts["random_roll"], pool, share("random rolls", 0.7, 0.95), seed
             ),
         }
     checks = [
@@ -91,7 +95,7 @@ def reproduce(
     ]
     progress("figures", 0.97)
     drawn = figures.draw(out, section, classical, starts)
-    return StudyResult(TITLE, tuple(checks), drawn)
+    return StudyResult(TITLE, tuple(checks), drawn, seed)
 
 
 def servo_classically(scene: Scene) -> Mapping[str, Motion]:
@@ -175,7 +179,7 @@ def _tracking(runs: Mapping[str, Realised]) -> list[Check]:
     error = {name: float(run.tracking_error_px.max()) for name, run in runs.items()}
     final = {name: float(run.goal_error_px[-1].max()) for name, run in runs.items()}
     pose = {name: run.final_pose_error for name, run in runs.items()}
-    completed = all(run.succeeded for run in runs.values())
+    completed = all(realised.run.outcome.succeeded for realised in runs.values())
     worst_pose = max(metres for metres, _ in pose.values())
     return [
         Check(

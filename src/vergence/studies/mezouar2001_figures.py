@@ -103,17 +103,16 @@ def _planned_and_realised(section: Section6, name: str) -> Any:
     path, run, scene = section.paths[name], section.runs[name], section.scene
     drawing, axes = grid(_WIDTH, 8.8, 3, 2)
     _planned(axes[0], path, "(a)", "(b)")
-    trace = run.trace
-    image_paths(axes[1, 0], scene.camera, trace["points_px"])
+    image_paths(axes[1, 0], scene.camera, run.camera.true_px)
     axes[1, 0].set_title("(c) realised, in the image", fontsize=9)
-    joint_paths(axes[1, 1], trace["time"], run.joints_normalized, scene.arm.names)
+    joint_paths(axes[1, 1], run.motion.time, run.joints_normalized, scene.arm.names)
     axes[1, 1].set_title("(d) realised, joints", fontsize=9)
     axes[1, 1].set_xlabel("time (s)")
     legend(axes[1, 1])
     _velocities(axes[2, 0], run)
     axes[2, 0].set_title("(e) camera velocity", fontsize=9)
     for index, errors in enumerate(run.goal_error_px.T):
-        axes[2, 1].plot(trace["time"], errors, label=f"mark {index + 1}", **curve(index))
+        axes[2, 1].plot(run.camera.time, errors, label=f"mark {index + 1}", **curve(index))
     axes[2, 1].set_title("(f) distance from the desired place", fontsize=9)
     axes[2, 1].set_xlabel("time (s)")
     axes[2, 1].set_ylabel("error (px)")
@@ -124,7 +123,7 @@ def _planned_and_realised(section: Section6, name: str) -> Any:
 
 
 def _velocities(axes: "Axes", run: Realised) -> None:
-    time, v = run.trace["time"], run.trace["v_camera"]
+    time, v = run.motion.time, run.motion.v_camera
     for index, axis in enumerate("xyz"):
         axes.plot(time, 100.0 * v[:, index], label=f"v{axis} (cm/s)", color=COLORS[index])
     for index, axis in enumerate("xyz"):

@@ -1,8 +1,7 @@
 """Section 6 of [Mezouar2001] on the gantry cell: plan from two pictures, then track the plan."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,58 +14,13 @@ from vergence.cell.schema import ReachTable
 from vergence.errors import VergenceError
 from vergence.geometry import se3_inverse, so3_log
 from vergence.planning import Path, PlanFailure, PotentialFieldPlanner, Trajectory
-from vergence.runtime.recording import RunInfo, TickRecord
-from vergence.signals import Outcome
+from vergence.runtime import Run
+from vergence.runtime.results import ArmTrace, CameraTrace
 from vergence.simulation import SimulatedDriver
 from vergence.studies.reach_scene import Scene
 
 SETTLE_S = 4.0  # after a plan's end
 PLANNERS = {"both": "potential_field", "optimised": "optimised"}  # of the paths that are run
-
-
-@dataclass(slots=True)
-class PathTrace:
-    """Listens to a run; a row for every picture.
-
-    Columns: time (s), q (n,), points_px (N, 2) true, wanted_px (N, 2), v_camera (6,) commanded,
-    T_world_camera (4, 4).
-    """
-
-    arm: str
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    outcome: Outcome | None = None
-
-    def begin(self, _info: RunInfo) -> None:
-        """Start with no rows."""
-        self.rows.clear()
-
-    def tick(self, record: TickRecord) -> None:
-        """Keep what was so when the picture was taken, and what was made of it."""
-        frame = next((f for f in record.sample.frames if f.truth is not None), None)
-        command = record.commands.get(self.arm)
-        if frame is None or frame.truth is None or record.reference is None or command is None:
-            return
-        self.rows.append(
-            {
-                "time": frame.time,
-                "q": frame.joints[self.arm],
-                "points_px": frame.truth.points_px,
-                "wanted_px": record.reference.points_px,
-                "v_camera": command.v_camera,
-                "T_world_camera": frame.truth.T_world_camera,
-            }
-        )
-
-    def event(self, time: float, name: str, text: str) -> None:
-        """Events are in the outcome's reason."""
-
-    def close(self, outcome: Outcome, _summary: Mapping[str, float | str]) -> None:
-        """Keep how it ended."""
-        self.outcome = outcome
-
-    def __getitem__(self, column: str) -> FloatArray:
-        """Return a column as an array, one row a picture."""
-        return np.array([row[column] for row in self.rows])
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,30 +29,40 @@ class Realised:
 
     scene: Scene
     trajectory: Trajectory
-    trace: PathTrace
-    succeeded: bool
+    run: Run
+
+    @property
+    def camera(self) -> CameraTrace:
+        """What the camera saw."""
+        return self.run.cameras[self.run.info.task_camera]
+
+    @property
+    def motion(self) -> ArmTrace:
+        """How the arm moved."""
+        (arm,) = self.run.arms.values()
+        return arm
 
     @property
     def tracking_error_px(self) -> FloatArray:
         """Distance of each point from its place on the plan, (K, N)."""
-        return _distances(self.trace["points_px"] - self.trace["wanted_px"])
+        return _distances(self.camera.true_px - self.camera.desired_px)
 
     @property
     def goal_error_px(self) -> FloatArray:
-        """Distance of each point from where the desired picture has it, (K, N)."""
-        return _distances(self.trace["points_px"] - self.scene.goal_px)
+        """Distance of each point from where the desired image has it, (K, N)."""
+        return _distances(self.camera.true_px - self.scene.goal_px)
 
     @property
     def image_margin_px(self) -> float:
         """Smallest distance of a point to the border of the image; negative outside."""
-        camera, px = self.scene.camera, self.trace["points_px"]
+        camera, px = self.scene.camera, self.camera.true_px
         far = np.array([camera.width - 0.5, camera.height - 0.5]) - px
         return float(min((px + 0.5).min(), far.min()))
 
     @property
     def joints_normalized(self) -> FloatArray:
         """Joint positions with their limits at -1 and 1, (K, n)."""
-        return self.scene.arm.normalized(self.trace["q"])
+        return self.scene.arm.normalized(self.motion.position)
 
     @property
     def joint_margin(self) -> float:
@@ -107,8 +71,8 @@ class Realised:
 
     @property
     def final_pose_error(self) -> tuple[float, float]:
-        """How far the camera ends from where the desired picture was taken, m and rad."""
-        missing = se3_inverse(self.scene.T_world_goal.copy()) @ self.trace["T_world_camera"][-1]
+        """How far the camera ends from where the desired image was taken, m and rad."""
+        missing = se3_inverse(self.scene.T_world_goal.copy()) @ self.camera.T_world_camera[-1]
         turn = so3_log(np.ascontiguousarray(missing[:3, :3]))
         return float(np.linalg.norm(missing[:3, 3])), float(np.linalg.norm(turn))
 
@@ -167,9 +131,7 @@ def run_section6(cell: Cell, planned: Section6, name: str, images: bool) -> Real
     changed = cell.replace(
         task={"planner": PLANNERS[name]}, duration_s=trajectory.duration + SETTLE_S
     )
-    trace = PathTrace(task.arm)
-    result = run_cell(changed, [trace], images)
-    return Realised(planned.scene, trajectory, trace, result.outcome.succeeded)
+    return Realised(planned.scene, trajectory, run_cell(changed, images=images))
 
 
 def _distances(differences: FloatArray) -> FloatArray:

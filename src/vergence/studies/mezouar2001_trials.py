@@ -17,6 +17,7 @@ from vergence.studies.reach_scene import Scene
 NOISE_PX = 0.3
 ROLL_DEG = (120.0, 180.0)
 SEED_START, SEED_NOISE, SEED_WRONG = 0, 1, 2  # of the draws
+_IN_A_SET = 100_000  # starts, or beliefs, that a seed has
 CELLS = 256  # of the proof's grid along each turning joint, at most
 
 
@@ -35,14 +36,18 @@ class Trial(NamedTuple):
     infeasible: bool  # proved, not guessed
 
 
-def try_start(scene: Scene, roll_deg: tuple[float, float] | None, index: int) -> Trial:
+def try_start(
+    scene: Scene, roll_deg: tuple[float, float] | None, index: int, seed: int = 0
+) -> Trial:
     """Servo from a random start by every method; a start ours fails from may be infeasible.
 
     Args:
         scene: arm, camera and marks.
         roll_deg: see `Scene.drawn`.
         index: names the start.
+        seed: names the set of starts.
     """
+    index += seed * _IN_A_SET
     random = np.random.default_rng([SEED_START, index])
     start = Scene.drawn(scene.arm, scene.camera, scene.marks, random, roll_deg)
     belief = Belief(scene.camera, noise_px=NOISE_PX)
@@ -60,9 +65,9 @@ def is_infeasible(scene: Scene) -> bool:
     return proves_no_path(scene.problem(), CELLS)
 
 
-def try_belief(scene: Scene, method: Method, index: int) -> End:
+def try_belief(scene: Scene, method: Method, index: int, seed: int = 0) -> End:
     """Servo from the scene's start with a wrong camera and a wrong d*."""
-    random = np.random.default_rng([SEED_WRONG, index])
+    random = np.random.default_rng([SEED_WRONG, index + seed * _IN_A_SET])
     belief = Belief.perturbed(scene.camera, NOISE_PX, random)
     return _end(servo(scene, method, belief, random))
 
@@ -73,9 +78,10 @@ def random_starts(
     count: int,
     pool: ProcessPoolExecutor | None = None,
     progress: Callable[[float], None] = lambda _share: None,
+    seed: int = 0,
 ) -> list[Trial]:
     """Return what came of a number of random starts."""
-    return try_all(partial(try_start, scene, roll_deg), count, pool, progress)
+    return try_all(partial(try_start, scene, roll_deg, seed=seed), count, pool, progress)
 
 
 def wrong_beliefs(
@@ -83,9 +89,10 @@ def wrong_beliefs(
     count: int,
     pool: ProcessPoolExecutor | None = None,
     progress: Callable[[float], None] = lambda _share: None,
+    seed: int = 0,
 ) -> list[End]:
     """Return what came of a number of wrong beliefs with the planner to use."""
-    return try_all(partial(try_belief, scene, "optimised"), count, pool, progress)
+    return try_all(partial(try_belief, scene, "optimised", seed=seed), count, pool, progress)
 
 
 def endings(trials: Sequence[Trial], method: str) -> Counter[Ending]:

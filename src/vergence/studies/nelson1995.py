@@ -12,7 +12,6 @@ from vergence.control import OptimalTracking
 from vergence.signals import OutcomeKind
 from vergence.studies import nelson1995_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
-from vergence.studies.trace import Trace
 from vergence.studies.trial import Trial, Trials
 
 TITLE = "Nelson and Khosla (1995): singularity and joint limit avoidance while tracking"
@@ -26,15 +25,16 @@ STRATEGIES: Mapping[str, Mapping[str, Any]] = {
 WINDOW_PX = 32.0  # the search range of the tracker
 
 
-def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
+def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
     """Run section 5 and what follows from it; write the figures.
 
     Args:
         out: folder for the figures.
         quick: exact projections instead of rendered images.
         progress: told what is being done.
+        seed: of the cell.
     """
-    cell = load_cell("puma560")
+    cell = load_cell("puma560", seed=seed)
     trials = {}
     for i, (strategy, law) in enumerate(STRATEGIES.items()):
         for j, sign in enumerate((1, -1)):
@@ -52,7 +52,7 @@ def reproduce(out: Path, quick: bool, progress: Progress) -> StudyResult:
     ]
     progress("figures", 0.97)
     drawn = figures.draw(out, cell, trials)
-    return StudyResult(TITLE, tuple(checks), drawn)
+    return StudyResult(TITLE, tuple(checks), drawn, seed)
 
 
 def moving(
@@ -67,10 +67,8 @@ def moving(
 
 
 def run(cell: Cell, quick: bool) -> Trial:
-    """Run a cell and keep its rows."""
-    trace = Trace(cell.task.camera)
-    result = run_cell(cell, [trace], images=not quick)
-    return Trial(result.outcome, result.summary, trace)
+    """Run a cell."""
+    return Trial(run_cell(cell, images=not quick))
 
 
 def _two_axis(trials: Trials) -> list[Check]:
@@ -130,8 +128,8 @@ def _avoidance(trials: Trials, quick: bool) -> list[Check]:
     worst = max(trial.summary["max_error_px"] for trial in both)
     ratio = min(trial.summary["min_manipulability_ratio"] for trial in both)
     penalty = min(trial.summary["min_penalty"] for trial in both)
-    final = max(float(trial.trace["error_px"][-1]) for trial in both)
-    drift = max(float(np.nanmax(trial.trace["drift_px"])) for trial in both)
+    final = max(float(trial.error_px[-1]) for trial in both)
+    drift = max(float(np.nanmax(trial.drift_px)) for trial in both)
     return [
         Check(
             "avoidance.range_m",
@@ -185,7 +183,7 @@ def _stability(cell: Cell, quick: bool, progress: Progress) -> Check:
         trial = run(base.replace(law={"Q": law.Q * factor}), quick)
         if not trial.outcome.succeeded:
             return False
-        time, error = trial.trace["time"], trial.trace["error_px"]
+        time, error = trial.camera.time, trial.error_px
         early = error[(time > 2.0) & (time < 4.0)].max()
         late = error[time > 6.0].max()
         return bool(late < max(0.7 * early, 1.0))

@@ -45,7 +45,7 @@ def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
             "Figure 10: manipulability, two axes.",
         ),
         "figure_11": (
-            _against(two, "camera_m", "penalty", "camera translation x (m)", "P"),
+            _penalty(two, "camera_m", "camera translation x (m)"),
             "Figure 11: penalty, two axes.",
         ),
         "figure_12": (
@@ -53,17 +53,11 @@ def draw(out: Path, cell: Cell, trials: Trials) -> tuple[Figure, ...]:
             "Figure 12: manipulability, four axes with avoidance.",
         ),
         "figure_13": (
-            _against(avoiding, "estimated_m", "penalty", "estimated object translation x (m)", "P"),
+            _penalty(avoiding, "estimated_m", "estimated object translation x (m)"),
             "Figure 13: penalty, four axes with avoidance.",
         ),
         "figure_14": (
-            _against(
-                avoiding,
-                "estimated_m",
-                "depth_m",
-                "estimated object translation x (m)",
-                "depth of the feature (m)",
-            ),
+            _depth(avoiding),
             "Figure 14: depth of the object, four axes with avoidance.",
         ),
         "figure_15": (
@@ -112,10 +106,10 @@ def _penalties(arm: Arm, start: FloatArray) -> Any:
 def _translation(trials: Trials, sign: int) -> Any:
     drawing, axes = _axes("time (s)", "translation (m)")
     whole = trials["avoidance", sign]
-    axes.plot(whole.trace["time"], whole.object_m, color="#999", linewidth=3, label="object")
+    axes.plot(whole.camera.time, whole.object_m, color="#999", linewidth=3, label="object")
     for index, (strategy, label) in enumerate(_LABELS.items()):
         trial = trials[strategy, sign]
-        time = trial.trace["time"]
+        time = trial.camera.time
         axes.plot(time, trial.camera_m, label=f"camera, {label}", **curve(index))
         if strategy == "avoidance":
             axes.plot(
@@ -144,7 +138,7 @@ def _manipulability(trials: list[Trial], x: str, x_label: str) -> Any:
     drawing, axes = _axes(x_label, "manipulability (m⁶)")
     for trial in trials:
         first = trial is trials[0]
-        w, P = trial.trace["manipulability"], trial.trace["penalty"]
+        w, P = trial.arm.manipulability, trial.arm.penalty
         along = getattr(trial, x)
         axes.plot(along, w, label="w' (26)" if first else None, **curve(0))
         axes.plot(
@@ -159,10 +153,18 @@ def _manipulability(trials: list[Trial], x: str, x_label: str) -> Any:
     return drawing
 
 
-def _against(trials: list[Trial], x: str, column: str, x_label: str, y_label: str) -> Any:
-    drawing, axes = _axes(x_label, y_label)
+def _penalty(trials: list[Trial], x: str, x_label: str) -> Any:
+    drawing, axes = _axes(x_label, "P")
     for trial in trials:
-        axes.plot(getattr(trial, x), trial.trace[column], **curve(0))
+        axes.plot(getattr(trial, x), trial.arm.penalty, **curve(0))
+    axes.set_ylim(bottom=0.0)
+    return drawing
+
+
+def _depth(trials: list[Trial]) -> Any:
+    drawing, axes = _axes("estimated object translation x (m)", "depth of the feature (m)")
+    for trial in trials:
+        axes.plot(trial.estimated_m, trial.camera.true_depth_m[:, 0], **curve(0))
     axes.set_ylim(bottom=0.0)
     return drawing
 
@@ -172,7 +174,7 @@ def _errors(trials: Trials) -> Any:
     for index, strategy in ((0, "two_axis"), (2, "avoidance")):
         trial = trials[strategy, -1]
         label = _LABELS[strategy]
-        axes.plot(trial.trace["time"], trial.trace["error_px"], label=label, **curve(index))
+        axes.plot(trial.camera.time, trial.error_px, label=label, **curve(index))
     axes.set_ylim(bottom=0.0)
     legend(axes)
     return drawing

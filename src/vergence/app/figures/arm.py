@@ -7,7 +7,8 @@ import numpy as np
 from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
 from vergence.drawing import LIMIT, curve, legend
-from vergence.runtime.recording import ArmInfo, ArmTrace
+from vergence.runtime import ArmInfo
+from vergence.runtime.results import ArmTrace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

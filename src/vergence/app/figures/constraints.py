@@ -5,7 +5,7 @@ import numpy as np
 from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import BoolArray, FloatArray
 from vergence.drawing import COLORS, legend
-from vergence.runtime.recording import ArmTrace
+from vergence.runtime.results import ArmTrace
 
 _PUSHED, _BENT = COLORS[4], COLORS[1]
 

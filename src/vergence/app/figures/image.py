@@ -8,7 +8,7 @@ from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.drawing import COLORS, curve, legend
-from vergence.runtime.recording import CameraTrace
+from vergence.runtime.results import CameraTrace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

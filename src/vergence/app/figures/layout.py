@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from vergence.drawing import SETTINGS, draw_names_as_written, figure
-from vergence.runtime.recording import Event
+from vergence.runtime.results import Event
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

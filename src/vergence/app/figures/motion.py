@@ -5,7 +5,7 @@ import numpy as np
 from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray, IntArray
 from vergence.drawing import curve, legend
-from vergence.runtime.recording import CameraTrace, TargetTrace
+from vergence.runtime.results import CameraTrace, TargetTrace
 
 
 def target_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
@@ -72,11 +72,11 @@ def estimate_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels 
 
 def pose_error_figure(trace: CameraTrace) -> Panels | None:
     """Draw how far the target truly is from its wanted pose in a camera."""
-    known = np.isfinite(trace.T_camera_target_wanted[:, 0, 0])
+    known = np.isfinite(trace.T_camera_target_desired[:, 0, 0])
     known &= np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
         return None
-    wanted = trace.T_camera_target_wanted[known]
+    wanted = trace.T_camera_target_desired[known]
     seen = np.linalg.inv(trace.T_world_camera[known]) @ trace.T_world_target[known]
     distance = np.linalg.norm(seen[:, :3, 3] - wanted[:, :3, 3], axis=1)
     angle = _angles(np.swapaxes(wanted[:, :3, :3], 1, 2) @ seen[:, :3, :3])

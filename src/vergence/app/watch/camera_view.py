@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.runtime.recording.numbers import numbers
+from vergence.runtime.json_numbers import numbers
 from vergence.signals import ImagePoints
 
 _JPEG_QUALITY = 80

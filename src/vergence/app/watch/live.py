@@ -27,11 +27,12 @@ from vergence.app.watch.publisher import Publisher
 from vergence.app.watch.scene import Scene, world_state
 from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.watched_driver import WatchedDriver
-from vergence.assembly import LawContext, Parts, RunResult, run_driver
+from vergence.assembly import LawContext, Parts, run_driver
 from vergence.control import Law
-from vergence.runtime import Loop, Recorder
+from vergence.runtime import Loop, Recorder, Run
 from vergence.signals import Outcome, OutcomeKind
 
+_KEPT_TICKS = 20_000  # in memory, some ten minutes; the recording has them all
 _LOOK_UP_S = 0.1  # the longest wait without a look at whether Ctrl-C was pressed
 
 
@@ -76,7 +77,7 @@ class Live:
         """Ask for something; it is done between two turns of the loop."""
         self._inbox.ask(request)
 
-    def run(self) -> RunResult:
+    def run(self) -> Run:
         """Run the cell until Ctrl-C; return what came of the last run."""
         while self._again:
             self._again = False
@@ -94,7 +95,7 @@ class Live:
         self.scene.close()
         self._driver.close()
 
-    def _run_once(self) -> RunResult:
+    def _run_once(self) -> Run:
         cell = self._editor.cell
         about = {
             "mode": "live",
@@ -112,6 +113,7 @@ class Live:
                 self._images,
                 duration_s=float("inf"),
                 attend=self._attend,
+                most_ticks=_KEPT_TICKS,
             )
         finally:
             self._loop = None

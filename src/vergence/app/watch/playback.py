@@ -23,8 +23,8 @@ from vergence.app.watch.view_state import Row
 from vergence.arrays import FloatArray
 from vergence.geometry import se3_inverse
 from vergence.robot import manipulability_measure
-from vergence.runtime.pose_errors import angle_between
-from vergence.runtime.recording import CameraTrace, Recording
+from vergence.runtime.recording import Recording
+from vergence.runtime.results import CameraTrace, angle_between
 from vergence.signals import ImagePoints, SearchWindows
 
 _MM = 1e3
@@ -94,7 +94,7 @@ class Playback:
         for name, trace in self._recording.cameras.items():
             if np.isfinite(trace.error_px).any():
                 yield error_plot(trace.error_px.shape[1], self._further(name))
-            if np.isfinite(trace.T_camera_target_wanted).any():
+            if np.isfinite(trace.T_camera_target_desired).any():
                 yield from (HAND_MM, HAND_DEG)
         if self._recording.target is not None and len(self._truth[0]):
             yield TARGET_MM
@@ -123,8 +123,8 @@ class Playback:
 
     def _hand_rows(self) -> Iterator[Row]:
         for trace in self._recording.cameras.values():
-            for index in np.flatnonzero(np.isfinite(trace.T_camera_target_wanted[:, 0, 0])):
-                wanted = trace.T_camera_target_wanted[index]
+            for index in np.flatnonzero(np.isfinite(trace.T_camera_target_desired[:, 0, 0])):
+                wanted = trace.T_camera_target_desired[index]
                 T = se3_inverse(trace.T_world_camera[index]) @ trace.T_world_target[index]
                 values = {
                     "hand_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - wanted[:3, 3])]),

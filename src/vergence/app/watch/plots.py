@@ -8,8 +8,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
-from vergence.runtime.recording import ArmInfo
-from vergence.runtime.recording.numbers import numbers
+from vergence.runtime import ArmInfo
+from vergence.runtime.json_numbers import numbers
 
 _DIGITS = 5
 

@@ -13,8 +13,8 @@ from vergence.arrays import FloatArray
 from vergence.cell import Cell
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import manipulability_measure
-from vergence.runtime.pose_errors import pose_errors
-from vergence.runtime.recording import RunInfo, TickRecord
+from vergence.runtime import RunInfo, TickRecord
+from vergence.runtime.results import tick_pose_errors
 from vergence.signals import Frame, FrameTruth, ImagePoints, Outcome, Reference
 from vergence.simulation import SimulatedDriver
 
@@ -129,13 +129,14 @@ class Publisher:
 
     def _errors(self, record: TickRecord) -> dict[str, FloatArray]:
         if self._cell.task.kind == "follow":
-            errors = pose_errors(record, self._cell.task.camera)
-            if errors is None:
+            assert self._info is not None, "a run begins before it ticks"
+            errors = tick_pose_errors(record, self._info)
+            if not len(errors.time):
                 return {}
             return {
-                "hand_mm": np.array([_MM * np.linalg.norm(errors.hand_m)]),
-                "hand_deg": np.array([np.rad2deg(errors.hand_rad)]),
-                "target_mm": np.array([_MM * np.linalg.norm(errors.target_m)]),
+                "hand_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
+                "hand_deg": np.rad2deg(errors.camera_rad),
+                "target_mm": _MM * np.linalg.norm(errors.target_m, axis=1),
             }
         if record.observation is None or record.reference is None:
             return {}

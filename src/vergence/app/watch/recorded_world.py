@@ -6,7 +6,7 @@ from vergence.app.watch.scene import world_state
 from vergence.arrays import FloatArray
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.runtime.recording import RunInfo
+from vergence.runtime import RunInfo
 from vergence.simulation import choose_renderer
 from vergence.simulation.world import World
 

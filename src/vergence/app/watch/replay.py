@@ -83,9 +83,8 @@ class Replay:
         self.view_state.begin(about, self._playback.rows())
         for event in self._recording.events:
             self.view_state.event(event.time, event.name, event.text)
-        if outcome is not None:
-            end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-            self.view_state.status(outcome={**end, "succeeded": outcome.succeeded})
+        end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
+        self.view_state.status(outcome={**end, "succeeded": outcome.succeeded})
         self._show()
 
     def _show(self) -> None:

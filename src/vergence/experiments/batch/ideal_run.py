@@ -1,6 +1,5 @@
 """A run on an arm that moves exactly as it is told, before exact projections."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,9 +8,8 @@ from vergence.arrays import FloatArray
 from vergence.control import Law
 from vergence.estimation import ExactPoints
 from vergence.planning import FixedReference
-from vergence.runtime.loop import Loop, Patience
-from vergence.runtime.recording import Listener
-from vergence.signals import Outcome, Reference
+from vergence.runtime import Loop, Patience, Run, RunInfo, RunRecorder
+from vergence.signals import Reference
 from vergence.simulation import IdealCell, IdealDriver
 from vergence.simulation.ideal_driver import ARM, CAMERA
 
@@ -31,16 +29,19 @@ class IdealRun:
         """Return what draws the noise."""
         return np.random.default_rng([self.cell.seed, 3])
 
-    def in_loop(self, listeners: Sequence[Listener] = ()) -> Outcome:
-        """Make the run in the loop; return how it ended."""
+    def in_loop(self) -> Run:
+        """Make the run in the loop."""
+        driver, recorder = IdealDriver(self.cell), RunRecorder()
+        recorder.begin(RunInfo.of(driver, "ideal", "", self.cell.seed, CAMERA))
         loop = Loop(
-            IdealDriver(self.cell),
+            driver,
             ARM,
             ExactPoints(CAMERA, self.noise_px, self.noise()),
             FixedReference(Reference(0.0, self.wanted_px)),
             self.law,
             outer_rate_hz=self.cell.rate_hz,
-            listeners=listeners,
+            listeners=[recorder],
             patience=self.patience,
         )
-        return loop.run(self.duration_s)
+        recorder.close(loop.run(self.duration_s), {})
+        return recorder.run()

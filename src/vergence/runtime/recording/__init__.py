@@ -4,10 +4,10 @@ Topics of a recording, X being an arm or a camera; times are seconds since the s
 
 | topic | type | holds |
 |---|---|---|
-| `/arm/X/state` | JSON | joints, rates, command, camera twist, manipulability, penalty |
+| `/arm/X/state` | JSON | joints, set-points, command, camera twist, limits that shaped it |
 | `/arm/X/joints` | foxglove.JointStates | joints under their names |
 | `/camera/X/features` | JSON | points with covariance, desired and true points, true poses |
-| `/camera/X/image` | foxglove.CompressedImage | every n-th picture, JPEG |
+| `/camera/X/image` | foxglove.CompressedImage | every n-th image, JPEG |
 | `/camera/X/annotations` | foxglove.ImageAnnotations | tracked, lost, desired and true points |
 | `/camera/X/calibration` | foxglove.CameraCalibration | intrinsic parameters, once |
 | `/target` | JSON | pose, velocity and covariance as a filter believes them |
@@ -17,22 +17,7 @@ Topics of a recording, X being an arm or a camera; times are seconds since the s
 Two metadata records frame them: `vergence` (version, cell file, limits, cameras, seed), `outcome`.
 """
 
-from vergence.runtime.recording.listener import Listener
 from vergence.runtime.recording.recorder import Recorder
-from vergence.runtime.recording.recording import Event, Recording
-from vergence.runtime.recording.run_info import ArmInfo, RunInfo
-from vergence.runtime.recording.tick import TickRecord
-from vergence.runtime.recording.traces import ArmTrace, CameraTrace, TargetTrace
+from vergence.runtime.recording.recording import Recording
 
-__all__ = [
-    "ArmInfo",
-    "ArmTrace",
-    "CameraTrace",
-    "Event",
-    "Listener",
-    "Recorder",
-    "Recording",
-    "RunInfo",
-    "TargetTrace",
-    "TickRecord",
-]
+__all__ = ["Recorder", "Recording"]

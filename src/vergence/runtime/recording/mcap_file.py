@@ -8,8 +8,8 @@ import foxglove
 import foxglove.channels
 import foxglove.mcap
 
+from vergence.runtime.json_numbers import dumps
 from vergence.runtime.recording.messages import nanoseconds
-from vergence.runtime.recording.numbers import dumps
 
 
 class McapFile:

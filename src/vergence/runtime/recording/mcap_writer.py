@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vergence.arrays import FloatArray, ImageArray
-from vergence.camera import Camera
-from vergence.geometry import se3_inverse, transform_points
+from vergence.arrays import ImageArray
 from vergence.places import CELL, RECORDING
+from vergence.runtime.json_numbers import finite
 from vergence.runtime.recording import messages, streams
 from vergence.runtime.recording.mcap_file import McapFile
-from vergence.runtime.recording.numbers import finite
-from vergence.runtime.recording.run_info import RunInfo
-from vergence.runtime.recording.tick import TickRecord
+from vergence.runtime.results import arm_row, camera_row, images_of, target_row
+from vergence.runtime.run_info import RunInfo
+from vergence.runtime.tick import TickRecord
 from vergence.signals import Frame, ImagePoints, Outcome
 
 SUMMARY = "summary.json"
@@ -23,10 +22,10 @@ SUMMARY = "summary.json"
 _FLUSH_PERIOD = 1.0  # s of the run that a killed process may lose
 
 
-class Tape:
+class McapWriter:
     """The open recording of one run.
 
-    Numbers go to JSON streams of our own (`streams`), pictures, marks, joints, poses and events
+    Numbers go to JSON streams of our own (`streams`), images, marks, joints, poses and events
     to Foxglove's types (`messages`). Every second of the run the file is brought up to date, so
     that it can be read up to there whatever happens to the process.
     """
@@ -51,7 +50,7 @@ class Tape:
         self.now = record.time
         for arm in record.sample.joints:
             self._record_arm(record, arm)
-        for frame, view in _paired(record):
+        for frame, view in images_of(record):
             if frame is not None:
                 self._record_picture(frame)
             self._record_points(record, frame, view)
@@ -88,40 +87,26 @@ class Tape:
         self._file.flush()
 
     def _record_arm(self, record: TickRecord, arm: str) -> None:
-        state = record.sample.joints[arm]
-        row = streams.arm_message(record.time, state, record.commands.get(arm))
+        row = streams.message_of(arm_row(record, arm))
         self._file.numbers(f"/arm/{arm}/state", self.now, streams.ARM_SCHEMA, row)
-        names = self._info.arms[arm].names
+        state, names = record.sample.joints[arm], self._info.arms[arm].names
         joints = messages.joints(state.time, names, state.position, state.velocity)
         self._file.typed(f"/arm/{arm}/joints", self.now, joints)
 
     def _record_points(
         self, record: TickRecord, frame: Frame | None, view: ImagePoints | None
     ) -> None:
-        camera, time = _source(frame, view)
-        desired, wanted = self._wanted(record, camera)
-        if desired is None and wanted is not None:
-            desired = _shown(wanted, frame, view, self._info.cameras[camera])
-        row = streams.features_message(record.time, frame, view, desired, wanted)
-        self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, row)
-        truth = frame.truth if frame is not None else None
-        marks = messages.annotations(time, view, desired, truth.points_px if truth else None)
+        row = camera_row(record, self._info, frame, view)
+        camera, time = row["camera"], row["time"]
+        message = streams.message_of(row)
+        self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, message)
+        marks = messages.annotations(time, view, row.get("desired_px"), row.get("true_px"))
         self._file.typed(f"/camera/{camera}/annotations", self.now, marks)
-        if truth is not None:
-            poses = {camera: truth.T_world_camera}
+        if "T_world_camera" in row:
+            poses = {camera: row["T_world_camera"]}
             if camera == self._info.task_camera:  # another may look at a tool
-                poses["target"] = truth.T_world_target
+                poses["target"] = row["T_world_target"]
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
-
-    def _wanted(
-        self, record: TickRecord, camera: str
-    ) -> tuple[FloatArray | None, FloatArray | None]:
-        """Return the wanted points and the wanted pose of the target that this camera is about."""
-        if record.reference is None:
-            return None, None
-        if camera != self._info.task_camera:
-            return record.reference.elsewhere_px.get(camera), None
-        return record.reference.points_px, record.reference.T_camera_target
 
     def _record_picture(self, frame: Frame) -> None:
         count = self._pictures.get(frame.camera, 0)
@@ -135,44 +120,10 @@ class Tape:
         target = record.observation.target if record.observation else None
         if target is None:
             return
-        row = streams.target_message(target)
+        row = streams.message_of(target_row(record, target))
         self._file.numbers("/target", self.now, streams.TARGET_SCHEMA, row)
         poses = {"target estimate": target.T_world_target}
         self._file.typed("/tf", self.now, messages.transforms(target.time, poses))
-
-
-def _shown(
-    T_camera_target: FloatArray, frame: Frame | None, view: ImagePoints | None, camera: Camera
-) -> FloatArray | None:
-    """Return where the points that were looked for would be at a wanted pose, (M, 2) px.
-
-    Where they are on the target is only known of a simulated picture.
-    """
-    truth = frame.truth if frame is not None else None
-    if truth is None or view is None:
-        return None
-    rays = np.column_stack((camera.normalize(truth.points_px), np.ones(len(truth.depth_m))))
-    T_target_camera = se3_inverse(truth.T_world_target) @ truth.T_world_camera
-    T = np.ascontiguousarray(T_camera_target @ T_target_camera)
-    places: FloatArray = camera.project(transform_points(T, rays * truth.depth_m[:, None]))
-    return np.where(view.asked[:, None], places, np.nan)
-
-
-def _paired(record: TickRecord) -> list[tuple[Frame | None, ImagePoints | None]]:
-    """Return each picture with what was measured in it; either may be missing."""
-    views = record.observation.views if record.observation else ()
-    measured = {(view.camera, view.time): view for view in views}
-    pairs: list[tuple[Frame | None, ImagePoints | None]] = [
-        (frame, measured.pop((frame.camera, frame.time), None)) for frame in record.sample.frames
-    ]
-    return pairs + [(None, view) for view in measured.values()]
-
-
-def _source(frame: Frame | None, view: ImagePoints | None) -> tuple[str, float]:
-    """Return the camera and the time of exposure."""
-    taken = frame if frame is not None else view
-    assert taken is not None
-    return taken.camera, taken.time
 
 
 def _warm_up() -> None:

@@ -1,6 +1,6 @@
 """Reads a run back from its folder."""
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -13,21 +13,15 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError, echo
 from vergence.places import find_recording
 from vergence.runtime.recording import streams, wire
+from vergence.runtime.recording.checked_messages import checked_messages
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
-from vergence.runtime.recording.rows import rows
-from vergence.runtime.recording.run_info import RunInfo
-from vergence.runtime.recording.traces import (
-    ArmTrace,
-    CameraTrace,
-    Row,
-    TargetTrace,
-    arm_trace,
-    camera_trace,
-    target_trace,
-)
+from vergence.runtime.recording.streams import row_of
+from vergence.runtime.results import ArmTrace, CameraTrace, Columns, Event, Run, TargetTrace
+from vergence.runtime.results.columns import Table
+from vergence.runtime.run_info import RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
-_PICTURES = "/image"  # how the topics end that are read one by one
+_IMAGES = "/image"  # how the topics end that are read one by one
 _MOST_EVENTS = 100_000
 _Text = Annotated[str, StringConstraints(max_length=1000)]
 _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
@@ -36,28 +30,15 @@ _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened once."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording(Run):
+    """A run read from its folder, with the images that were kept; `Recording.open` reads one.
 
-    time: float  # s since the start of the run
-    name: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A run as its folder tells it; open one with `Recording.open`."""
+    The outcome of a run that was cut off before it could say is *cut off*.
+    """
 
     path: Path  # of the file
-    info: RunInfo
     version: str  # of the vergence that wrote it
-    arms: Mapping[str, ArmTrace]
-    cameras: Mapping[str, CameraTrace]
-    target: TargetTrace | None  # where a filter ran
-    events: tuple[Event, ...]  # in order of time
-    outcome: Outcome | None  # None if the run was cut off before it could say
-    summary: Mapping[str, float | str | None]
     complete: bool  # whether the file ends as it should
     skipped: int  # messages that could not be read
 
@@ -72,33 +53,30 @@ class Recording:
             InputError: if there is no recording, or it is not one of ours.
         """
         path = find_recording(run)
-        contents = McapContents.read(path, leave_out=_PICTURES)
+        contents = McapContents.read(path, leave_out=_IMAGES)
         info, version = _introduction(path, contents)
         read = _Messages(contents)
-        target = read.rows("/target", streams.TARGET_SCHEMA, ("time",))
+        arms = {
+            name: read.table(f"/arm/{name}/state", streams.ARM_SCHEMA, ArmTrace, len(arm.names))
+            for name, arm in info.arms.items()
+        }
+        cameras = {
+            name: read.table(f"/camera/{name}/features", streams.FEATURES_SCHEMA, CameraTrace)
+            for name in info.cameras
+        }
+        target = read.table("/target", streams.TARGET_SCHEMA, TargetTrace)
         outcome, summary = _end(contents.metadata.get("outcome"))
+        ends = [float(trace.time[-1]) for trace in arms.values() if len(trace.time)]
         return cls(
-            path=path,
             info=info,
-            version=version,
-            arms={
-                name: arm_trace(
-                    read.rows(f"/arm/{name}/state", streams.ARM_SCHEMA, ("time",)), len(arm.names)
-                )
-                for name, arm in info.arms.items()
-            },
-            cameras={
-                name: camera_trace(
-                    read.rows(
-                        f"/camera/{name}/features", streams.FEATURES_SCHEMA, ("time", "received")
-                    )
-                )
-                for name in info.cameras
-            },
-            target=target_trace(target) if target else None,
+            arms=arms,
+            cameras=cameras,
+            target=target if len(target.time) else None,
             events=read.events(),
-            outcome=outcome,
+            outcome=outcome or _cut_off(max(ends, default=0.0)),
             summary=summary,
+            path=path,
+            version=version,
             complete=contents.complete and outcome is not None,
             skipped=read.skipped,
         )
@@ -108,21 +86,14 @@ class Recording:
         """The run folder."""
         return self.path.parent
 
-    @property
-    def duration(self) -> float:
-        """Time of the last tick, s."""
-        arms = (trace.time for trace in self.arms.values())
-        cameras = (trace.received for trace in self.cameras.values())
-        return max((float(time[-1]) for time in (*arms, *cameras) if len(time)), default=0.0)
-
     def image_times(self, camera: str) -> FloatArray:
-        """Return when the kept pictures of a camera were exposed, (P,) s."""
+        """Return when the kept images of a camera were exposed, (P,) s."""
         return np.array([time for time, _ in self.jpegs(camera)])
 
     def images(
         self, camera: str, only: Container[int] | None = None
     ) -> Iterator[tuple[float, ImageArray]]:
-        """Yield the kept pictures of a camera with their time of exposure, in order.
+        """Yield the kept images of a camera with their time of exposure, in order.
 
         Args:
             camera: its name.
@@ -137,7 +108,7 @@ class Recording:
 
     def jpegs(self, camera: str) -> Iterator[tuple[float, bytes]]:
         """Yield the kept images of a camera with their time of exposure, in order, as JPEG."""
-        for message in messages_on(self.path, f"/camera/{camera}{_PICTURES}"):
+        for message in messages_on(self.path, f"/camera/{camera}{_IMAGES}"):
             try:
                 parts = wire.fields(message)
                 time, jpeg = wire.time_of(parts, 1), wire.bytes_of(parts, 2)
@@ -170,12 +141,17 @@ class _Messages:
         self._messages = contents.messages
         self.skipped = 0
 
-    def rows(self, topic: str, schema: Mapping[str, Any], times: Sequence[str]) -> list[Row]:
-        """Return the messages of a numeric stream."""
+    def table(
+        self, topic: str, schema: Mapping[str, Any], trace: type[Table], joints: int = 0
+    ) -> Table:
+        """Return the table of a numeric stream."""
         messages = self._messages.get(topic, ())
-        kept = rows(messages, schema, times)
+        kept = checked_messages(messages, schema)
         self.skipped += len(messages) - len(kept)
-        return kept
+        columns = Columns(trace, joints)
+        for message in kept:
+            columns.append(row_of(message, trace, joints))
+        return columns.table()
 
     def events(self) -> tuple[Event, ...]:
         """Return what happened, in order."""
@@ -203,7 +179,7 @@ def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
     return info, echo(about.get("version", ""))
 
 
-def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, float | str | None]]:
+def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, Any]]:
     """Return how the run ended and its summary, if the file has them and they can be read."""
     try:
         if end is None:
@@ -213,3 +189,7 @@ def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, float
     except (KeyError, ValueError):
         return None, {}
     return (outcome, summary) if 0 <= outcome.time < 1e9 else (None, {})
+
+
+def _cut_off(time: float) -> Outcome:
+    return Outcome(OutcomeKind.CUT_OFF, "the recording ends without an outcome", time)

@@ -1,143 +1,121 @@
-"""The numeric streams: one JSON message a tick and arm, a picture and camera, a target estimate.
+"""The numeric streams: one JSON message a tick and arm, an image and camera, a target estimate.
 
-Each field is a number or a flat list, because that is what plotting tools can address
-(``/camera/wrist/features.u[0]``); matrices are row by row. A field that is not known is left out.
+A message is a row of a trace (`vergence.runtime.results`). Each field is a number or a flat list,
+because that is what plotting tools can address (``/camera/wrist/features.u[0]``): points are split
+into u and v, matrices go row by row. A field that is not known is left out.
 """
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vergence.arrays import FloatArray
-from vergence.runtime.recording.numbers import numbers
-from vergence.signals import Frame, ImagePoints, JointCommand, JointState, TargetState
+from vergence.runtime.json_numbers import array, numbers
+from vergence.runtime.results import ArmTrace, CameraTrace, Row, TargetTrace
 
+# What the u and v of points are called in a message.
+_POINTS = {
+    "points_px": ("u", "v"),
+    "window_center_px": ("window_u", "window_v"),
+    "window_half_px": ("window_half_u", "window_half_v"),
+    "desired_px": ("desired_u", "desired_v"),
+    "true_px": ("true_u", "true_v"),
+}
+_COUNTED = ("u", "desired_u", "true_u")  # say how many points there are
 _NUMBER = {"type": "number"}
 _NUMBERS = {"type": "array", "items": _NUMBER}
 _WORDS = {"type": "array", "items": {"type": "string"}}
-_FLAGS = {"type": "array", "items": {"type": "boolean"}}
+_FLAG = {"type": "boolean"}
+_FLAGS = {"type": "array", "items": _FLAG}
 
 
-def _schema(title: str, **properties: Any) -> dict[str, Any]:
-    return {"title": title, "type": "object", "properties": properties}
+def _schema(title: str, trace: type, **more: Any) -> dict[str, Any]:
+    """Return the JSON schema of a trace's rows."""
+    properties: dict[str, Any] = {}
+    for one in fields(trace):
+        shape, kind = one.metadata["shape"], one.metadata["kind"]
+        if kind is tuple:
+            properties[one.name] = _WORDS
+        elif kind is dict:
+            properties |= {one.name: _WORDS, f"{one.name}_by": _NUMBERS}
+        elif kind is bool:
+            properties[one.name] = _FLAGS if shape else _FLAG
+        else:
+            names = _POINTS.get(one.name, (one.name,))
+            properties |= dict.fromkeys(names, _NUMBERS if shape else _NUMBER)
+    return {"title": title, "type": "object", "properties": properties | more}
 
 
-ARM_SCHEMA = _schema(
-    "vergence.Arm",
-    time=_NUMBER,
-    position=_NUMBERS,
-    velocity=_NUMBERS,
-    command=_NUMBERS,
-    v_camera=_NUMBERS,
-    manipulability=_NUMBER,
-    penalty=_NUMBER,
-    active=_WORDS,
-    slack=_WORDS,
-    slack_by=_NUMBERS,
-)
-
-FEATURES_SCHEMA = _schema(
-    "vergence.Features",
-    time=_NUMBER,
-    received=_NUMBER,
-    u=_NUMBERS,
-    v=_NUMBERS,
-    covariance=_NUMBERS,
-    found=_FLAGS,
-    reasons=_WORDS,
-    window_u=_NUMBERS,
-    window_v=_NUMBERS,
-    window_half_u=_NUMBERS,
-    window_half_v=_NUMBERS,
-    desired_u=_NUMBERS,
-    desired_v=_NUMBERS,
-    true_u=_NUMBERS,
-    true_v=_NUMBERS,
-    error_px=_NUMBERS,
-    T_camera_target_wanted=_NUMBERS,
-    T_world_camera=_NUMBERS,
-    T_world_target=_NUMBERS,
-)
-
-TARGET_SCHEMA = _schema(
-    "vergence.Target",
-    time=_NUMBER,
-    T_world_target=_NUMBERS,
-    velocity=_NUMBERS,
-    covariance=_NUMBERS,
-    consistent={"type": "boolean"},
-)
+ARM_SCHEMA = _schema("vergence.Arm", ArmTrace)
+FEATURES_SCHEMA = _schema("vergence.Features", CameraTrace, error_px=_NUMBERS)
+TARGET_SCHEMA = _schema("vergence.Target", TargetTrace)
 
 
-def arm_message(time: float, state: JointState, command: JointCommand | None) -> dict[str, Any]:
-    """Say how an arm moves and how it was told to."""
-    message = {
-        "time": time,
-        "position": numbers(state.position),
-        "velocity": numbers(state.velocity),
-    }
-    if command is not None:
-        message["command"] = numbers(command.velocity)
-        message["v_camera"] = numbers(command.v_camera)
-        message["active"] = list(command.active)
-        message["slack"] = list(command.slack)
-        message["slack_by"] = numbers(list(command.slack.values()))
-        measures = (("manipulability", command.manipulability), ("penalty", command.penalty))
-        message |= {name: value for name, value in measures if math.isfinite(value)}
+def message_of(row: Row) -> dict[str, Any]:
+    """Return a row as JSON values."""
+    message: dict[str, Any] = {}
+    for name, value in row.items():
+        if name in _POINTS:
+            u, v = _POINTS[name]
+            message |= {u: numbers(value[:, 0]), v: numbers(value[:, 1])}
+        elif isinstance(value, Mapping):
+            message |= {name: list(value), f"{name}_by": numbers(list(value.values()))}
+        elif isinstance(value, str):
+            continue  # the camera's name, which is in the topic
+        elif isinstance(value, tuple):
+            message[name] = list(value)
+        elif np.ndim(value):
+            flat = np.ravel(value)
+            message[name] = flat.tolist() if flat.dtype == np.bool_ else numbers(flat)
+        elif isinstance(value, bool | np.bool_):
+            message[name] = bool(value)
+        elif np.isfinite(value):
+            message[name] = float(value)
+    points, desired = row.get("points_px"), row.get("desired_px")
+    if points is not None and desired is not None and points.shape == desired.shape:
+        message["error_px"] = numbers(np.hypot(*(points - desired).T))  # for plotting tools
     return message
 
 
-def features_message(
-    received: float,
-    frame: Frame | None,
-    points: ImagePoints | None,
-    desired_px: FloatArray | None,
-    T_camera_target_wanted: FloatArray | None,
-) -> dict[str, Any]:
-    """Say what one picture showed, what was wanted, and what was true.
+def row_of(message: Mapping[str, Any], trace: type, joints: int = 0) -> Row:
+    """Return the row that `message_of` made JSON values of.
+
+    A list may have any length, since it may come from anybody: what is too much is left out, and
+    what is missing is not known.
 
     Args:
-        received: when the loop had it, s.
-        frame: the picture; None if the points come from elsewhere.
-        points: what was measured in it; None if nothing was.
-        desired_px: (M, 2) where the points should be; None if that is of no concern here.
-        T_camera_target_wanted: (4, 4) likewise where the target should be.
+        message: of a numeric stream.
+        trace: whose row it is.
+        joints: of the arm.
     """
-    message: dict[str, Any] = {"received": received}
-    if points is not None:
-        message |= {"time": points.time, **_columns("", points.points_px)}
-        message["covariance"] = numbers(points.covariance_px.ravel())
-        message["found"] = np.asarray(points.found, dtype=bool).tolist()
-        message["reasons"] = list(points.reasons)
-        if points.windows is not None:
-            message |= _columns("window_", points.windows.center_px)
-            message |= _columns("window_half_", points.windows.half_px)
-    if desired_px is not None:
-        message |= _columns("desired_", desired_px)
-        if points is not None and points.points_px.shape == desired_px.shape:
-            message["error_px"] = numbers(np.hypot(*(points.points_px - desired_px).T))
-    if T_camera_target_wanted is not None:
-        message["T_camera_target_wanted"] = numbers(T_camera_target_wanted.ravel())
-    if frame is not None:
-        message["time"] = frame.time
-        if frame.truth is not None:
-            message |= _columns("true_", frame.truth.points_px)
-            message["T_world_camera"] = numbers(frame.truth.T_world_camera.ravel())
-            message["T_world_target"] = numbers(frame.truth.T_world_target.ravel())
-    return message
+    sizes = {"n": joints, "M": max(len(message.get(key, ())) for key in _COUNTED)}
+    row: dict[str, Any] = {}
+    for one in fields(trace):
+        name, kind = one.name, one.metadata["kind"]
+        shape = [sizes.get(size, size) for size in one.metadata["shape"]]
+        if name in _POINTS and any(key in message for key in _POINTS[name]):
+            columns = [_padded(message.get(key, ()), shape[0], float) for key in _POINTS[name]]
+            row[name] = np.column_stack(columns)
+        elif name not in message:
+            continue
+        elif kind is tuple:
+            reasons = trace is CameraTrace
+            row[name] = tuple(message[name][: sizes["M"]] if reasons else message[name])
+        elif kind is dict:
+            by = array(message.get(f"{name}_by", ())).tolist()
+            row[name] = dict(zip(message[name], by, strict=False))
+        elif shape:
+            row[name] = _padded(message[name], math.prod(shape), kind).reshape(shape)
+        else:
+            row[name] = kind(np.nan if message[name] is None else message[name])
+    return row
 
 
-def target_message(target: TargetState) -> dict[str, Any]:
-    """Say where a filter believes the target to be."""
-    return {
-        "time": target.time,
-        "T_world_target": numbers(target.T_world_target.ravel()),
-        "velocity": numbers(target.velocity),
-        "covariance": numbers(target.covariance.ravel()),
-        "consistent": bool(target.consistent),
-    }
-
-
-def _columns(prefix: str, points_px: FloatArray) -> dict[str, list[Any]]:
-    return {prefix + "u": numbers(points_px[:, 0]), prefix + "v": numbers(points_px[:, 1])}
+def _padded(values: Sequence[Any], size: int, kind: type) -> NDArray[Any]:
+    """Return so many values, the last not known if there are fewer."""
+    padded: NDArray[Any] = np.full(size, np.nan if kind is float else False, dtype=kind)
+    padded[: len(values)] = np.array(values[:size], dtype=kind)
+    return padded

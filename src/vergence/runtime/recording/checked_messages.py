@@ -6,9 +6,9 @@ What does not fit is left out, so that nothing behind it has to expect anything 
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
-from vergence.runtime.recording.traces import Row
+Message: TypeAlias = dict[str, Any]  # of a numeric stream
 
 _LARGEST = 1e15  # of a number; no unit of ours needs more
 _LATEST_S = 1e7  # four months
@@ -19,15 +19,15 @@ _MOST_NUMBERS = 20_000_000  # of the widest list, over all messages of a stream
 _TIMES = ("time", "received")
 
 
-def rows(messages: Sequence[bytes], schema: Mapping[str, Any], times: Sequence[str]) -> list[Row]:
+def checked_messages(messages: Sequence[bytes], schema: Mapping[str, Any]) -> list[Message]:
     """Return the messages that are what their schema says, as far as there is room for them.
 
     Args:
         messages: of one stream.
-        schema: of its messages.
-        times: which keys every message needs.
+        schema: of its messages; each needs the times that are in it.
     """
-    kept: list[Row] = []
+    times = [key for key in _TIMES if key in schema["properties"]]
+    kept: list[Message] = []
     widest = 1
     for message in messages:
         row = _row(message, schema["properties"])
@@ -40,7 +40,7 @@ def rows(messages: Sequence[bytes], schema: Mapping[str, Any], times: Sequence[s
     return kept
 
 
-def _row(message: bytes, properties: Mapping[str, Any]) -> Row | None:
+def _row(message: bytes, properties: Mapping[str, Any]) -> Message | None:
     """Return what a message says of the known keys; None if it is no message of this kind."""
     try:
         values = json.loads(message)
@@ -48,7 +48,7 @@ def _row(message: bytes, properties: Mapping[str, Any]) -> Row | None:
         return None
     if not isinstance(values, dict):
         return None
-    row: Row = {}
+    row: Message = {}
     for key, value in values.items():
         about = properties.get(key)
         if about is None:

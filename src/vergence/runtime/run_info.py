@@ -11,7 +11,7 @@ from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.robot import Arm
 from vergence.runtime.driver import Driver
-from vergence.runtime.recording.numbers import array, numbers
+from vergence.runtime.json_numbers import array, numbers
 
 _Name = Annotated[str, StringConstraints(max_length=200)]
 _Number = Annotated[float, Field(ge=-1e9, le=1e9)]

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from vergence.runtime.recording.run_info import RunInfo
-from vergence.runtime.recording.tick import TickRecord
+from vergence.runtime.run_info import RunInfo
+from vergence.runtime.tick import TickRecord
 from vergence.signals import Outcome
 
 

@@ -1,0 +1,45 @@
+"""Plan a cell's path in the image, and move nothing."""
+
+from pathlib import Path
+from typing import Any
+
+from vergence.assembly.reach import look_twice, plan_reach
+from vergence.assembly.run import changed_cell
+from vergence.cell import Cell
+from vergence.cell.schema import ReachTable
+from vergence.errors import InputError
+from vergence.planning import Path as PlannedPath
+from vergence.planning import PlanFailure
+from vergence.simulation import SimulatedDriver
+from vergence.vision.two_view import TwoViewFailure
+
+
+def plan(
+    cell: str | Path | Cell, *, images: bool = True, seed: int | None = None, **changes: Any
+) -> PlannedPath | PlanFailure | TwoViewFailure:
+    """Look at the target from the start and from the goal, and plan the path between the images.
+
+    Args:
+        cell: the name of a built-in cell, a cell file, a folder with one, or a cell; its task is to
+            reach.
+        images: match rendered images; if not, take exact projections.
+        seed: replaces the cell's.
+        **changes: values of the cell to replace; tables as dictionaries, as in its file.
+
+    Returns:
+        The path, or why there is none, which is false.
+
+    Raises:
+        InputError: if there is no such cell, or its task is another.
+    """
+    loaded = changed_cell(cell, seed, changes)
+    if not isinstance(loaded.task, ReachTable):
+        raise InputError(str(loaded.path), "task.kind", loaded.task.kind, "reach")
+    driver = SimulatedDriver(loaded, images)
+    try:
+        seen = look_twice(loaded, loaded.task, driver, images)
+        if isinstance(seen, PlanFailure):
+            return seen
+        return plan_reach(loaded, loaded.task, driver, seen)
+    finally:
+        driver.close()

@@ -1,0 +1,41 @@
+"""What was changed in a cell, as comments behind its file's text."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> str:
+    """Return a line ``# set: KEY = VALUE`` for each change, as `load_cell` writes and reads them.
+
+    A table with a kind is written whole, since its other keys depend on that.
+
+    Args:
+        changes: the nested values that were replaced.
+        values: what the cell says now, at the same place.
+        above: the keys they stand under, with a dot behind each.
+    """
+    text = ""
+    for key, change in changes.items():
+        now = values[key]
+        if isinstance(change, Mapping) and "kind" not in change:
+            text += settings_text(change, now, f"{above}{key}.")
+        else:
+            text += f"\n# set: {above}{key} = {_toml(now)}"
+    return text
+
+
+def _toml(value: Any) -> str:
+    """Return a value in TOML, nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, Mapping):
+        known = {key: one for key, one in value.items() if one is not None}
+        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in known.items()) + " }"
+    if isinstance(value, list | tuple | np.ndarray):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, np.generic):
+        value = value.item()
+    return json.dumps(value, default=str)

@@ -1,0 +1,42 @@
+"""What a run was: one object, in memory or read from a recording, and what is computed from it."""
+
+from vergence.runtime.results.columns import Columns, Row
+from vergence.runtime.results.pose_errors import (
+    PoseErrors,
+    angle_between,
+    pose_errors,
+    tick_pose_errors,
+)
+from vergence.runtime.results.run import Event, Run
+from vergence.runtime.results.run_recorder import RunRecorder
+from vergence.runtime.results.summary import summarise
+from vergence.runtime.results.tick_rows import (
+    arm_row,
+    camera_row,
+    images_of,
+    points_at_pose,
+    target_row,
+)
+from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace, largest
+
+__all__ = [
+    "ArmTrace",
+    "CameraTrace",
+    "Columns",
+    "Event",
+    "PoseErrors",
+    "Row",
+    "Run",
+    "RunRecorder",
+    "TargetTrace",
+    "angle_between",
+    "arm_row",
+    "camera_row",
+    "images_of",
+    "largest",
+    "points_at_pose",
+    "pose_errors",
+    "summarise",
+    "target_row",
+    "tick_pose_errors",
+]

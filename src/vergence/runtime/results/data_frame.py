@@ -1,0 +1,90 @@
+"""A run as named columns: for pandas, and for a NumPy archive."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vergence.arrays import pandas_or_error
+from vergence.errors import InputError, nearest
+from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from vergence.runtime.results.run import Run
+
+AnyTrace = ArmTrace | CameraTrace | TargetTrace
+_TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+
+def data_frame(run: "Run", of: str | None) -> "pd.DataFrame":
+    """Return a run, or one of its arms, cameras or the target, as a table; see `Run.to_frame`."""
+    pd = pandas_or_error()
+    traces = _traces(run)
+    if of is not None:
+        if of not in traces:
+            raise InputError("to_frame", "of", of, nearest(of, traces))
+        trace = traces[of]
+        return pd.DataFrame({"time": trace.time, **dict(_columns(trace, _joints(run, of)))})
+    table = pd.DataFrame({"time": run.times})
+    for name, trace in traces.items():
+        ticks = trace.time if isinstance(trace, ArmTrace) else trace.received
+        columns = {
+            f"{name}.{column}": values
+            for column, values in _columns(trace, _joints(run, name), matrices=False)
+        }
+        part = pd.DataFrame({"time": ticks, **columns})
+        table = table.merge(part.drop_duplicates("time", keep="last"), on="time", how="left")
+    return table
+
+
+def named_arrays(run: "Run") -> dict[str, Any]:
+    """Return every array of a run by a name such as ``puma.position``; of texts none."""
+    return {
+        f"{name}.{one.name}": getattr(trace, one.name)
+        for name, trace in _traces(run).items()
+        for one in fields(trace)
+        if one.metadata["kind"] in (float, bool)
+    }
+
+
+def _traces(run: "Run") -> dict[str, AnyTrace]:
+    """Return everything with rows by its name; a camera called as an arm is told apart."""
+    cameras = {f"camera {n}" if n in run.arms else n: one for n, one in run.cameras.items()}
+    target: Mapping[str, AnyTrace] = {} if run.target is None else {"target": run.target}
+    return {**run.arms, **cameras, **target}
+
+
+def _joints(run: "Run", name: str) -> tuple[str, ...]:
+    return run.info.arms[name].names if name in run.arms else ()
+
+
+def _columns(
+    trace: AnyTrace, joints: tuple[str, ...], matrices: bool = True
+) -> Iterator[tuple[str, Any]]:
+    """Yield the columns of a trace but its time, each number by itself."""
+    for one in fields(trace):
+        values = getattr(trace, one.name)
+        shape = one.metadata["shape"]
+        if one.name == "time" or (not matrices and len([s for s in shape if s != "M"]) > 1):
+            continue
+        if one.metadata["kind"] in (tuple, dict):
+            yield one.name, list(values)
+            continue
+        for index in np.ndindex(values.shape[1:]):
+            words = [_label(s, i, joints) for s, i in zip(shape, index, strict=True)]
+            yield ".".join([one.name, *words]), values[(slice(None), *index)]
+    if isinstance(trace, CameraTrace):
+        for point, error in enumerate(trace.error_px.T):
+            yield f"error_px.{point}", error
+
+
+def _label(size: int | str, index: int, joints: tuple[str, ...]) -> str:
+    """Return what a place along an axis of a given size is called."""
+    if size == "n":
+        return joints[index]
+    if size == 2:
+        return "uv"[index]
+    return _TWIST[index] if size == 6 else str(index)

@@ -1,0 +1,88 @@
+"""Keeps a run in memory while it happens."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+from time import perf_counter
+
+from vergence.runtime.results.columns import Columns
+from vergence.runtime.results.run import Event, Run
+from vergence.runtime.results.summary import summarise
+from vergence.runtime.results.tick_rows import arm_row, camera_row, images_of, target_row
+from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace
+from vergence.runtime.run_info import RunInfo
+from vergence.runtime.tick import TickRecord
+from vergence.signals import Outcome
+
+
+class RunRecorder:
+    """A listener that keeps all numbers of a run in memory; images are not kept.
+
+    Args:
+        most_ticks: how many to keep of a run without an end; the older half is dropped where there
+            would be more. All if None.
+    """
+
+    def __init__(self, most_ticks: int | None = None) -> None:
+        self._most = most_ticks
+
+    def begin(self, info: RunInfo) -> None:
+        """Start with nothing."""
+        self._info = info
+        self._arms = {
+            name: Columns(ArmTrace, len(arm.names), self._most) for name, arm in info.arms.items()
+        }
+        self._cameras = {name: Columns(CameraTrace, most=self._most) for name in info.cameras}
+        self._target: Columns[TargetTrace] | None = None
+        self._events: deque[Event] = deque(maxlen=self._most)
+        self._first: tuple[float, float] | None = None  # time in the run and on the wall, s
+        self._pace = float("nan")
+        self._outcome: Outcome | None = None
+
+    def tick(self, record: TickRecord) -> None:
+        """Keep one turn of the loop."""
+        for name in record.sample.joints:
+            self._arms[name].append(arm_row(record, name))
+        for frame, view in images_of(record):
+            row = camera_row(record, self._info, frame, view)
+            self._cameras[row["camera"]].append(row)
+        if record.observation is None:
+            return
+        self._keep_pace(record.time)
+        if record.observation.target is not None:
+            if self._target is None:
+                self._target = Columns(TargetTrace, most=self._most)
+            self._target.append(target_row(record, record.observation.target))
+
+    def event(self, time: float, name: str, text: str) -> None:
+        """Keep something that happened once."""
+        self._events.append(Event(time, name, text))
+
+    def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
+        """Keep how it ended."""
+        self._outcome = outcome
+
+    def run(self) -> Run:
+        """Return the run that has ended, with its summary."""
+        assert self._outcome is not None, "a run ends before it is read"
+        run = Run(
+            self._info,
+            {name: columns.table() for name, columns in self._arms.items()},
+            {name: columns.table() for name, columns in self._cameras.items()},
+            None if self._target is None else self._target.table(),
+            tuple(self._events),
+            self._outcome,
+            {},
+        )
+        values = {**summarise(run), "duration_s": self._outcome.time}
+        if self._pace == self._pace:
+            values["real_time_factor"] = self._pace
+        return replace(run, summary=values)
+
+    def _keep_pace(self, time: float) -> None:
+        """Count the real-time factor from the first image worked on: by then all is compiled."""
+        now = perf_counter()
+        if self._first is None:
+            self._first = (time, now)
+        elif now > self._first[1]:
+            self._pace = (time - self._first[0]) / (now - self._first[1])

@@ -1,0 +1,99 @@
+"""How a run went over time, as arrays: a row a tick, NaN where nothing is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.runtime.results.columns import column
+
+
+class Trace:
+    """What all traces can do; `time` (K,) s is their first field."""
+
+    __slots__ = ()
+
+    def at(self, rows: BoolArray | IntArray) -> Self:
+        """Return some of the rows, by a mask (K,) or by their numbers."""
+        numbers = np.arange(len(self.time))[rows]  # type: ignore[attr-defined]
+        return type(self)(**{one.name: self._picked(one.name, numbers) for one in fields(self)})  # type: ignore[arg-type]
+
+    def _picked(self, name: str, numbers: IntArray) -> Any:
+        values = getattr(self, name)
+        if isinstance(values, tuple):
+            return tuple(values[number] for number in numbers)
+        return values[numbers]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmTrace(Trace):
+    """How an arm with n joints moved in K ticks."""
+
+    time: FloatArray = column()  # (K,) s
+    position: FloatArray = column("n")  # (K, n) measured, rad or m
+    velocity: FloatArray = column("n")  # (K, n) measured, rad/s or m/s
+    setpoint: FloatArray = column("n")  # (K, n) where the joints were last told to be, rad or m
+    command: FloatArray = column("n")  # (K, n) rates the law asked for; NaN while the arm held
+    v_camera: FloatArray = column(6)  # (K, 6) camera twist the command was made from, m/s, rad/s
+    manipulability: FloatArray = column()  # (K,) w' of [Nelson1995] eq. (26)
+    penalty: FloatArray = column()  # (K,) P of [Nelson1995] eq. (27)
+    active: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) limits that shaped the command
+    slack: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) limits relaxed, and how far
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraTrace(Trace):
+    """What a camera saw in K images of up to M points."""
+
+    time: FloatArray = column()  # (K,) s, of exposure
+    received: FloatArray = column()  # (K,) s, the tick in which the loop had the image
+    points_px: FloatArray = column("M", 2)  # (K, M, 2) measured
+    covariance_px: FloatArray = column("M", 2, 2)  # (K, M, 2, 2) px²
+    found: BoolArray = column("M", kind=bool)  # (K, M)
+    reasons: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) of M: why not found
+    asked: BoolArray = column("M", kind=bool)  # (K, M) whether it was looked for
+    window_center_px: FloatArray = column("M", 2)  # (K, M, 2) predicted places; NaN without window
+    window_half_px: FloatArray = column("M", 2)  # (K, M, 2) half the sizes of the windows
+    desired_px: FloatArray = column("M", 2)  # (K, M, 2)
+    desired_by_pose: BoolArray = column(kind=bool)  # (K,) whether they follow from a desired pose
+    T_camera_target_desired: FloatArray = column(4, 4)  # (K, 4, 4) where the task desires a pose
+    true_px: FloatArray = column("M", 2)  # (K, M, 2) truly projected; this and the rest only from
+    true_depth_m: FloatArray = column("M")  # (K, M) a simulated camera
+    visible: BoolArray = column("M", kind=bool)  # (K, M) whether truly in view
+    T_world_camera: FloatArray = column(4, 4)  # (K, 4, 4) true
+    T_world_target: FloatArray = column(4, 4)  # (K, 4, 4) true
+
+    @property
+    def error_px(self) -> FloatArray:
+        """Distance of each found point from where it should be, (K, M)."""
+        return self._where_found(self.points_px - self.desired_px)
+
+    @property
+    def drift_px(self) -> FloatArray:
+        """Distance of each found point from where it truly is, (K, M)."""
+        return self._where_found(self.points_px - self.true_px)
+
+    def _where_found(self, difference_px: FloatArray) -> FloatArray:
+        distance = np.hypot(difference_px[..., 0], difference_px[..., 1])
+        return np.where(self.found, distance, np.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TargetTrace(Trace):
+    """Where a filter believed the target to be, K times."""
+
+    time: FloatArray = column()  # (K,) s, of exposure
+    received: FloatArray = column()  # (K,) s, the tick in which the loop had the image
+    T_world_target: FloatArray = column(4, 4)  # (K, 4, 4)
+    velocity: FloatArray = column(6)  # (K, 6) m/s and rad/s, world axes
+    covariance: FloatArray = column(12, 12)  # (K, 12, 12)
+    consistent: BoolArray = column(kind=bool)  # (K,)
+
+
+def largest(distances: FloatArray) -> FloatArray:
+    """Return the largest distance of each row of (K, M), (K,); NaN in a row without any."""
+    known = np.isfinite(distances)
+    worst = np.where(known, distances, -np.inf).max(axis=1, initial=-np.inf)
+    return np.where(known.any(axis=1), worst, np.nan)

@@ -1,0 +1,19 @@
+"""What the loop tells its listeners each time round."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vergence.signals import JointCommand, Observation, Reference, Sample, Setpoint
+
+
+@dataclass(frozen=True, slots=True)
+class TickRecord:
+    """One turn of the outer loop: what came in, what was desired, what went out."""
+
+    time: float  # s since the start of the run
+    sample: Sample  # joints and the images that arrived
+    observation: Observation | None  # what perception made of them; None if none arrived
+    reference: Reference | None  # what the law aimed at
+    commands: Mapping[str, JointCommand]  # by arm; empty while the cell holds
+    # Where each arm's joints were last told to be: what their measured positions should be now.
+    setpoints: Mapping[str, Setpoint] = field(default_factory=dict)
