@@ -18,7 +18,7 @@ from vergence.app.figures import (
     target_figure,
     twist_figure,
 )
-from vergence.app.figures.arm import normalized
+from vergence.app.figures.arm import drawn_positions, normalized
 from vergence.geometry import se3_exp
 from vergence.runtime import ArmInfo
 from vergence.runtime.recording import Recording
@@ -89,6 +89,28 @@ def test_joint_limits_are_at_one() -> None:
     np.testing.assert_allclose(normalized(arm, arm.q_max)[:2], 1.0)
     np.testing.assert_allclose(normalized(arm, np.array([1.0, 3.0, 9.0]))[:2], 0.0)
     assert np.isnan(normalized(arm, np.zeros(3))[2])
+
+
+def test_a_joint_without_limits_is_drawn_in_half_turns(recording: Recording) -> None:
+    info, trace = recording.info.arms["puma"], recording.arms["puma"]
+    endless = ArmInfo(
+        info.names,
+        np.append(info.q_min[:5], -np.inf),
+        np.append(info.q_max[:5], np.inf),
+        info.rate_max,
+    )
+    q = trace.position.copy()
+    q[:, 5] = np.deg2rad(np.linspace(27.0, 387.0, len(q)))
+    made = joints_figure(endless, replace(trace, position=q))
+    assert made is not None
+    drawn = made.axes[0].lines[5]
+    assert drawn.get_label() == "joint6 (half turns)"
+    assert drawn.get_ydata()[0] == pytest.approx(27 / 180)
+    assert drawn.get_ydata()[-1] == pytest.approx(27 / 180)
+    assert np.abs(drawn.get_ydata()).max() <= 1.0
+    np.testing.assert_array_equal(
+        made.axes[0].lines[0].get_ydata(), drawn_positions(info, trace.position)[:, 0]
+    )
 
 
 def test_events_are_marked_in_every_panel(recording: Recording) -> None:

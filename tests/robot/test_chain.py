@@ -74,7 +74,7 @@ def test_the_walk_from_the_tip_and_the_walk_from_the_base_agree() -> None:
     arm = Arm.from_mujoco(mujoco.MjModel.from_xml_string(random_arm(rng, 7)), "eye")
     q = rng.uniform(-1, 1, 7)
     state = chain_state(arm.chain, q)
-    turned = np.kron(np.eye(2), state.R.T) @ world_jacobian(arm.chain, state)
+    turned = np.kron(np.eye(2), state.R.T) @ world_jacobian(arm.chain, state, 7)
     np.testing.assert_allclose(jacobian(arm.chain, q), turned, atol=1e-13)
     T = forward_kinematics(arm.chain, q)
     np.testing.assert_array_equal(T[:3, :3], state.R)

@@ -32,7 +32,7 @@ _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper fac
 
 _CELL = """# A first cell for {model_name}: a camera on {body} keeps its place
 # before a board that wanders. Start, mounting and board were found by `vergence new`; the arm's
-# rates and the camera are guesses, to be replaced by your own.
+# accelerations and the camera are guesses, to be replaced by your own.
 name = "{name}"
 duration_s = 10.0
 
@@ -41,8 +41,8 @@ model = "{model}"
 body = "{body}"  # the arm's last body
 position_m = [0.0, 0.0, {height}]  # of its base
 start_deg = {start}  # metres for sliding joints
-rate_max_deg_s = 90.0  # from the robot's manual; one number, or one a joint
-acceleration_max_deg_s2 = 360.0
+rate_max_deg_s = {rates}  # {rates_from}; m/s for sliding joints
+acceleration_max_deg_s2 = {accelerations}  # a guess: see the robot's manual
 
 [cameras.wrist]
 arm = "arm"
@@ -100,7 +100,7 @@ def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
 
 
 def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> str:
-    unit = np.where(draft.arm.chain.sliding, 1.0, np.pi / 180)
+    unit = np.where(draft.arm.sliding, 1.0, np.pi / 180)
     camera_m, camera_rpy = _placement(draft.T_body_camera)
     target_m, target_rpy = _placement(draft.T_world_target)
     return _CELL.format(
@@ -110,6 +110,9 @@ def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> 
         height=draft.height_m,
         name=name,
         start=_numbers(draft.start / unit, 3),
+        rates=_limits(draft.arm.rate_max / unit),
+        rates_from=draft.rates_from,
+        accelerations=_limits(draft.arm.acceleration_max / unit),
         camera_m=camera_m,
         camera_rpy=camera_rpy,
         target_m=target_m,
@@ -124,6 +127,10 @@ def _placement(T: "FloatArray") -> tuple[str, str]:
 
     rpy = matrix_to_rpy(np.ascontiguousarray(T[:3, :3]))[::-1]
     return _numbers(T[:3, 3], 4), _numbers(np.rad2deg(rpy), 3)
+
+
+def _limits(values: "FloatArray") -> str:
+    return "[" + ", ".join(f"{value:.4g}" for value in values) + "]"
 
 
 def _numbers(values: "FloatArray", digits: int) -> str:

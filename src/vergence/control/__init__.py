@@ -38,6 +38,7 @@ from vergence.control.objectives import (
     least_squares,
     optimal_tracking_tick,
     pack_setup,
+    unpack_chain,
 )
 from vergence.control.pose_servo import PoseServo
 from vergence.control.servo import Servo, Situation
@@ -99,6 +100,7 @@ __all__ = [
     "moved",
     "optimal_tracking_tick",
     "pack_setup",
+    "unpack_chain",
     "pose_difference",
     "resolvability",
     "resolve_redundant",

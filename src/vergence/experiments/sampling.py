@@ -95,7 +95,7 @@ class Draws:
             raise InputError("spread", "", given, "a smaller share")
         changes: dict[str, Any] = {}
         if "starts" in self.vary:
-            unit = np.where(arm.chain.sliding, 1.0, np.pi / 180)
+            unit = np.where(arm.sliding, 1.0, np.pi / 180)
             changes = {"arms": {name: {"start_deg": listed(q / unit)}}}
         if "targets" in self.vary:
             changes = merged(changes, {"target": placed(T)})

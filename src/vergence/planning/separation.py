@@ -64,8 +64,10 @@ def proves_no_path(problem: PlanningProblem, cells_max: int = 128, margin_px: fl
 
 def slides_then_turns(arm: Arm) -> bool:
     """Tell whether three sliding joints at right angles come first, then one to three turning."""
-    sliding = arm.chain.sliding
+    sliding = arm.sliding
     limited = np.isfinite(arm.q_max - arm.q_min).all()
+    if len(sliding) < len(arm.chain.sliding):
+        return False
     if not (4 <= len(sliding) <= 6 and sliding[:3].all() and limited) or sliding[3:].any():
         return False
     axes = chain_state(arm.chain, arm.q_min.copy()).axis[:3]
@@ -163,7 +165,7 @@ def cell_sees(
     positions x; whether they meet is decided by `halfspaces_meet`.
     """
     state = chain_state(chain, q)
-    J = world_jacobian(chain, state)
+    J = world_jacobian(chain, state, len(q))
     G, h, side = np.zeros((11, 3)), np.empty(11), np.empty(3)
     turn = half.sum()
     corner = _turned_corner(view, turn)

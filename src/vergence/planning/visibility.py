@@ -79,7 +79,7 @@ def add_visibility_penalty(
     h = view_clearances(state.R, state.p, view)
     if h.min() >= margin:
         return 0.0
-    J = world_jacobian(chain, state)
+    J = world_jacobian(chain, state, len(q))
     n, cost = len(q), 0.0
     slope, c, d = np.empty(n), np.empty(3), np.empty(3)
     for j in range(len(h)):

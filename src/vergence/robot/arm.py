@@ -12,20 +12,26 @@ from vergence.robot.chain import Chain, forward_kinematics, jacobian
 if TYPE_CHECKING:
     import mujoco
 
+# Where neither the model nor the user says: rad/s, m/s, rad/s², m/s².
+RATE, SLIDING_RATE, ACCELERATION, SLIDING_ACCELERATION = np.pi, 0.5, 4 * np.pi, 2.0
+_ROUNDING = 1e-3  # of a limit written in degrees
+
 
 @dataclass(frozen=True, slots=True)
 class Arm:
     """Joints from the world to a tip (a camera or a tool), with their limits."""
 
-    names: tuple[str, ...]  # of the joints, from the base outwards
-    chain: Chain
+    names: tuple[str, ...]  # of the joints that may be commanded, from the base outwards
+    chain: Chain  # its axes, m ≥ n: a joint that others follow moves several
     q_min: FloatArray  # (n,) rad or m, -inf where there is no limit
     q_max: FloatArray  # (n,)
     rate_max: FloatArray  # (n,) rad/s or m/s
     acceleration_max: FloatArray  # (n,) rad/s² or m/s²
+    axis_names: tuple[str, ...] = ()  # (m,) of the chain's axes; `names` if empty
 
     def __post_init__(self) -> None:
         n = len(self.names)
+        object.__setattr__(self, "axis_names", self.axis_names or self.names)
         for name in ("q_min", "q_max", "rate_max", "acceleration_max"):
             object.__setattr__(self, name, frozen(getattr(self, name), (n,), name))
         for joint, low, high in zip(self.names, self.q_min, self.q_max, strict=True):
@@ -42,8 +48,8 @@ class Arm:
         cls,
         model: "mujoco.MjModel",
         tip: str,
-        rate_max: float | FloatArray = np.pi,
-        acceleration_max: float | FloatArray = 4 * np.pi,
+        rate_max: float | FloatArray | None = None,
+        acceleration_max: float | FloatArray | None = None,
         kind: str = "camera",
     ) -> Self:
         """Read the joints that carry a camera, site or body off a MuJoCo model.
@@ -52,31 +58,45 @@ class Arm:
             model: any compiled model.
             tip: name of the camera, site or body at the end of the chain. A camera's frame is
                 turned to OpenCV's convention: z forward, x right, y down.
-            rate_max: joint rate limits, one for all or (n,), rad/s or m/s.
-            acceleration_max: joint acceleration limits, likewise.
+            rate_max: joint rate limits, one for all or (n,), rad/s or m/s; up to those of the
+                model, which hold if absent. Where the model has none, π rad/s or 0.5 m/s.
+            acceleration_max: joint acceleration limits, likewise; 4π rad/s² or 2 m/s² if absent.
             kind: "camera", "site" or "body".
 
         Raises:
             InputError: if there is no such tip, no joint carries it, a joint has more than one
-                degree of freedom, or limits are the wrong way round or too few.
+                degree of freedom, joints are coupled in a way that no chain can be, or limits are
+                the wrong way round, too few, or looser than the model's.
         """
         from vergence.robot.mujoco_chain import read_chain
 
-        names, chain, limits = read_chain(model, tip, kind)
-        n = len(names)
+        read = read_chain(model, tip, kind)
+        n = len(read.names)
+        sliding = _of_joints(read.chain.sliding, read.names, read.axis_names)
+        if rate_max is None:
+            known, guessed = np.isfinite(read.rate_max), np.where(sliding, SLIDING_RATE, RATE)
+            rate_max = np.where(known, read.rate_max, guessed)
+        if acceleration_max is None:
+            acceleration_max = np.where(sliding, SLIDING_ACCELERATION, ACCELERATION)
         return cls(
-            names,
-            chain,
-            limits[:, 0],
-            limits[:, 1],
-            _one_each(rate_max, n, "rate_max"),
+            read.names,
+            read.chain,
+            read.limits[:, 0],
+            read.limits[:, 1],
+            _within(_one_each(rate_max, n, "rate_max"), read.rate_max, read.names),
             _one_each(acceleration_max, n, "acceleration_max"),
+            read.axis_names,
         )
 
     @property
     def joint_count(self) -> int:
         """Number of joints n."""
         return len(self.names)
+
+    @property
+    def sliding(self) -> BoolArray:
+        """Which joints slide, (n,)."""
+        return _of_joints(self.chain.sliding, self.names, self.axis_names)
 
     def forward_kinematics(self, q: FloatArray) -> FloatArray:
         """Return T_world_tip (4, 4) at joint positions q (n,)."""
@@ -110,6 +130,23 @@ class Arm:
         if joint not in self.names:
             raise InputError("arm", "joint", joint, nearest(joint, self.names))
         return self.names.index(joint)
+
+
+def _of_joints(
+    axes: BoolArray | FloatArray, names: tuple[str, ...], axis_names: tuple[str, ...]
+) -> BoolArray:
+    """Return of what all axes say (m,) that of the joints' own, (n,)."""
+    own: BoolArray = np.array([bool(axes[axis_names.index(name)]) for name in names])
+    return own
+
+
+def _within(rate_max: FloatArray, most: FloatArray, names: tuple[str, ...]) -> FloatArray:
+    """Return rate limits (n,) cut to the model's; refuse one above by more than rounding."""
+    for joint, rate, limit in zip(names, rate_max, most, strict=True):
+        if rate > limit * (1 + _ROUNDING):
+            allowed = f"up to {limit:g}, the model's velocity limit"
+            raise InputError("arm", f"rate_max of {joint}", f"{rate:g}", allowed)
+    return np.minimum(rate_max, most)
 
 
 def _one_each(values: float | FloatArray, n: int, name: str) -> FloatArray:

@@ -83,7 +83,7 @@ def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4
 
 def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the joint limits, a turn (a metre) either side of `near` where there are none."""
-    reach = np.where(arm.chain.sliding, 1.0, 2 * np.pi)
+    reach = np.where(arm.sliding, 1.0, 2 * np.pi)
     low = np.where(np.isfinite(arm.q_min), arm.q_min, near - reach)
     high = np.where(np.isfinite(arm.q_max), arm.q_max, near + reach)
     return low, high
@@ -92,7 +92,7 @@ def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _full_turns(arm: Arm, q: FloatArray, low: FloatArray, high: FloatArray) -> list[FloatArray]:
     """Return q and q with single joints turned by whole turns inside the limits."""
     result = [q]
-    for i in np.flatnonzero(np.logical_not(arm.chain.sliding)):
+    for i in np.flatnonzero(~arm.sliding):
         for turn in (-2 * np.pi, 2 * np.pi):
             shifted = q.copy()
             shifted[i] += turn

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.robot.chain import Chain, jacobian
+from vergence.robot.chain import Chain, axes_jacobian, joint_columns
 from vergence.robot.positive_definite import (
     invert_spd,
     invert_spd_any,
@@ -26,6 +26,7 @@ class Manipulability(NamedTuple):
     J_camera: FloatArray  # (6, n)
     J_inverse: FloatArray  # (n, 6) damped pseudo-inverse of J_camera
     smallest_singular_value: float  # of J, bounded from below: 1/√tr((J Jᵀ)⁻¹)
+    J_axes: FloatArray  # (6, m) by axis; J_camera itself where no joint moves several axes
 
 
 def determinant_measure(J: FloatArray) -> float:
@@ -127,6 +128,7 @@ class Posture(NamedTuple):
     damped: FloatArray  # (6, 6) (J Jᵀ + λ² I)⁻¹; the inverse itself away from singularities
     det_JJt: float  # det(J Jᵀ), or det(Jᵀ J) with fewer than six joints
     sigma: float  # smallest singular value of J, bounded from below: 1/√tr((J Jᵀ)⁺)
+    J_axes: FloatArray  # (6, m) by axis; J itself where no joint moves several axes
 
 
 @njit(cache=True, error_model="numpy")
@@ -135,7 +137,8 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
 
     Where σ < damping, λ² = (damping - σ)²: the inverse stays bounded through a singularity.
     """
-    J = jacobian(chain, q)
+    J_axes = axes_jacobian(chain, q)
+    J = joint_columns(chain, J_axes, len(q))
     A = outer_square(J)
     inverse, det_JJt = invert_spd(A) if J.shape[1] >= 6 else pseudo_invert_square(J)
     trace = 0.0
@@ -147,7 +150,7 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
         for i in range(6):
             A[i, i] += (damping - sigma) ** 2
         damped = invert_spd(A)[0]
-    return Posture(J, inverse, damped, det_JJt, sigma)
+    return Posture(J, inverse, damped, det_JJt, sigma, J_axes)
 
 
 @njit(cache=True, error_model="numpy")
@@ -182,13 +185,33 @@ def pseudo_inverse_transposed(inverse: FloatArray, J: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) -> FloatArray:
-    """Return ∂det(J Jᵀ)/∂q (n,), exactly, in O(n).
+def determinant_gradient(
+    chain: Chain, J_axes: FloatArray, X: FloatArray, determinant: float
+) -> FloatArray:
+    """Return ∂det(J Jᵀ)/∂q (n,), exactly, in O(m).
 
-    J (6, n) along any axes, X = (J Jᵀ)⁻¹ J. With Jᵥᵢ, J_ωᵢ the halves of column i,
-    ∂Jᵢ/∂qⱼ is (J_ωⱼ × Jᵥᵢ, J_ωⱼ × J_ωᵢ) for j < i and (J_ωᵢ × Jᵥⱼ, 0) for j ≥ i, so
+    J_axes (6, m) along any axes, X = (J Jᵀ)⁻¹ J (6, n). Written for one joint an axis: with Jᵥᵢ,
+    J_ωᵢ the halves of column i, ∂Jᵢ/∂qⱼ is (J_ωⱼ × Jᵥᵢ, J_ωⱼ × J_ωᵢ) for j < i and
+    (J_ωᵢ × Jᵥⱼ, 0) for j ≥ i, so
     ∂det/∂qⱼ = 2 det [J_ωⱼ · Σ_{i>j} (Jᵥᵢ × Xᵥᵢ + J_ωᵢ × X_ωᵢ) + Jᵥⱼ · Σ_{i≤j} (Xᵥᵢ × J_ωᵢ)].
+    A joint of several axes is weighed by its ratios twice: in X and in the sum over its axes.
     """
+    n, m = X.shape[1], J_axes.shape[1]
+    if len(chain.coupling) == 0:
+        return axes_determinant_gradient(J_axes, X, determinant)
+    X_axes = np.empty((6, m))
+    for i in range(m):
+        j, ratio = int(chain.coupling[i, 0]), chain.coupling[i, 1]
+        for r in range(6):
+            X_axes[r, i] = ratio * X[r, j]
+    by_axis = axes_determinant_gradient(J_axes, X_axes, determinant)
+    gradient: FloatArray = joint_columns(chain, by_axis.reshape(1, m), n)[0]
+    return gradient
+
+
+@njit(cache=True, error_model="numpy")
+def axes_determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) -> FloatArray:
+    """Return ∂det(J Jᵀ)/∂s (m,) of `determinant_gradient` by axis, J and X (6, m)."""
     n = J.shape[1]
     gradient = np.zeros(n)
     s0 = s1 = s2 = 0.0
@@ -219,10 +242,10 @@ def limit_penalty(
 
 
 @njit(cache=True, error_model="numpy")
-def measure_gradient(arm: Posture, P: float, gradient_P: FloatArray) -> FloatArray:
+def measure_gradient(chain: Chain, arm: Posture, P: float, gradient_P: FloatArray) -> FloatArray:
     """Return ∂w'/∂q (n,) of w' = P det(J Jᵀ), exactly."""
     X = pseudo_inverse_transposed(arm.inverse, arm.J)
-    gradient = determinant_gradient(arm.J, X, arm.det_JJt)
+    gradient = determinant_gradient(chain, arm.J_axes, X, arm.det_JJt)
     for i in range(len(gradient)):
         gradient[i] = P * gradient[i] + gradient_P[i] * arm.det_JJt
     return gradient
@@ -274,7 +297,7 @@ def manipulability(
     """
     arm = posture(chain, q, damping)
     P, gradient_P = limit_penalty(q, q_min, q_max, k, per_joint)
-    gradient_q = measure_gradient(arm, P, gradient_P)
+    gradient_q = measure_gradient(chain, arm, P, gradient_P)
     return Manipulability(
         P * arm.det_JJt,
         P,
@@ -284,6 +307,7 @@ def manipulability(
         arm.J,
         pseudo_inverse_transposed(arm.damped, arm.J).T.copy(),
         arm.sigma,
+        arm.J_axes,
     )
 
 

@@ -1,6 +1,6 @@
 """Reading a serial chain off a MuJoCo model."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -8,6 +8,12 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
 from vergence.robot.chain import Chain
+from vergence.robot.mujoco_coupling import (
+    joints_above,
+    read_coupling,
+    shared_limits,
+    shared_rates,
+)
 
 # MuJoCo's camera looks along -z with y up; ours along z with y down.
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
@@ -20,14 +26,24 @@ _KINDS = {
 }
 
 
-def read_chain(model: Any, tip: str, kind: str) -> tuple[tuple[str, ...], Chain, FloatArray]:
-    """Return joint names, chain and position limits (n, 2) of the joints that carry the tip.
+class ReadChain(NamedTuple):
+    """What a model says of the joints that carry a tip."""
+
+    names: tuple[str, ...]  # of the joints that may be commanded, base first
+    axis_names: tuple[str, ...]  # of all axes, those that follow others among them
+    chain: Chain
+    limits: FloatArray  # (n, 2) of position, rad or m
+    rate_max: FloatArray  # (n,) rad/s or m/s, inf where the model does not say
+
+
+def read_chain(model: Any, tip: str, kind: str) -> ReadChain:
+    """Return the chain of the joints that carry a tip, with their limits.
 
     The transforms are read from the model in its reference configuration, where MuJoCo draws every
     axis and anchor in the world; so any nesting of bodies, offsets and fixed joints is covered.
     """
     tip_id, body = _find_tip(model, tip, kind)
-    joints = _joints_above(model, body)
+    joints = joints_above(model, body)
     if not joints:
         raise InputError("model", kind, tip, "something that a hinge or slide joint carries")
     for joint in joints:
@@ -43,9 +59,15 @@ def read_chain(model: Any, tip: str, kind: str) -> tuple[tuple[str, ...], Chain,
     frames.append(_tip_frame(data, tip_id, kind))
     sliding = np.array([int(model.jnt_type[j]) == _SLIDE for j in joints])
     reference = np.array([model.qpos0[model.jnt_qposadr[j]] for j in joints])
-    chain = _relative(frames, sliding, reference)
-    names = tuple(model.joint(j).name or f"joint{i + 1}" for i, j in enumerate(joints))
-    return names, chain, _limits(model, joints)
+    coupling = read_coupling(model, joints)
+    names = {j: model.joint(j).name or f"joint{i + 1}" for i, j in enumerate(joints)}
+    return ReadChain(
+        tuple(names[j] for j in coupling.leaders),
+        tuple(names.values()),
+        _relative(frames, sliding, reference)._replace(coupling=coupling.matrix),
+        shared_limits(model, joints, coupling),
+        shared_rates([_velocity_limit(model, j) for j in joints], coupling),
+    )
 
 
 def _find_tip(model: Any, tip: str, kind: str) -> tuple[int, int]:
@@ -59,15 +81,6 @@ def _find_tip(model: Any, tip: str, kind: str) -> tuple[int, int]:
     if kind == "camera":
         return tip_id, int(model.cam_bodyid[tip_id])
     return tip_id, int(model.site_bodyid[tip_id]) if kind == "site" else tip_id
-
-
-def _joints_above(model: Any, body: int) -> list[int]:
-    joints: list[int] = []
-    while body > 0:
-        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-        joints[:0] = range(first, first + count)
-        body = int(model.body_parentid[body])
-    return joints
 
 
 def _joint_frame(data: Any, joint: int) -> tuple[FloatArray, FloatArray]:
@@ -105,12 +118,13 @@ def _relative(
     return Chain(rotation, position, sliding)
 
 
-def _limits(model: Any, joints: list[int]) -> FloatArray:
-    for joint in joints:
-        low, high = model.jnt_range[joint]
-        if low > high:  # MuJoCo would take such a joint for one without limits
-            key = f"range of {model.joint(joint).name}"
-            raise InputError("model", key, f"{low:g} … {high:g}", "lower below upper")
-    limits = model.jnt_range[joints].copy()
-    limits[~model.jnt_limited[joints].astype(bool)] = (-np.inf, np.inf)
-    return np.asarray(limits, dtype=np.float64)
+def _velocity_limit(model: Any, joint: int) -> float:
+    """Return what `read_urdf` kept of the file's limit, rad/s or m/s; inf where it has none."""
+    name = velocity_limit_name(model.joint(joint).name)
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+    return np.inf if number < 0 else float(model.numeric_data[model.numeric_adr[number]])
+
+
+def velocity_limit_name(joint: str) -> str:
+    """Return the name of the custom number that holds a joint's velocity limit in a model."""
+    return f"{joint}/velocity_limit"

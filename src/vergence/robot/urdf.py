@@ -1,19 +1,23 @@
-"""Reading a URDF as MuJoCo can: meshes found, shapes that can be drawn, idle joints locked."""
+"""Reading a URDF as MuJoCo can: joints locked or coupled, limits kept, shapes that can be drawn."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
 import mujoco
-import numpy as np
 
 from vergence.errors import InputError
+from vergence.robot.bounded_xml import read_xml
+from vergence.robot.mesh_files import SHELL, use_triangles
+from vergence.robot.mujoco_chain import velocity_limit_name
+from vergence.robot.urdf_joints import settle_joints
+from vergence.robot.urdf_shapes import Shapes, choose_shapes, mend_inertia, report_faults
+from vergence.robot.urdf_tree import read_tree
 
-_MESHES = {".stl", ".obj", ".msh"}  # the formats that MuJoCo reads
 _DEFAULT_GREY = (0.5, 0.5, 0.5, 1.0)
 _PAINT = (0.86, 0.87, 0.89, 1.0)  # of shapes without a colour
+_PARTS = ("link", "joint", "material")  # of a robot; the rest is for other programs
 
 
 def read_urdf(path: Path, last_body: str | None = None) -> Any:
@@ -22,129 +26,68 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     What MuJoCo alone would not do with one:
 
     - links that no joint moves stay bodies, so that cameras can be mounted on them;
+    - joints are locked where they cannot move, see `settle_joints`;
+    - velocity limits are kept, as custom numbers that `Arm.from_mujoco` reads;
     - `package://NAME/…` is looked for in the folders above the file, as a ROS workspace lays them
-      out;
-    - a link whose visual meshes MuJoCo cannot read is drawn by its collision shapes;
+      out, and a link whose visual meshes cannot be drawn is drawn by its collision shapes, if it is
+      a link of an arm;
     - an inertia that no body can have loses its products of inertia;
-    - joints that do not lead to the last body, as a gripper's, are locked where they are zero;
     - arms touch nothing, as the arms of all our cells.
 
     Args:
         path: of the file.
-        last_body: name of the arm's last link; no joint is locked without one.
+        last_body: name of the arm's last link; without one no joint is locked, and all shapes have
+            to be there, as a target's.
 
     Raises:
-        InputError: if the file is no URDF, or a mesh is missing.
+        InputError: if the file is no URDF, or says what cannot be honoured.
     """
-    robot = _parse(path)
-    for link in robot.iter("link"):
-        _choose_shapes(link)
-        _mend_inertia(link)
-    for mesh in robot.iter("mesh"):
-        mesh.set("filename", str(_find_mesh(mesh.get("filename", ""), path)))
-    if last_body is not None:
-        _lock_idle_joints(robot, last_body)
+    source = str(path)
+    robot = read_xml(path)
+    if robot.tag != "robot":
+        raise InputError(source, "", f"<{robot.tag}>", "<robot>, as a URDF begins")
+    shapes = Shapes(path, path.parent / _own_mesh_folder(robot), {}, {})
+    for child in [child for child in robot if child.tag not in _PARTS]:
+        robot.remove(child)
+    tree = read_tree(robot, source)
+    rates = settle_joints(tree, last_body) if last_body and last_body in tree.links else {}
+    for link in tree.links.values():
+        choose_shapes(link, shapes)
+        mend_inertia(link, source)
+    report_faults(shapes, last_body is None)
     _set_compiler(robot)
     try:
         spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
     except ValueError as error:
-        raise InputError(str(path), "", str(error), "a URDF that MuJoCo reads") from None
+        raise InputError(source, "", str(error), "a URDF that MuJoCo reads") from None
+    _finish(spec, shapes, rates)
+    return spec
+
+
+def _finish(spec: Any, shapes: Shapes, rates: dict[str, float]) -> None:
+    """Give MuJoCo what a URDF's text cannot tell it."""
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
         if tuple(geom.rgba) == _DEFAULT_GREY:
             geom.rgba = _PAINT
-    return spec
+    for mesh in spec.meshes:
+        found = shapes.meshes[mesh.file, tuple(mesh.scale)]
+        if found.is_flat:
+            mesh.inertia = SHELL
+        if found.triangles is not None:
+            use_triangles(mesh, found.triangles)
+    for joint, rate in rates.items():
+        spec.add_numeric(name=velocity_limit_name(joint), data=[rate])
 
 
-def _parse(path: Path) -> Element:
-    try:
-        robot = ET.parse(path).getroot()
-    except ET.ParseError as error:
-        raise InputError(str(path), "", str(error), "XML") from None
-    if robot.tag != "robot":
-        raise InputError(str(path), "", f"<{robot.tag}>", "<robot>, as a URDF begins")
-    return robot
-
-
-def _choose_shapes(link: Element) -> None:
-    """Keep a link's visual shapes if all can be drawn, else its collision shapes."""
-    visual, collision = link.findall("visual"), link.findall("collision")
-    drawable = bool(visual) and all(_drawable(shape) for shape in visual)
-    for shape in collision if drawable else visual:
-        link.remove(shape)
-    if not drawable:
-        for shape in collision:
-            if not _drawable(shape):
-                link.remove(shape)
-
-
-def _mend_inertia(link: Element) -> None:
-    inertia = link.find("inertial/inertia")
-    if inertia is None:
-        return
-    tensor = np.zeros((3, 3))
-    for row, column in zip(*np.triu_indices(3), strict=True):
-        key = "i" + "xyz"[row] + "xyz"[column]
-        tensor[row, column] = tensor[column, row] = float(inertia.get(key, 0.0))
-    if np.linalg.eigvalsh(tensor)[0] <= 0:
-        for key in ("ixy", "ixz", "iyz"):
-            inertia.set(key, "0")
-
-
-def _drawable(shape: Element) -> bool:
-    mesh = shape.find("geometry/mesh")
-    return mesh is None or Path(mesh.get("filename", "")).suffix.lower() in _MESHES
-
-
-def _find_mesh(name: str, urdf: Path) -> Path:
-    """Return the file that a mesh's name means."""
-    scheme, _, rest = name.rpartition("://")
-    if scheme == "package":
-        candidates = list(_in_packages(Path(rest), urdf))
-    else:
-        candidates = [urdf.parent / rest]  # an absolute path stays one
-    for candidate in candidates:
-        if candidate.is_file():
-            return candidate
-    allowed = f"a file that exists, such as {candidates[0]}"
-    if scheme == "package":
-        allowed = f"a file in a folder {Path(rest).parts[0]}/ beside or above the URDF"
-    raise InputError(str(urdf), "mesh filename", name, allowed)
-
-
-def _in_packages(path: Path, urdf: Path) -> Iterator[Path]:
-    """Return where a path that begins with a package's name may lie, nearest first."""
-    package, inside = path.parts[0], Path(*path.parts[1:])
-    for folder in urdf.resolve().parents:
-        if folder.name == package:
-            yield folder / inside
-        yield folder / path
-
-
-def _lock_idle_joints(robot: Element, last_body: str) -> None:
-    joints = robot.findall("joint")
-    above = {_link(joint, "child"): joint for joint in joints}
-    driving = []
-    link = last_body
-    while link in above:
-        driving.append(above[link])
-        link = _link(above[link], "parent")
-    for joint in joints:
-        if not any(joint is one for one in driving):
-            joint.set("type", "fixed")
-            for mimic in joint.findall("mimic"):
-                joint.remove(mimic)
-
-
-def _link(joint: Element, end: str) -> str:
-    found = joint.find(end)
-    return "" if found is None else found.get("link", "")
+def _own_mesh_folder(robot: Element) -> str:
+    """Return where the file's extension for MuJoCo says that its meshes are."""
+    compiler = robot.find("mujoco/compiler")
+    return "" if compiler is None else compiler.get("meshdir", "")
 
 
 def _set_compiler(robot: Element) -> None:
-    """Tell MuJoCo how to read it, whatever the file's own extension says."""
-    for own in robot.findall("mujoco"):
-        robot.remove(own)
+    """Tell MuJoCo how to read it."""
     compiler = {
         "fusestatic": "false",
         "strippath": "false",

@@ -68,7 +68,7 @@ def _through_joints(
     if offsets.shape[1] != arm.joint_count:
         allowed = f"{arm.joint_count} values a way-point: {', '.join(arm.names)}"
         raise InputError(source, f"{key}.offsets_deg", f"{offsets.shape[1]} values", allowed)
-    offsets *= np.where(arm.chain.sliding, 1.0, np.pi / 180)
+    offsets *= np.where(arm.sliding, 1.0, np.pi / 180)
     return start + through_waypoints(motion, offsets, times)
 
 

@@ -12,10 +12,11 @@ from vergence.cell.locate import locate_model
 from vergence.cell.schema import ArmTable, CameraTable, Placement
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion
-from vergence.robot.urdf import read_urdf
+from vergence.robot.model_files import read_model
 from vergence.simulation.motion import placement_pose
 
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
+_FOLLOWS = mujoco.mjtEq.mjEQ_JOINT
 _ROOM = Path(__file__).with_name("scene.xml")
 
 
@@ -73,12 +74,11 @@ def _read(cell: Cell, key: str, model: Path, last_body: str | None = None) -> An
     path = locate_model(model, cell.path.parent, str(cell.path), key)
     if not path.is_file():
         raise InputError(str(cell.path), key, path, "an MJCF or URDF file that exists")
-    if path.suffix.lower() == ".urdf":
-        return read_urdf(path, last_body)
     try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise InputError(str(cell.path), key, f"{path}: {error}", "a model MuJoCo reads") from None
+        return read_model(path, last_body)
+    except InputError as error:
+        where = f"{error.source}: {error.key}" if error.key else error.source
+        raise InputError(str(cell.path), key, f"{where}: {error.given}", error.allowed) from None
 
 
 def _place(element: Any, placement: Placement, camera: bool = False) -> None:
@@ -89,7 +89,7 @@ def _place(element: Any, placement: Placement, camera: bool = False) -> None:
 
 
 def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
-    """Attach an arm and give every joint towards its last body a position servo.
+    """Attach an arm and give every joint towards its last body that follows none a position servo.
 
     The arm's weight is compensated, as a robot's own controller does.
     """
@@ -106,10 +106,14 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
             model.delete(actuator)
     for body in model.bodies:
         body.gravcomp = 1.0
+    couplings = [eq for eq in model.equalities if eq.active and eq.type == _FOLLOWS]
+    for coupling in couplings:
+        coupling.solref = [2.0 * spec.option.timestep, 1.0]  # as stiff as MuJoCo holds one
+    followers = {coupling.name1 for coupling in couplings}
     frame = spec.worldbody.add_frame()
     _place(frame, table)
     spec.attach(model, frame=frame, prefix=f"{name}/")
-    for joint in joints:
+    for joint in (joint for joint in joints if joint not in followers):
         servo = spec.add_actuator(
             name=f"{name}/{joint}",
             target=f"{name}/{joint}",

@@ -1,6 +1,7 @@
 """The cell as its file and its models describe it: geometry, arms, cameras, the target."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -8,10 +9,12 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
 from vergence.cell.cell import Cell
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import joint_accelerations, joint_positions, joint_rates
 from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion, se3_inverse
 from vergence.robot import Arm
+from vergence.robot.chain import axis_positions
+from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics
 from vergence.simulation.motion import placement_pose
 
@@ -46,6 +49,7 @@ class CellModel:
         self._to_camera: dict[str, Arm] = {}  # made when asked for
         self._joints = {name: self._joint_ids(name) for name in cell.arms}
         self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
+        self._axis_qpos = {name: self._axis_addresses(name) for name in cell.arms}
         self._target = int(self.model.body("target").id)
         self._rail = int(self.model.body("target").mocapid[0])  # -1 if an arm carries it
         self._target_bodies = _descendants(self.model, self._target)
@@ -55,11 +59,6 @@ class CellModel:
     def joint_position(self, arm: str) -> FloatArray:
         """Return an arm's joint positions (n,), rad or m."""
         return frozen(self.data.qpos[self._qpos[arm]])
-
-    def joint_addresses(self, arm: str) -> IntArray:
-        """Return where an arm's joints stand in MuJoCo's qpos, (n,)."""
-        addresses: IntArray = self._qpos[arm]
-        return addresses
 
     def camera_pose(self, camera: str) -> FloatArray:
         """Return T_world_camera (4, 4) in OpenCV's convention."""
@@ -107,14 +106,18 @@ class CellModel:
 
     def place_arm(self, arm: str, position: FloatArray) -> None:
         """Put an arm's joints somewhere (n,), against all physics, and update every pose."""
-        self.data.qpos[self._qpos[arm]] = position
-        self.update()
+        self.place({arm: position})
 
     def place(self, joints: Mapping[str, FloatArray]) -> None:
         """Put arms where their joints say, arm name to positions (n,), and update every pose."""
         for arm, position in joints.items():
-            self.data.qpos[self._qpos[arm]] = position
+            self.write_position(self.data, arm, position)
         self.update()
+
+    def write_position(self, data: Any, arm: str, position: FloatArray) -> None:
+        """Write an arm's joint positions (n,) into a state, joints that follow them among them."""
+        chain = self.arms[arm].chain
+        data.qpos[self._axis_qpos[arm]] = axis_positions(chain, np.asarray(position, np.float64))
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
         """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.
@@ -192,31 +195,36 @@ class CellModel:
         return self._arm_to(name, camera or carried[0], "camera")
 
     def _arm_to(self, name: str, tip: str, kind: str) -> Arm:
-        table = self.cell.arms[name]
-        rates, accelerations = table.rate_max_deg_s, table.acceleration_max_deg_s2
         try:
-            arm = Arm.from_mujoco(
-                self.model, tip, np.deg2rad(rates), np.deg2rad(accelerations), kind
-            )
+            arm = Arm.from_mujoco(self.model, tip, kind=kind)
         except InputError as error:
-            units = {"rate_max": "rate_max_deg_s", "acceleration_max": "acceleration_max_deg_s2"}
-            key, given = f"arms.{name}.model", f"{error.key} {error.given}"
-            if error.key in units:
-                key, given = f"arms.{name}.{units[error.key]}", str(error.given)
-            raise InputError(str(self.cell.path), key, given, error.allowed) from None
-        names = tuple(joint.removeprefix(f"{name}/") for joint in arm.names)
-        return Arm(names, arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)
+            given = f"{error.key} {error.given}"
+            raise InputError(
+                str(self.cell.path), f"arms.{name}.model", given, error.allowed
+            ) from None
+        names, axes = (
+            tuple(joint.removeprefix(f"{name}/") for joint in joints)
+            for joints in (arm.names, arm.axis_names)
+        )
+        arm = replace(arm, names=names, axis_names=axes)
+        rates = joint_rates(self.cell, name, arm, read_chain(self.model, tip, kind).rate_max)
+        accelerations = joint_accelerations(self.cell, name, arm)
+        return replace(arm, rate_max=rates, acceleration_max=accelerations)
 
     def _joint_ids(self, arm: str) -> Any:
         return np.array([self.model.joint(f"{arm}/{j}").id for j in self.arms[arm].names])
+
+    def _axis_addresses(self, arm: str) -> IntArray:
+        names = self.arms[arm].axis_names
+        joints = [self.model.joint(f"{arm}/{name}").id for name in names]
+        return np.asarray(self.model.jnt_qposadr[joints], dtype=np.int64)
 
     def _place_at_start(self) -> None:
         for name in self.cell.arms:
             key = f"arms.{name}.start_deg"
             given = self.cell.arms[name].start_deg
-            self.data.qpos[self._qpos[name]] = joint_positions(
-                self.cell, key, given, self.arms[name]
-            )
+            start = joint_positions(self.cell, key, given, self.arms[name])
+            self.write_position(self.data, name, start)
         self.move_target(placement_pose(self.cell.target))
         self.update()
 

@@ -1,7 +1,7 @@
 """A first cell for an arm that nobody has set up yet: how to stand, where to look, what at."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
 from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
-from vergence.robot.urdf import read_urdf
+from vergence.robot.chain import axis_positions
+from vergence.robot.model_files import read_model
+from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import named_joints
 from vergence.simulation.cell_model import hidden
 
@@ -23,6 +25,8 @@ _ASIDE_M = (0.08, 0.15)  # how far beside the body it is mounted if something is
 _HANGING_M = 0.1  # below its own zero: an arm that reaches lower hangs, and is lifted
 _ABOVE_FLOOR_M = 0.05
 _WITHOUT_LIMITS = 2.0  # rad or m: how far such a joint is turned for a start
+_RATES = 0.25, np.pi / 2  # m/s if it slides, rad/s if not: where the model says nothing
+_ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
 _SPAN = 0.35  # half a side of the board as a share of its distance
 
 
@@ -36,6 +40,7 @@ class Draft:
     T_world_target: FloatArray  # (4, 4) of a board before the camera, its z towards it
     height_m: float  # of the arm's base above the floor
     half_side_m: float  # of the board
+    rates_from: str  # whose the rate limits of the arm are
 
 
 def draft_cell(model_path: Path, body: str) -> Draft:
@@ -52,7 +57,7 @@ def draft_cell(model_path: Path, body: str) -> Draft:
         InputError: if there is no such body, nothing moves it, or no posture is found.
     """
     model = _compile(model_path, body)
-    arm = Arm.from_mujoco(model, body, kind="body")
+    arm, rates_from = _arm(model, body)
     data = mujoco.MjData(model)
     postures = _postures(arm)
     distance = float(np.clip(0.5 * _reach(arm, postures), 0.15, 0.6))
@@ -63,22 +68,14 @@ def draft_cell(model_path: Path, body: str) -> Draft:
             board = _before(T_world_camera, distance)
             if _sees(model, data, arm, q, T_world_camera, board, _ABOVE_FLOOR_M - height):
                 board[2, 3] += height
-                return Draft(q, arm, T_body_camera, board, height, _SPAN * distance)
+                return Draft(q, arm, T_body_camera, board, height, _SPAN * distance, rates_from)
     given = f"a camera on {body} sees nothing but the arm or the floor in {_TRIED} postures"
     raise InputError(str(model_path), "", given, "an arm with room before its last body")
 
 
 def _compile(path: Path, body: str) -> Any:
-    if not path.is_file():
-        raise InputError(str(path), "", "no such file", "an MJCF or URDF file")
-    if path.suffix.lower() == ".xacro":
-        first = (
-            f"a URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf"
-        )
-        raise InputError(str(path), "", "an xacro", first)
+    spec = read_model(path, body)
     try:
-        is_urdf = path.suffix.lower() == ".urdf"
-        spec = read_urdf(path, body) if is_urdf else mujoco.MjSpec.from_file(str(path))
         bodies = {one.name: one for one in spec.bodies if one.name and one.name != "world"}
         if body not in bodies:
             raise InputError(str(path), "--body", body or "none", nearest(body, bodies))
@@ -90,13 +87,26 @@ def _compile(path: Path, body: str) -> Any:
         raise InputError(str(path), "", str(error), "a model that MuJoCo compiles") from None
 
 
+def _arm(model: Any, body: str) -> tuple[Arm, str]:
+    """Return the arm, cautious where its model sets no limits, and whose its rate limits are."""
+    arm = Arm.from_mujoco(model, body, kind="body")
+    given = read_chain(model, body, "body").rate_max
+    guessed = [name for name, rate in zip(arm.names, given, strict=True) if np.isinf(rate)]
+    rates = np.where(np.isinf(given), np.where(arm.sliding, *_RATES), given)
+    whose = "the model's velocity limits"
+    if guessed:
+        whose = f"guesses for {', '.join(guessed)}: the model has no limits"
+    accelerations = np.where(arm.sliding, *_ACCELERATIONS)
+    return replace(arm, rate_max=rates, acceleration_max=accelerations), whose
+
+
 def _postures(arm: Arm) -> FloatArray:
     """Return postures well inside the limits, to a tenth of a degree or a millimetre, (K, n)."""
     rng = np.random.default_rng(0)
     low = np.where(np.isfinite(arm.q_min), arm.q_min, -_WITHOUT_LIMITS)
     high = np.where(np.isfinite(arm.q_max), arm.q_max, _WITHOUT_LIMITS)
     share = rng.uniform(0.1, 0.9, (_POSTURES, arm.joint_count))
-    step = np.where(arm.chain.sliding, 1e-3, np.deg2rad(0.1))
+    step = np.where(arm.sliding, 1e-3, np.deg2rad(0.1))
     postures: FloatArray = np.round((low + share * (high - low)) / step) * step
     return postures
 
@@ -177,7 +187,7 @@ def _sees(
     points = board[:3, 3] + np.outer(x, board[:3, 0]) + np.outer(y, board[:3, 1])
     if min(points[:, 2].min(), T_world_camera[2, 3]) < lowest_m:
         return False
-    for name, position in zip(arm.names, q, strict=True):
+    for name, position in zip(arm.axis_names, axis_positions(arm.chain, q), strict=True):
         data.joint(name).qpos[0] = position
     mujoco.mj_kinematics(model, data)
     eye = np.ascontiguousarray(T_world_camera[:3, 3])

@@ -40,7 +40,7 @@ class Obstacles:
         import mujoco
 
         for arm, position in joints.items():
-            self._data.qpos[self._cell_model.joint_addresses(arm)] = position
+            self._cell_model.write_position(self._data, arm, position)
         mujoco.mj_kinematics(self._model, self._data)
 
     def blocked(self, eye: FloatArray, points: FloatArray) -> BoolArray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.cell.cell import Cell
+from vergence.robot.chain import joint_columns
 from vergence.simulation.cell_model import CellModel
 
 _SERVO_DAMPING = 1.0  # critical
@@ -44,12 +45,19 @@ class World(CellModel):
     def _actuator_ids(self, arm: str) -> Any:
         return np.array([self.model.actuator(f"{arm}/{j}").id for j in self.arms[arm].names])
 
+    def _felt_inertia(self, arm: str, inertia: FloatArray) -> FloatArray:
+        """Return the inertia (n,) of all that each joint moves, from that of all joints (N, N)."""
+        dofs = [self.model.joint(f"{arm}/{name}").dofadr[0] for name in self.arms[arm].axis_names]
+        ratios = joint_columns(self.arms[arm].chain, np.eye(len(dofs)), self.arms[arm].joint_count)
+        felt: FloatArray = np.diag(ratios.T @ inertia[np.ix_(dofs, dofs)] @ ratios)
+        return felt
+
     def _tune_servos(self, arm: str) -> FloatArray:
         """Give every joint a critically damped servo; return k_v/k_p (n,)."""
         inertia = np.empty((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, inertia)
         bandwidth = 2 * np.pi * self.cell.arms[arm].servo_bandwidth_hz
-        felt = np.diag(inertia)[self._qvel[arm]]
+        felt = self._felt_inertia(arm, inertia)
         kp, kv = felt * bandwidth**2, 2 * _SERVO_DAMPING * bandwidth * felt
         ids = self._actuators[arm]
         self.model.actuator_gainprm[ids, 0] = kp

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.app.figures.layout import Panels, panels
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.drawing import LIMIT, curve, legend
 from vergence.runtime import ArmInfo
 from vergence.runtime.results import ArmTrace
@@ -13,14 +13,19 @@ from vergence.runtime.results import ArmTrace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from vergence.robot import Arm
+
 
 def joints_figure(arm: ArmInfo, trace: ArmTrace) -> Panels | None:
-    """Draw joints and their rates as shares of their limits; a limit is at -1 or 1."""
+    """Draw joints and their rates as shares of their limits; a limit is at -1 or 1.
+
+    A joint without limits is drawn in half turns.
+    """
     if not len(trace.time):
         return None
     out = panels(2)
     position, rate = out.axes
-    _curves(position, trace.time, normalized(arm, trace.position), arm.names)
+    _curves(position, trace.time, drawn_positions(arm, trace.position), drawn_names(arm))
     _curves(rate, trace.time, trace.velocity / arm.rate_max, arm.names)
     position.set_ylabel("joint position\n(share of its range)")
     rate.set_ylabel("joint rate\n(share of its limit)")
@@ -61,11 +66,29 @@ def measures_figure(trace: ArmTrace) -> Panels | None:
     return out
 
 
-def normalized(arm: ArmInfo, position: FloatArray) -> FloatArray:
+def normalized(arm: "ArmInfo | Arm", position: FloatArray) -> FloatArray:
     """Return positions as shares of the range, -1 and 1 at the limits; NaN without limits."""
-    limited = np.isfinite(arm.q_min) & np.isfinite(arm.q_max)
+    limited = _limited(arm)
     low, high = (np.where(limited, limit, np.nan) for limit in (arm.q_min, arm.q_max))
     return np.asarray((2 * position - low - high) / (high - low))
+
+
+def drawn_positions(arm: "ArmInfo | Arm", position: FloatArray) -> FloatArray:
+    """Return positions (…, n) as shares of the range; in half turns, within ±1, without limits."""
+    shares = normalized(arm, position)
+    half_turns = np.remainder(position + np.pi, 2 * np.pi) / np.pi - 1.0
+    return np.where(_limited(arm), shares, half_turns)
+
+
+def drawn_names(arm: "ArmInfo | Arm") -> tuple[str, ...]:
+    """Return the names of joints beside what `drawn_positions` makes of them."""
+    shown = zip(arm.names, _limited(arm), strict=True)
+    return tuple(name if limited else f"{name} (half turns)" for name, limited in shown)
+
+
+def _limited(arm: "ArmInfo | Arm") -> BoolArray:
+    limited: BoolArray = np.isfinite(arm.q_min) & np.isfinite(arm.q_max)
+    return limited
 
 
 def _curves(axes: "Axes", time: FloatArray, values: FloatArray, names: tuple[str, ...]) -> None:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vergence.app.figures.arm import drawn_names, drawn_positions
 from vergence.app.figures.layout import panels
 from vergence.drawing import legend
 from vergence.studies.path_panels import camera_paths, grid, image_paths, joint_paths, space
@@ -28,9 +29,8 @@ def plan_joints_figure(trajectory: "Trajectory") -> Any:
     q, rates, _ = (np.array(rows) for rows in zip(*map(trajectory.joints, time), strict=True))
     out = panels(2, height=2.4)
     position, rate = out.axes
-    joint_paths(
-        position, time, arm.normalized(q), arm.names, "joint position\n(share of its range)"
-    )
+    shares, label = drawn_positions(arm, q), "joint position\n(share of its range)"
+    joint_paths(position, time, shares, drawn_names(arm), label)
     joint_paths(rate, time, rates / arm.rate_max, arm.names, "joint rate\n(share of its limit)")
     legend(position)
     return out.figure

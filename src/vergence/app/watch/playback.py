@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vergence.app.figures.arm import normalized
+from vergence.app.figures.arm import drawn_positions
 from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.plots import (
     HAND_DEG,
@@ -110,7 +110,7 @@ class Playback:
         if self._world is not None:
             arm = self._world.world.arms[self._arm]
             measures = np.array([manipulability_measure(arm.jacobian(q)) for q in trace.position])
-        shares = normalized(info, trace.position)
+        shares = drawn_positions(info, trace.position)
         for time, share, measure in zip(trace.time.tolist(), shares, measures, strict=True):
             values = {"joints": share, "manipulability": np.array([measure])}
             yield row(time, self.plots, values)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vergence.app.figures.arm import drawn_names
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
 from vergence.runtime import ArmInfo
@@ -52,8 +53,8 @@ def error_key(camera: str = "") -> str:
 
 def joints_plot(arm: ArmInfo) -> Plot:
     """Return the panel of an arm's joints."""
-    title, names = "joints between their limits", tuple(arm.names)
-    return Plot("joints", title, "±1 = limit", names, -1.1, 1.1, (-1.0, 1.0))
+    title = "joints between their limits"
+    return Plot("joints", title, "±1 = limit", drawn_names(arm), -1.1, 1.1, (-1.0, 1.0))
 
 
 def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vergence.app.figures.arm import normalized
+from vergence.app.figures.arm import drawn_positions
 from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.outline import outline, target_corners
 from vergence.app.watch.plots import Plot, error_key, live_plots, row
@@ -120,7 +120,7 @@ class Publisher:
         name = self._cell.task.arm
         q = record.sample.joints[name].position
         return {
-            "joints": normalized(self._info.arms[name], q),
+            "joints": drawn_positions(self._info.arms[name], q),
             "manipulability": np.array(
                 [manipulability_measure(self._driver.arms[name].jacobian(q))]
             ),

@@ -44,7 +44,7 @@ class RecordedWorld:
         """Put the arms and the target somewhere; return MuJoCo's state."""
         world = self.world
         for arm, position in joints.items():
-            world.data.qpos[world.joint_addresses(arm)] = position
+            world.write_position(world.data, arm, position)
         world.move_target(T_world_target)
         return world_state(world.model, world.data)
 

@@ -14,7 +14,7 @@ Velocity3 = tuple[Coordinate, Coordinate, Coordinate]  # m/s
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]  # m
 Distance = Annotated[float, Field(ge=0, le=1e3)]  # m
 Speed = Annotated[float, Field(ge=1e-6, le=100)]  # m/s
-JointRate = Annotated[float, Field(ge=1e-3, le=1e5)]  # degrees/s, or degrees/s²
+JointRate = Annotated[float, Field(ge=1e-3, le=1e5)]  # degrees/s, degrees/s²; m/s, m/s²
 Time = Annotated[float, Field(ge=0, le=86400)]  # s
 Duration = Annotated[float, Field(ge=1e-3, le=86400)]  # s
 Rate = Annotated[float, Field(ge=1e-2, le=1e4)]  # Hz

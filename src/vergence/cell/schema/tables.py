@@ -101,9 +101,13 @@ class ArmTable(Placement):
 
     model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
     body: Text  # the last body: cameras are mounted on it unless they name another
-    start_deg: _Joints  # at the start: degrees; metres for sliding joints
-    rate_max_deg_s: _JointRates = 180.0  # m/s·(180/π) for sliding joints
-    acceleration_max_deg_s2: _JointRates = 720.0  # m/s²·(180/π) if they slide
+    start_deg: _Joints  # at the start; metres for sliding joints
+    rate_max_deg_s: _JointRates | None = (
+        None  # m/s for sliding joints; if absent the model's limits, without those 180 or 0.5
+    )
+    acceleration_max_deg_s2: _JointRates | None = (
+        None  # m/s² for sliding joints; 720 or 2 if absent
+    )
     servo_bandwidth_hz: Rate = 12.0  # of the joint servos that stand for the robot's own
     motion: ArmMotion | None = None  # what it does by itself; without one the loop holds it
 

@@ -8,6 +8,7 @@ from vergence.control.objectives._tracking import (
     optimal_tracking_tick,
     pack_setup,
     tracking_twist,
+    unpack_chain,
     unpack_tick,
 )
 from vergence.control.objectives.image_based import ImageBased, InteractionModel
@@ -50,6 +51,7 @@ __all__ = [
     "least_squares",
     "optimal_tracking_tick",
     "pack_setup",
+    "unpack_chain",
     "state_of",
     "tip_goal",
     "tip_twist",

@@ -171,7 +171,7 @@ class PackedSetup(NamedTuple):
     """A setup in two arrays: every array costs a call from Python 0.1 µs, a container more."""
 
     weights: FloatArray  # (27,) the numbers and the gains
-    joints: FloatArray  # (n + 1, 4, 4) the chain's transforms; their last rows hold the limits
+    joints: FloatArray  # (m + 1, 5, 4) the chain's transforms, limits and coupling
 
 
 def pack_setup(setup: TrackingSetup) -> PackedSetup:
@@ -180,10 +180,22 @@ def pack_setup(setup: TrackingSetup) -> PackedSetup:
     numbers = (gains.Q, gains.S, gains.avoidance_max, gains.period)
     penalty = (setup.penalty_k, setup.per_joint, setup.damping)
     weights = (numbers, penalty, setup.focal_px, gains.R, gains.controlled, gains.avoiding)
-    joints = np.zeros((len(chain.position), 4, 4))
+    n = len(setup.q_min)
+    joints = np.zeros((len(chain.position), 5, 4))
     joints[:, :3, :3], joints[:, :3, 3] = chain.rotation, chain.position
-    joints[:-1, 3] = np.column_stack((setup.q_min, setup.q_max, setup.rate_max, chain.sliding))
+    joints[:n, 3, :3] = np.column_stack((setup.q_min, setup.q_max, setup.rate_max))
+    if len(chain.coupling):
+        joints[:-1, 4, :3] = chain.coupling
+    else:
+        joints[:-1, 4, :2] = np.column_stack((np.arange(n), np.ones(n)))
+    joints[:-1, 4, 3] = chain.sliding
     return PackedSetup(np.concatenate(weights), joints)
+
+
+@njit(cache=True, error_model="numpy")
+def unpack_chain(joints: FloatArray) -> Chain:
+    """Read the chain back."""
+    return Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 4, 3], joints[:-1, 4, :3])
 
 
 @njit(cache=True, error_model="numpy")
@@ -214,12 +226,13 @@ def optimal_tracking_tick(
     """
     n, gains, focal_px = len(q), unpack_gains(weights), weights[7:9]
     penalty_k, per_joint, damping = weights[4], weights[5] != 0.0, weights[6]
-    q_min, q_max, rate_max = joints[:-1, 3, 0], joints[:-1, 3, 1], joints[:-1, 3, 2]
-    arm = posture(Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 3, 3]), q, damping)
+    q_min, q_max, rate_max = joints[:n, 3, 0], joints[:n, 3, 1], joints[:n, 3, 2]
+    chain = unpack_chain(joints)
+    arm = posture(chain, q, damping)
     P, gradient_P = limit_penalty(q, q_min, q_max, penalty_k, per_joint)
     gradient = gains.avoiding
     if gains.S > 0.0:
-        gradient = camera_gradient(arm, measure_gradient(arm, P, gradient_P))
+        gradient = camera_gradient(arm, measure_gradient(chain, arm, P, gradient_P))
     BtB, Bt_error, Bt_drift = image_square(features, focal_px, gains.period)
     w = P * arm.det_JJt
     v_camera = tracking_displacement(BtB, Bt_error, gains, w, gradient)

@@ -109,7 +109,7 @@ class OptimalTracking:
         now = posture(arm.chain, state.q, _DAMPED_BELOW)
         per_joint = self.penalty == "per_joint"
         P, slope = limit_penalty(state.q, arm.q_min, arm.q_max, self.penalty_k, per_joint)
-        gradient: FloatArray = camera_gradient(now, measure_gradient(now, P, slope))
+        gradient: FloatArray = camera_gradient(now, measure_gradient(arm.chain, now, P, slope))
         if state.A is not None:
             gradient = np.linalg.solve(state.A.T, gradient).astype(np.float64)
         return Avoidance(P * now.det_JJt, gradient)

@@ -104,7 +104,8 @@ def constrained_rates(
         size = np.sqrt(np.sum(rate * rate))
         g += pull * min(1.0, avoidance.rate_max / max(size, 1e-300))
     yoshikawa = np.sqrt(m.det_JJt)
-    slope = determinant_gradient(J, m.J_inverse.T.copy(), m.det_JJt) / (2.0 * max(yoshikawa, 1e-9))
+    slope = determinant_gradient(chain, m.J_axes, m.J_inverse.T.copy(), m.det_JJt)
+    slope /= 2.0 * max(yoshikawa, 1e-9)
     J_camera = J if len(scene.A) == 0 else scene.A @ J
     C_sight, d_sight = np.empty((0, n)), np.empty(0)
     if len(scene.solids):

@@ -7,8 +7,7 @@ from numba import njit, prange
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import picture_tick
-from vergence.control import guarded_steps, optimal_tracking_tick
-from vergence.robot import Chain
+from vergence.control import guarded_steps, optimal_tracking_tick, unpack_chain
 from vergence.robot.chain import Axes, tip_frame
 
 COMPLETED, IMAGE_LATE, TARGET_LOST, SINGULAR, STUCK = range(5)  # how a run ends
@@ -19,7 +18,7 @@ class LoopInputs(NamedTuple):
     """All that a run depends on; with one axis more in front, that of many runs."""
 
     weights: FloatArray  # (27,) of `pack_setup`
-    joints: FloatArray  # (n + 1, 4, 4) of `pack_setup`
+    joints: FloatArray  # (m + 1, 5, 4) of `pack_setup`
     limits: FloatArray  # (4, n) q_min, q_max, rate_max, acceleration_max
     start: FloatArray  # (n,) joint positions
     features: FloatArray  # (M, 3) in the target's frame, m
@@ -98,7 +97,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
     q, velocity = run.start.copy(), np.zeros(len(run.start))
     answer, rates = np.zeros(len(q) + 10), np.zeros(len(q))
     found = np.empty((len(run.features), 5))
-    chain = Chain(run.joints[:, :3, :3], run.joints[:, :3, 3], run.joints[:-1, 3, 3])
+    chain = unpack_chain(run.joints)
     inner_hz, outer_hz = run.rates_hz[0], run.rates_hz[1]
     duration, image_patience, target_patience = run.ends_s[0], run.ends_s[1], run.ends_s[2]
     tick, last_picture, last_seen = 0, 0.0, 0.0

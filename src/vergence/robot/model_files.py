@@ -1,0 +1,29 @@
+"""A robot's or an object's model file, whichever format it is in."""
+
+from pathlib import Path
+from typing import Any
+
+from vergence.errors import InputError
+from vergence.robot.mjcf import read_mjcf
+from vergence.robot.urdf import read_urdf
+
+
+def read_model(path: Path, last_body: str | None = None) -> Any:
+    """Return the MjSpec of an MJCF or URDF.
+
+    Args:
+        path: of the file.
+        last_body: of the arm that it is; absent where it is no arm.
+
+    Raises:
+        InputError: if there is no such file, or it cannot be used.
+    """
+    if not path.is_file():
+        raise InputError(str(path), "", "no such file", "an MJCF or URDF file")
+    if path.suffix.lower() == ".xacro":
+        name = path.stem.removesuffix(".urdf")
+        first = f"a URDF; expand it first: xacro {path.name} > {name}.urdf"
+        raise InputError(str(path), "", "an xacro", first)
+    if path.suffix.lower() == ".urdf":
+        return read_urdf(path, last_body)
+    return read_mjcf(path, meshes_needed=last_body is None)
