@@ -10,6 +10,7 @@ import pytest
 from vergence.app.main import main
 from vergence.assembly import run_cell
 from vergence.cell import load_cell
+from vergence.cell.locate import locate_model
 from vergence.errors import InputError
 from vergence.places import CELLS
 from vergence.simulation import SimulatedDriver
@@ -117,3 +118,54 @@ def test_a_cell_that_is_not_there_is_answered_with_those_of_this_folder(
     (tmp_path / "recorded" / "recording.mcap").touch()
     assert command("run", "min") == 2
     assert "in this folder (mine)" in capsys.readouterr().err
+
+
+RAIL = """<robot name="r"><link name="base"/><link name="cart"/><link name="arm"/><link name="tip">
+<visual><geometry><sphere radius="0.02"/></geometry></visual></link>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="0.4"/></joint>
+<joint name="shoulder" type="revolute"><parent link="cart"/><child link="arm"/><axis xyz="0 1 0"/>
+<origin xyz="0 0 0.8"/><limit lower="-2" upper="2" effort="1" {velocity}/></joint>
+<joint name="elbow" type="continuous"><parent link="arm"/><child link="tip"/><axis xyz="0 1 0"/>
+<origin xyz="0.4 0 0"/><limit effort="1" velocity="1.0"/></joint></robot>"""
+
+
+def test_the_rate_limits_of_the_draft_are_the_models(command, tmp_path: Path) -> None:
+    (tmp_path / "rail.urdf").write_text(RAIL.format(velocity='velocity="0.05"'))
+    assert command("new", "rail.urdf", "--body", "tip") == 0
+    text = (tmp_path / "rail" / "cell.toml").read_text()
+    assert "rate_max_deg_s = [0.4, 2.865, 57.3]  # the model's velocity limits; m/s" in text
+    arm = SimulatedDriver(load_cell("rail"), images=False).world.arms["arm"]
+    np.testing.assert_allclose(arm.rate_max, [0.4, 0.05, 1.0], rtol=1e-3)
+    assert arm.acceleration_max[0] == 1.0
+
+
+def test_a_guessed_rate_limit_says_so(command, tmp_path: Path) -> None:
+    (tmp_path / "rail.urdf").write_text(RAIL.format(velocity=""))
+    assert command("new", "rail.urdf", "--body", "tip") == 0
+    text = (tmp_path / "rail" / "cell.toml").read_text()
+    assert "[0.4, 90, 57.3]  # guesses for shoulder: the model has no limits" in text
+
+
+def test_the_lens_of_a_camera_file_is_the_cameras(command, tmp_path: Path) -> None:
+    lens = "width = 1280\nheight = 720\nfx = 2400.0\nfy = 2400.0\ncx = 640.0\ncy = 360.0\n"
+    (tmp_path / "lens.toml").write_text(lens)
+    arguments = ("new", ARMS[6][0], "--body", ARMS[6][1], "--camera", "lens.toml")
+    assert command(*arguments) == 0
+    assert load_cell("puma560").cameras["wrist"].resolution == (1280, 720)
+    result = run_cell(load_cell("puma560", {"duration_s": "1"}), images=False)
+    assert result.outcome.succeeded, str(result.outcome)
+    assert command(*arguments, "--out", "other", "--camera", "no.toml") == 2
+
+
+@pytest.mark.parametrize(
+    ("model", "body"),
+    [
+        ("finger_edu_description/robots/finger_edu.urdf", "finger_tip_link"),
+        ("baxter_description/urdf/baxter.urdf", "right_gripper"),
+    ],
+)
+def test_an_arm_that_reaches_nothing_from_the_floor_is_put_on_a_stand(model, body) -> None:
+    draft = draft_cell(locate_model(Path(f"{ROBOTS}/{model}"), Path(), "", ""), body)
+    assert 0.05 < draft.height_m < 2.0
+    assert draft.T_world_target[2, 3] > 0.04

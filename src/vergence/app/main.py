@@ -214,15 +214,21 @@ def new(
         str, typer.Argument(help="URDF or MJCF file of the arm; or package:NAME/PATH.")
     ],
     body: Annotated[
-        str, typer.Option(help="The arm's last body, which carries the camera; wrong: a list.")
+        str,
+        typer.Option(
+            help="Last body of the arm; the camera is mounted on it. Omit it to list the bodies."
+        ),
     ] = "",
     out: Annotated[Path | None, typer.Option(help="Folder, instead of the model's name.")] = None,
+    camera: Annotated[
+        Path | None, typer.Option(help="Camera file with the lens, as `calibrate` writes it.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a first cell for an arm of yours: start, camera and target are found."""
     from vergence.app.new import new as command
 
-    raise typer.Exit(command(model, body, out, as_json))
+    raise typer.Exit(command(model, body, out, camera, as_json))
 
 
 @app.command(epilog="Example: vergence watch puma560    or vergence watch runs/NAME-TIME")

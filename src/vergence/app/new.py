@@ -1,5 +1,6 @@
 """`vergence new`: a first cell for an arm of somebody's own."""
 
+import json
 import os
 import shlex
 from pathlib import Path
@@ -13,8 +14,10 @@ from vergence.places import CELL
 
 if TYPE_CHECKING:
     from vergence.arrays import FloatArray
+    from vergence.camera import Camera
     from vergence.simulation.draft import Draft
 
+_SHARE = 0.85  # of the image's height that the board fills
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
   <asset>
@@ -48,8 +51,7 @@ acceleration_max_deg_s2 = {accelerations}  # a guess: see the robot's manual
 arm = "arm"
 position_m = {camera_m}  # in the last body: z looks ahead, x right, y down
 rotation_rpy_deg = {camera_rpy}
-resolution = [640, 480]
-focal_px = [600.0, 600.0]  # your lens, see `vergence calibrate --help`
+{lens}
 rate_hz = 30.0
 latency_frames = 1  # from exposure until the picture arrives
 
@@ -76,20 +78,29 @@ gain = 3.0
 """
 
 
-def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
+_LENS = """resolution = [640, 480]
+focal_px = [600.0, 600.0]  # your lens, see `vergence calibrate --help`"""
+
+
+def new(model: str, body: str, out: Path | None, camera: Path | None, as_json: bool) -> int:
     """Write a cell for an arm into a new folder; return the exit code."""
+    from vergence.camera import read_camera
     from vergence.cell.locate import locate_model
-    from vergence.simulation.draft import draft_cell
+    from vergence.simulation.draft import SPAN, draft_cell
 
     path = locate_model(Path(model), Path.cwd(), "vergence new", "MODEL")
     folder = out or Path(path.stem)
     if (folder / CELL).exists():
         raise InputError(str(folder), "", "a cell is there already", "--out with another folder")
-    draft = draft_cell(path, body)
+    lens = None if camera is None else read_camera(camera)
+    draft = draft_cell(path, body, SPAN if lens is None else min(SPAN, _span(lens)))
     folder.mkdir(parents=True, exist_ok=True)
     named = model if model.startswith("package:") else os.path.relpath(path, folder)
     (folder / "board.xml").write_text(_BOARD.format(half=draft.half_side_m))
-    (folder / CELL).write_text(_text(draft, path.name, named, body, folder.resolve().name))
+    text = _text(draft, path.name, named, body, folder.resolve().name)
+    if camera is not None:
+        text = text.replace(_LENS, f"calibration = {json.dumps(os.path.relpath(camera, folder))}")
+    (folder / CELL).write_text(text)
     if as_json:
         emit({"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()})
     else:
@@ -97,6 +108,12 @@ def new(model: str, body: str, out: Path | None, as_json: bool) -> int:
         typed = shlex.quote(str(folder))
         say(f"next:  vergence watch {typed}      or  vergence run {typed}")
     return SUCCESS
+
+
+def _span(lens: "Camera") -> float:
+    """Return half a side of what fills most of a camera's image at a distance of one."""
+    half_width, half_height = 0.5 * lens.width / lens.fx, 0.5 * lens.height / lens.fy
+    return _SHARE * min(half_width, half_height)
 
 
 def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> str:
@@ -113,6 +130,7 @@ def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> 
         rates=_limits(draft.arm.rate_max / unit),
         rates_from=draft.rates_from,
         accelerations=_limits(draft.arm.acceleration_max / unit),
+        lens=_LENS,
         camera_m=camera_m,
         camera_rpy=camera_rpy,
         target_m=target_m,

@@ -1,5 +1,6 @@
 """A first cell for an arm that nobody has set up yet: how to stand, where to look, what at."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +28,7 @@ _ABOVE_FLOOR_M = 0.05
 _WITHOUT_LIMITS = 2.0  # rad or m: how far such a joint is turned for a start
 _RATES = 0.25, np.pi / 2  # m/s if it slides, rad/s if not: where the model says nothing
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
-_SPAN = 0.35  # half a side of the board as a share of its distance
+SPAN = 0.35  # half a side of the board as a share of its distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,33 +44,39 @@ class Draft:
     rates_from: str  # whose the rate limits of the arm are
 
 
-def draft_cell(model_path: Path, body: str) -> Draft:
+def draft_cell(model_path: Path, body: str, span: float = SPAN) -> Draft:
     """Find a posture from which a camera on an arm's last body looks well at a board.
 
     Well means: far from singular postures and joint limits, downwards rather than up, not twisted
-    about for nothing, with none of the arm in the way and the board above the floor.
+    about for nothing, with none of the arm in the way and the board above the floor. An arm that
+    reaches none such from where it stands is put on a stand.
 
     Args:
         model_path: MJCF or URDF.
         body: the last body of the arm, which carries the camera.
+        span: half a side of the board as a share of its distance.
 
     Raises:
-        InputError: if there is no such body, nothing moves it, or no posture is found.
+        InputError: if there is no such body, nothing moves it, or the arm is always in the way.
     """
     model = _compile(model_path, body)
     arm, rates_from = _arm(model, body)
     data = mujoco.MjData(model)
     postures = _postures(arm)
     distance = float(np.clip(0.5 * _reach(arm, postures), 0.15, 0.6))
-    height = _height(model, data)
-    for T_body_camera in _mountings(model, data, body):
-        for q in _best_first(arm, postures, T_body_camera)[:_TRIED]:
+    own_height = _height(model, data)
+    half_side = span * distance
+    for highest in (own_height, np.inf):
+        for T_body_camera, q in _candidates(model, data, arm, body, postures):
             T_world_camera = se3_compose(arm.forward_kinematics(q), T_body_camera)
             board = _before(T_world_camera, distance)
-            if _sees(model, data, arm, q, T_world_camera, board, _ABOVE_FLOOR_M - height):
+            points = _grid(board, half_side)
+            lowest = min(points[:, 2].min(), T_world_camera[2, 3])
+            height = max(own_height, math.ceil(100 * (_ABOVE_FLOOR_M - lowest)) / 100)
+            if height <= highest and _sees(model, data, arm, q, T_world_camera, points):
                 board[2, 3] += height
-                return Draft(q, arm, T_body_camera, board, height, _SPAN * distance, rates_from)
-    given = f"a camera on {body} sees nothing but the arm or the floor in {_TRIED} postures"
+                return Draft(q, arm, T_body_camera, board, height, half_side, rates_from)
+    given = f"a camera on {body} that sees nothing but the arm in {_TRIED} postures"
     raise InputError(str(model_path), "", given, "an arm with room before its last body")
 
 
@@ -140,6 +147,15 @@ def _best_first(arm: Arm, postures: FloatArray, T_body_camera: FloatArray) -> Fl
     return ordered
 
 
+def _candidates(
+    model: Any, data: Any, arm: Arm, body: str, postures: FloatArray
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield poses (4, 4) of a camera in the body and, for each, the best postures (n,)."""
+    for T_body_camera in list(_mountings(model, data, body)):
+        for q in _best_first(arm, postures, T_body_camera)[:_TRIED]:
+            yield T_body_camera, q
+
+
 def _mountings(model: Any, data: Any, body: str) -> Iterator[FloatArray]:
     """Yield poses (4, 4) of a camera in the body: ahead of it, then beside it.
 
@@ -171,22 +187,18 @@ def _before(T_world_camera: FloatArray, distance: float) -> FloatArray:
     return board
 
 
-def _sees(
-    model: Any,
-    data: Any,
-    arm: Arm,
-    q: FloatArray,
-    T_world_camera: FloatArray,
-    board: FloatArray,
-    lowest_m: float,
-) -> bool:
-    """Tell whether the board is high enough, with nothing of the arm before it."""
-    distance = np.linalg.norm(board[:3, 3] - T_world_camera[:3, 3])
-    side = np.linspace(-_SPAN, _SPAN, 5) * distance
+def _grid(board: FloatArray, half_side: float) -> FloatArray:
+    """Return points (25, 3) all over a board at a pose (4, 4)."""
+    side = np.linspace(-half_side, half_side, 5)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
-    points = board[:3, 3] + np.outer(x, board[:3, 0]) + np.outer(y, board[:3, 1])
-    if min(points[:, 2].min(), T_world_camera[2, 3]) < lowest_m:
-        return False
+    points: FloatArray = board[:3, 3] + np.outer(x, board[:3, 0]) + np.outer(y, board[:3, 1])
+    return points
+
+
+def _sees(
+    model: Any, data: Any, arm: Arm, q: FloatArray, T_world_camera: FloatArray, points: FloatArray
+) -> bool:
+    """Tell whether nothing of the arm at q is before points (N, 3)."""
     for name, position in zip(arm.axis_names, axis_positions(arm.chain, q), strict=True):
         data.joint(name).qpos[0] = position
     mujoco.mj_kinematics(model, data)
