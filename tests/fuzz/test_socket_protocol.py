@@ -1,0 +1,99 @@
+"""Both ends of the example's socket, and what may come over it."""
+
+import json
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from driver import SocketDriver
+from hypothesis import given
+from hypothesis import strategies as st
+from link import Link, LinkBrokenError
+from untrusted import mutants
+
+from robot import read_answer
+from vergence.camera import Camera
+from vergence.errors import DriverSilent
+
+ANSWER = json.dumps({"period": 3, "setpoints": {"puma": [[0.1, -2.0], [0.0, 1e-3]]}}).encode()
+STATE = json.dumps(
+    {
+        "period": 4,
+        "time": 0.25,
+        "joints": {"puma": [[0.1, -2.0], [0.0, 1e-3]]},
+        "images": [["wrist", 0.2]],
+    }
+).encode()
+ARM: Any = SimpleNamespace(joint_count=2)
+LONGEST = 1 << 16
+
+
+def framed(message: bytes) -> bytes:
+    return len(message).to_bytes(4, "big") + message
+
+
+@pytest.fixture
+def pair() -> Iterator[Callable[[], tuple[socket.socket, socket.socket]]]:
+    made: list[socket.socket] = []
+
+    def make() -> tuple[socket.socket, socket.socket]:
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            near = socket.create_connection(listener.getsockname())
+            far, _ = listener.accept()
+        made.extend((near, far))
+        return near, far
+
+    yield make
+    for each in made:
+        each.close()
+
+
+@given(mutants(ANSWER))
+def test_a_set_point_is_one_or_breaks_the_link(message: bytes) -> None:
+    try:
+        period, setpoints = read_answer(message, 5, {"puma": ARM})
+    except LinkBrokenError:
+        return
+    assert 0 <= period <= 5
+    for setpoint in setpoints.values():
+        assert setpoint.position.shape == setpoint.velocity.shape == (2,)
+        assert np.isfinite(setpoint.position + setpoint.velocity).all()
+
+
+@given(st.lists(st.binary(max_size=300), max_size=5), st.integers(1, 50))
+def test_messages_come_as_they_were_sent_in_whatever_pieces(
+    pair: Callable[[], tuple[socket.socket, socket.socket]], sent: Sequence[bytes], size: int
+) -> None:
+    near, far = pair()
+    link = Link(near, LONGEST)
+    data = b"".join(map(framed, sent))
+    for start in range(0, len(data), size):
+        far.sendall(data[start : start + size])
+    assert [link.receive(5.0) for _ in sent] == list(sent)
+    assert link.receive(0.0) is None
+
+
+@given(mutants(framed(STATE) + framed(bytes(12)) + framed(STATE)))
+def test_whatever_the_robot_says_is_a_state_or_a_silent_driver(
+    pair: Callable[[], tuple[socket.socket, socket.socket]], data: bytes
+) -> None:
+    near, far = pair()
+    driver = SocketDriver.__new__(SocketDriver)
+    vars(driver).update(
+        arms={"puma": ARM}, cameras={"wrist": Camera(4, 3, 5.0, 5.0, 1.5, 1.0)}, videos=()
+    )
+    vars(driver).update(_timeout_s=0.2, _period=0, time=0.0, _frames=[], _link=Link(near, LONGEST))
+    vars(driver).update(_history={"puma": SimpleNamespace(add=lambda _: None, at=lambda _: None)})
+    far.sendall(data)
+    far.close()
+    for _ in range(2):
+        try:
+            driver._receive()
+        except DriverSilent:
+            break
+        sample = driver.read()
+        assert np.isfinite(sample.joints["puma"].position).all()
+        assert all(frame.image.shape == (3, 4) for frame in sample.frames)
