@@ -17,6 +17,9 @@ from vergence.experiments.trial import Trial, TrialResult
 
 _CONNECT_S = 10
 _CHUNK = 256  # quick trials handed out at once: about a second of one core
+_NO_PAGES: dict[str, list[str]] = {
+    f"distributed.{role}.http.routes": [] for role in ("scheduler", "worker")
+}
 _SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
 
 
@@ -102,11 +105,16 @@ class Crew:
                 yield client
             return
         with (
+            import_module("dask").config.set(_NO_PAGES),
             distributed.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=":0",  # any free port
+                host="127.0.0.1",
+                # Workers run what they are sent: only who has this run's certificate is heard.
+                security=distributed.Security.temporary(),
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.ERROR,
             ) as cluster,
             distributed.Client(cluster) as client,
