@@ -37,7 +37,7 @@ class TransposeLaw:
 
 
 def main() -> None:
-    settings = {"target.features": SQUARE, "target.motion": '{ kind = "still" }'}
+    settings = {"target.features": SQUARE, "target.motion": '{ kind = "stationary" }'}
     driver = SimulatedDriver(load_cell("puma560", settings), images=False)
     truth = driver.first_frame("wrist").truth
     assert truth is not None

@@ -37,7 +37,7 @@ def servo(driver: SimulatedDriver, law: Law, desired_px: np.ndarray, folder: Pat
 def main() -> None:
     for name in ("plain", "constrained"):
         driver = SimulatedDriver(
-            load_cell("ur5", {"target.motion": '{ kind = "still" }'}), images=False
+            load_cell("ur5", {"target.motion": '{ kind = "stationary" }'}), images=False
         )
         arm, camera = driver.world.arm_to_camera("wrist"), driver.cameras["wrist"]
         truth = driver.first_frame("wrist").truth

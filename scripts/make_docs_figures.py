@@ -73,7 +73,7 @@ def compare() -> None:
     lines = []
     for cell, spread in COMPARED:
         options = ("--laws", LAWS, "--starts", str(STARTS), "--spread", str(spread))
-        still = ("--set", 'target.motion={kind="still"}', "--set", "duration_s=8")
+        still = ("--set", 'target.motion={kind="stationary"}', "--set", "duration_s=8")
         found = answer(f"laws-{cell}-{spread}", "compare", cell, *options, *still)
         lines += [f"**{cell}**, starts over {spread:.0%} of the joints' ranges", ""]
         lines += [*_table(found["laws"]), ""]

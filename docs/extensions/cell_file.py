@@ -61,13 +61,19 @@ def reference() -> Iterator[str]:
     yield from _parts()
 
 
+_ROLES = (  # of parts, and where they stand in the file
+    ("objective", "law"), ("limits", "law.limits"), ("solver", "law.solver"),
+    ("motion", "target.motion"), ("arm_motion", "arms.NAME.motion"),
+)  # fmt: skip
+
+
 def _parts() -> Iterator[str]:
     """Yield the sections of the law: the servo, its solvers, limits and objectives."""
     yield from ("(the-law)=", "## The law", "")
     settings = find("law", "servo")
     yield from (_text(settings), "")
     yield from _part(settings)
-    for role, place in (("limits", "law.limits"), ("solver", "law.solver"), ("objective", "law")):
+    for role, place in _ROLES:
         for kind in kinds(role):
             cls = find(role, kind)
             title = f"`[{place}]`"

@@ -68,11 +68,11 @@ def slot(role: str, default: Any = ..., *, many: bool = False, by_class: bool = 
 
 
 @dataclass_transform(frozen_default=True)
-def part(role: str, kind: str = "") -> Callable[[C], C]:
+def part(role: str | tuple[str, ...], kind: str = "") -> Callable[[C], C]:
     """Declare a class as a part.
 
     Args:
-        role: what it is for: "objective", "limit", "solver" …
+        role: what it is for: "objective", "limit", "solver" …, or several such.
         kind: its name in a cell file; ``module:Class`` without one.
 
     Its constructor raises `InputError` that names the field and what it may be.
@@ -97,11 +97,12 @@ def part(role: str, kind: str = "") -> Callable[[C], C]:
     return declare
 
 
-def as_part(role: str, kind: str = "") -> Callable[[C], C]:
+def as_part(role: str | tuple[str, ...], kind: str = "") -> Callable[[C], C]:
     """Declare a class as a part without making a dataclass of it, such as a feature."""
 
     def declare(cls: C) -> C:
-        cls.__part_role__ = role  # type: ignore[attr-defined]
+        roles = (role,) if isinstance(role, str) else role
+        cls.__part_roles__ = roles  # type: ignore[attr-defined]
         cls.__part_kind__ = kind or f"{cls.__module__}:{cls.__qualname__}"  # type: ignore[attr-defined]
         return cls
 
@@ -110,12 +111,7 @@ def as_part(role: str, kind: str = "") -> Callable[[C], C]:
 
 def is_part(value: object) -> bool:
     """Tell whether a class, or what it is an instance of, was declared with `part`."""
-    return hasattr(value, "__part_role__")
-
-
-def role_of(value: Any) -> str:
-    """Return the role of a part or of its class."""
-    return str(value.__part_role__)
+    return hasattr(value, "__part_roles__")
 
 
 def kind_of(value: Any) -> str:

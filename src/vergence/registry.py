@@ -17,6 +17,7 @@ from vergence.errors import InputError, nearest
 ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.centre"
 
 _CONTROL = "vergence.control"
+_MOTIONS = "vergence.simulation.motions"
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "feature": {"points": "vergence.features:Points"},
     "objective": {
@@ -27,6 +28,15 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "posture": f"{_CONTROL}.objectives:Posture",
     },
     "limit": {},
+    "motion": {
+        "stationary": f"{_MOTIONS}:Stationary",
+        "line": f"{_MOTIONS}:Line",
+        "circle": f"{_MOTIONS}:Circle",
+        "step": f"{_MOTIONS}:Step",
+        "random": f"{_MOTIONS}:Random",
+        "poses": f"{_MOTIONS}:PoseMotion",
+    },
+    "arm_motion": {"joints": f"{_MOTIONS}:JointMotion", "poses": f"{_MOTIONS}:PoseMotion"},
     "limits": {"limits": f"{_CONTROL}.limits:Limits"},
     "law": {"servo": f"{_CONTROL}:ServoSettings"},
     "term": {"term": f"{_CONTROL}:WeightedObjective"},
@@ -41,6 +51,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "feature": ("value", "interaction"),
     "objective": ("quadratic",),
     "limit": ("rows",),
+    "motion": ("poses",),
 }
 
 
@@ -86,9 +97,9 @@ def find(
         raise refuse(f"but {name} has no {attribute}")
     if not isinstance(found, type):
         raise refuse("which is no class")
-    declared = getattr(found, "__part_role__", None)
-    if declared != role:
-        what = "declared as nothing" if declared is None else f"declared as {declared}"
+    declared = getattr(found, "__part_roles__", ())
+    if role not in declared:
+        what = f"declared as {' and '.join(declared) or 'nothing'}"
         raise refuse(f"which is {what}")
     missing = [method for method in METHODS.get(role, ()) if not hasattr(found, method)]
     if missing:

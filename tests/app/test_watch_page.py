@@ -12,7 +12,7 @@ from watched import Watched
 from vergence.runtime.recording import Recording
 
 SMALL = ("resolution=[320, 240]", "pixel_um=[22.0, 26.0]")  # of puma560: the same view, quicker
-STILL = "target.motion={kind = 'still'}"
+STILL = "target.motion={kind = 'stationary'}"
 
 ROWS = "watch.plots.rows.length"
 TIME = "watch.plots.rows.at(-1)?.[0] ?? -1"

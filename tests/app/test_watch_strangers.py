@@ -38,7 +38,7 @@ WRONG = (
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
     folder = tmp_path_factory.mktemp("watch") / "run"
-    still = "target.motion={kind = 'still'}"
+    still = "target.motion={kind = 'stationary'}"
     command = Watched("puma560", "--no-images", "--out", str(folder), "--set", still)
     yield command
     command.end()

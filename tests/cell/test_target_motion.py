@@ -3,25 +3,18 @@
 import numpy as np
 import pytest
 
-from vergence.cell.schema import (
-    CircleMotion,
-    LineMotion,
-    Placement,
-    RandomMotion,
-    StepMotion,
-    StillMotion,
-)
+from vergence.cell.schema import Placement
+from vergence.parts import kind_of
 from vergence.simulation import placement_pose, target_pose
+from vergence.simulation.motions import Circle, Line, Random, Stationary, Step
 
 START = Placement(position_m=(0.3, -0.2, 0.1), rotation_rpy_deg=(10.0, -20.0, 30.0))
 MOTIONS = [
-    StillMotion(),
-    LineMotion(kind="line", velocity_m_s=(0.1, 0.0, 0.2), distance_m=0.5, start_s=1.0),
-    CircleMotion(kind="circle", radius_m=0.2, period_s=4.0, start_s=1.0),
-    StepMotion(kind="step", offset_m=(0.1, 0.2, 0.3), time_s=1.0),
-    RandomMotion(
-        kind="random", amplitude_m=(0.1, 0.1, 0.1), amplitude_rpy_deg=(5, 5, 5), start_s=1
-    ),
+    Stationary(),
+    Line(velocity_m_s=(0.1, 0.0, 0.2), distance_m=0.5, start_s=1.0),
+    Circle(radius_m=0.2, period_s=4.0, start_s=1.0),
+    Step(offset_m=(0.1, 0.2, 0.3), time_s=1.0),
+    Random(amplitude_m=(0.1, 0.1, 0.1), amplitude_rpy_deg=(5, 5, 5), start_s=1),
 ]
 
 
@@ -30,14 +23,14 @@ def positions(motion, times: np.ndarray, seed: int = 0) -> np.ndarray:
     return np.array([pose(time)[:3, 3] for time in times]) - START.position_m
 
 
-@pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.kind)
+@pytest.mark.parametrize("motion", MOTIONS, ids=kind_of)
 def test_it_starts_where_it_is_placed_and_waits_for_its_time(motion) -> None:
     pose = target_pose(START, motion, 0)
     for time in (0.0, 0.5, 0.999):
         np.testing.assert_allclose(pose(time), placement_pose(START), atol=1e-15)
 
 
-@pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.kind)
+@pytest.mark.parametrize("motion", MOTIONS, ids=kind_of)
 def test_it_stays_a_rigid_motion(motion) -> None:
     pose = target_pose(START, motion, 0)
     for time in np.linspace(0, 9, 19):

@@ -71,7 +71,7 @@ def twisted_start(cell, turn):
 
 
 def test_a_spare_joint_is_drawn_to_better_postures():
-    cell = load_cell("panda", {"target.motion": "{ kind = 'still' }", "duration_s": "8"})
+    cell = load_cell("panda", {"target.motion": "{ kind = 'stationary' }", "duration_s": "8"})
     cell = cell.replace(arms={"panda": {"start_deg": twisted_start(cell, 0.8)}})
     measure = {}
     for S in (0.0, 1e-5):

@@ -61,7 +61,8 @@ def keys() -> list[str]:
         for kind in kinds(role):
             found += [f"law.{below}{key}" for key in field_names(find(role, kind))]
     found += [f"law.{key}" for key in (*field_names(ServoSettings), "kind", "weight", "camera")]
-    found += [f"target.motion.{key}" for key in TABLES["random"].model_fields]
+    for kind in kinds("motion"):
+        found += [f"target.motion.{key}" for key in field_names(find("motion", kind))]
     odd = ["", ".", "a..b", "$\\bad{$", "laws.$\\bad{$", "x" * 30_000, ".".join("a" * 9000)]
     return [*found, *load_cell("four_cameras").model_dump(), *odd]
 

@@ -39,7 +39,7 @@ from vergence.parts import kind_of
 from vergence.runtime import Run, RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
-QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'still' }"}
+QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'stationary' }"}
 ALONE = Crew(workers=1)
 RUN_TRIAL = "vergence.experiments.run_trial"
 
@@ -172,7 +172,7 @@ def test_endings_are_told_apart(source):
     far = heading_trials(cell, 3.0, 1, (3.0,), law="image_based")[0]
     assert run_trial(source, far, 2.0).ending is Ending.OUT_OF_VIEW
     blind = Trial("blind", {**far.changes, "cameras": {"wrist": {"blind_s": [[0.1, 9.0]]}}})
-    still = {**blind.changes, "target": {**far.changes["target"], "motion": {"kind": "still"}}}
+    still = {**blind.changes, "target": {**far.changes["target"], "motion": {"kind": "stationary"}}}
     assert run_trial(source, Trial("lost", still), 2.0).ending is Ending.LOST
 
 
@@ -181,7 +181,7 @@ def test_maps_cover_the_square_and_all_directions(source):
     places = place_trials(cell, 0.2, 3, 0.1)
     assert len({trial.key for trial in places}) == 9
     assert [t.labels["x_m"] for t in places[:3]] == [-0.2, 0.0, 0.2]
-    assert places[4].changes["target"]["motion"]["kind"] == "still"
+    assert places[4].changes["target"]["motion"]["kind"] == "stationary"
     headings = heading_trials(cell, 0.5, 4, (0.1, 0.2))
     assert len({trial.key for trial in headings}) == 8
     quarter = headings[5].changes["target"]["motion"]["velocity_m_s"]
@@ -219,7 +219,7 @@ def test_laws_are_found_by_name(tmp_path):
 
 @pytest.mark.parametrize(("name", "seconds"), [("lippiello2005", "0.5"), ("eye_to_hand_pose", "4")])
 def test_a_campaign_holds_the_pose_a_cell_follows_fast(name, seconds):
-    changed = {"duration_s": seconds, "target.motion": "{ kind = 'still' }"}
+    changed = {"duration_s": seconds, "target.motion": "{ kind = 'stationary' }"}
     cell, source = load_cell(name, changed), CellSource.of(name, changed, None)
     aim = Aim.of(cell)
     again = Aim.of(cell.replace(**aim.tables))

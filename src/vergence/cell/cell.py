@@ -23,7 +23,7 @@ from vergence.cell.schema import (
 from vergence.cell.settings_text import settings_text
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
-from vergence.loading import Place
+from vergence.loading import Place, load_part
 from vergence.places import find_cell
 from vergence.registry import find
 from vergence.validation import explain
@@ -145,7 +145,7 @@ def _other_kind(old: Mapping[str, Any], change: Mapping[str, Any]) -> bool:
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = _with_laws(_with_calibrations(values, path), path)
+    values = _with_motions(_with_laws(_with_calibrations(values, path), path), path)
     try:
         cell = Cell.model_validate(values)
     except ValidationError as error:
@@ -174,6 +174,29 @@ def _with_laws(values: dict[str, Any], path: Path) -> dict[str, Any]:
         "law": law("law", values["law"]),
         "laws": {name: law(f"laws.{name}", table) for name, table in laws.items()},
     }
+
+
+def _with_motions(values: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Put in the motions of the target and of the arms."""
+
+    def with_motion(table: Any, role: str, key: str, default: str | None) -> Any:
+        if not isinstance(table, Mapping):
+            return table  # what cannot be one is left as it is
+        given = table.get("motion")
+        if given is None and default is None:
+            return table
+        place = Place(str(path), f"{key}.motion", path.parent)
+        return {**table, "motion": load_part(role, given or {"kind": default}, place)}
+
+    changed = dict(values)
+    if "target" in values:
+        changed["target"] = with_motion(values["target"], "motion", "target", "stationary")
+    if isinstance(arms := values.get("arms"), Mapping):
+        changed["arms"] = {
+            name: with_motion(table, "arm_motion", f"arms.{name}", None)
+            for name, table in arms.items()
+        }
+    return changed
 
 
 def _with_calibrations(values: dict[str, Any], path: Path) -> dict[str, Any]:

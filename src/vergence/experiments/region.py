@@ -92,7 +92,7 @@ def _going(x: float, y: float, speed: float) -> dict[str, Any]:
     """Return the motion to an offset in the world's x-y plane, and the time it takes."""
     distance = float(np.hypot(x, y))
     if distance < 1e-9:
-        return {"target": {"motion": {"kind": "still"}}, "duration_s": _SETTLE_S}
+        return {"target": {"motion": {"kind": "stationary"}}, "duration_s": _SETTLE_S}
     velocity = [round(speed * float(along) / distance, 9) for along in (x, y)] + [0.0]
     motion = {"kind": "line", "velocity_m_s": velocity, "distance_m": round(distance, 9)}
     duration = round(distance / speed + _SETTLE_S, 6)

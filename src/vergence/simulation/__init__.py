@@ -1,13 +1,8 @@
 """The cell in simulation: world, rendering, simulated and kinematic drivers, target motions."""
 
 from vergence.simulation.ideal_driver import IdealCell, IdealDriver
-from vergence.simulation.motion import (
-    TargetPose,
-    TargetPoses,
-    placement_pose,
-    target_pose,
-    target_poses,
-)
+from vergence.simulation.motion import placement_pose, target_pose, target_poses
+from vergence.simulation.motions import Motion, TargetPose, TargetPoses
 from vergence.simulation.renderer import CameraRenderer, choose_renderer
 from vergence.simulation.simulated_driver import SimulatedDriver
 
@@ -15,6 +10,7 @@ __all__ = [
     "CameraRenderer",
     "IdealCell",
     "IdealDriver",
+    "Motion",
     "SimulatedDriver",
     "TargetPose",
     "TargetPoses",

@@ -7,11 +7,10 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.cell.cell import Cell
-from vergence.cell.schema import JointMotion
 from vergence.errors import InputError
 from vergence.geometry import se3_compose, se3_inverse, se3_log
 from vergence.robot import Arm, Chain, forward_kinematics, jacobian
-from vergence.simulation.waypoints import through_poses, through_waypoints
+from vergence.simulation.motions import JointMotion
 
 _NEWTON_STEPS = 8
 _CLOSE = 1e-9  # m and rad
@@ -46,15 +45,15 @@ def arm_trajectory(cell: Cell, name: str, arm: Arm, start: FloatArray) -> JointT
     assert motion is not None
     source, key = str(cell.path), f"arms.{name}.motion"
     dt = 1.0 / cell.inner_rate_hz
-    last = int(np.ceil(motion.times_s[-1] / motion.speed / dt))
+    last = int(np.ceil(motion.duration_s / dt))
     times: FloatArray = np.linspace(0.0, last * dt, last + 1)
     if isinstance(motion, JointMotion):
         position = _through_joints(motion, arm, start, times, source, key)
     else:
-        poses = through_poses(motion, arm.forward_kinematics(start), times)
+        poses = motion.poses(arm.forward_kinematics(start), times)
         position, reached = trace_poses(arm.chain, start, poses)
         if reached < len(poses):
-            given = f"a way that at {reached * dt:.2f} s leads out of reach"
+            given = f"a path that at {reached * dt:.2f} s leads out of reach"
             raise InputError(source, key, given, "poses that the arm reaches")
     trajectory = JointTrajectory(position, np.gradient(position, dt, axis=0))
     _check_limits(trajectory, arm, dt, source, key)
@@ -69,7 +68,7 @@ def _through_joints(
         allowed = f"{arm.joint_count} values a way-point: {', '.join(arm.names)}"
         raise InputError(source, f"{key}.offsets_deg", f"{offsets.shape[1]} values", allowed)
     offsets *= np.where(arm.sliding, 1.0, np.pi / 180)
-    return start + through_waypoints(motion, offsets, times)
+    return start + motion.through(offsets, times)
 
 
 def _check_limits(trajectory: JointTrajectory, arm: Arm, dt: float, source: str, key: str) -> None:

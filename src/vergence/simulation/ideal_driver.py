@@ -11,7 +11,7 @@ from vergence.camera import Camera, picture_tick
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm
 from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
-from vergence.simulation.motion import TargetPoses
+from vergence.simulation.motions import TargetPoses
 
 ARM, CAMERA = "arm", "camera"
 

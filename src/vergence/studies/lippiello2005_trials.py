@@ -10,10 +10,10 @@ from vergence.arrays import FloatArray
 from vergence.assembly import run_cell
 from vergence.assembly.pose import follow_pose, target_shape
 from vergence.cell import Cell
-from vergence.cell.schema import PoseMotion
 from vergence.runtime.results import PoseErrors, angle_between
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
+from vergence.simulation.motions import PoseMotion
 
 # The paper's state, Q and R; trajectory planner without feed-forward or prediction. R = 9 px² is
 # what calibration left, so the cameras' poses are known that well: off by two or three pixels. How

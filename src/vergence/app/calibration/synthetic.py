@@ -184,7 +184,7 @@ class Studio:
         target = {
             "model": _write_model(folder, self.board),
             "carried_by": self.arm if self.fixed else None,
-            "motion": {"kind": "still"},
+            "motion": {"kind": "stationary"},
             "features": None,
             **_placement(T),
         }

@@ -1,8 +1,10 @@
 """What every table of a cell file is made of: a range, with both ends, for every number."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints
+
+from vergence.parts import table_of
 
 # Ranges are those of machines: what lies outside is a slip of the pen or of the unit, and would
 # take terabytes or years to simulate.
@@ -31,6 +33,13 @@ Name = Annotated[str, StringConstraints(pattern=r"^\w[\w .-]{0,63}$")]  # of wha
 
 MOST_JOINTS = 64
 MOST_POINTS = 1000
+
+
+def _written(part: Any) -> dict[str, Any] | None:
+    return None if part is None else table_of(part)
+
+
+Part = Annotated[Any, PlainSerializer(_written)]  # as its declaration reads it, see `registry`
 
 
 class Table(BaseModel):

@@ -9,12 +9,12 @@ from vergence.cell.schema.base import (
     MOST_JOINTS,
     MOST_POINTS,
     Angle,
-    Angles3,
     Distance,
     Duration,
     JointRate,
     Length,
     Name,
+    Part,
     Pixels,
     Placement,
     Point2,
@@ -24,8 +24,8 @@ from vergence.cell.schema.base import (
     Text,
     Time,
     Vector3,
-    Velocity3,
 )
+from vergence.parts import kind_of
 
 _MOST_WAYPOINTS = 1000
 _Side = Annotated[int, Field(ge=16, le=8192)]
@@ -49,53 +49,6 @@ class SceneTable(Table):
     light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of every lamp
 
 
-class Waypoints(Table):
-    """Way-points of a motion of its own, with rest at each and minimum jerk between them."""
-
-    times_s: tuple[Time, ...] = Field(
-        min_length=2, max_length=_MOST_WAYPOINTS
-    )  # first 0, increasing
-    speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0  # the times are divided by it
-
-    @model_validator(mode="after")
-    def _one_each(self) -> "Waypoints":
-        if self.times_s[0] != 0 or any(
-            b <= a for a, b in zip(self.times_s, self.times_s[1:], strict=False)
-        ):
-            raise ValueError("times_s that begin with 0 and increase")
-        for name, value in self:
-            if isinstance(value, tuple) and len(value) != len(self.times_s):
-                raise ValueError(f"as many {name} as times_s")
-        return self
-
-
-class JointMotion(Waypoints):
-    """The arm moves its joints through way-points, relative to its start."""
-
-    kind: Literal["joints"]
-    offsets_deg: Annotated[
-        tuple[_Joints, ...], Field(max_length=_MOST_WAYPOINTS)
-    ]  # metres for sliding joints
-
-
-class PoseMotion(Waypoints):
-    """An arm moves its last body, or the target it carries; or a target moves by itself.
-
-    A way-point is the pose in the frame that the body or target had at the start.
-    """
-
-    kind: Literal["poses"]
-    positions_m: Annotated[
-        tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)
-    ]  # one for each time
-    rotations_rpy_deg: Annotated[
-        tuple[Angles3, ...], Field(max_length=_MOST_WAYPOINTS)
-    ]  # one for each time
-
-
-ArmMotion = Annotated[JointMotion | PoseMotion, Field(discriminator="kind")]
-
-
 class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
@@ -109,7 +62,7 @@ class ArmTable(Placement):
         None  # m/s² for sliding joints; 720 or 2 if absent
     )
     servo_bandwidth_hz: Rate = 12.0  # of the joint servos that stand for the robot's own
-    motion: ArmMotion | None = None  # what it does by itself; without one the loop holds it
+    motion: Part = None  # what it does by itself; without one the loop holds it
 
 
 class CameraTable(Placement):
@@ -154,65 +107,21 @@ class CameraTable(Placement):
         return intervals
 
 
-class StillMotion(Table):
-    """The target stands."""
-
-    kind: Literal["still"] = "still"
-
-
-class LineMotion(Table):
-    """The target moves along a line, then stands."""
-
-    kind: Literal["line"]
-    velocity_m_s: Velocity3  # in the world
-    distance_m: Length  # after which it stops
-    start_s: Time = 0.0  # stands until then
-
-
-class CircleMotion(Table):
-    """The target moves on a horizontal circle that starts at its placement."""
-
-    kind: Literal["circle"]
-    radius_m: Length  # of the circle
-    period_s: Duration  # of once around
-    start_s: Time = 0.0  # stands until then
-
-
-class StepMotion(Table):
-    """The target jumps."""
-
-    kind: Literal["step"]
-    offset_m: Vector3  # in the world
-    time_s: Time  # when
-
-
-class RandomMotion(Table):
-    """The target wanders smoothly: a few sinusoids of random phase on every axis."""
-
-    kind: Literal["random"]
-    amplitude_m: Vector3  # along the world's axes
-    amplitude_rpy_deg: Angles3 = (0.0, 0.0, 0.0)  # about them
-    fastest_hz: Rate = 0.3  # of the sinusoids
-    start_s: Time = 0.0  # stands until then
-
-
-Motion = Annotated[
-    StillMotion | LineMotion | CircleMotion | StepMotion | RandomMotion | PoseMotion,
-    Field(discriminator="kind"),
-]
-
-
 class TargetTable(Placement):
     """The object; its placement is where its motion starts, or its pose in what carries it."""
 
     model: Path  # MJCF or URDF
     carried_by: Text | None = None  # an arm, whose last body it is fixed to
-    motion: Motion = StillMotion()  # what it does by itself
+    motion: Part = None  # what it does by itself; stationary if absent
     features: _Features | None = None  # m, in the target; picked in the image if absent
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":
-        if self.carried_by is not None and self.motion.kind != "still":
+        if (
+            self.carried_by is not None
+            and self.motion is not None
+            and kind_of(self.motion) != "stationary"
+        ):
             raise ValueError("either carried_by or a motion of its own")
         return self
 

@@ -1,0 +1,98 @@
+"""From rest to rest through way-points."""
+
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError
+from vergence.geometry import rpy_to_matrix, se3
+from vergence.parts import knob, part
+from vergence.simulation.motions.motion import Angle, Angles3, Vector3
+
+_MOST_WAYPOINTS = 1000
+_Time = Annotated[float, Field(ge=0, le=86400)]
+_Times = Annotated[tuple[_Time, ...], Field(min_length=2, max_length=_MOST_WAYPOINTS)]
+
+
+def smooth_step(share: FloatArray) -> FloatArray:
+    """Return 10 s³ - 15 s⁴ + 6 s⁵: from rest to rest with the least jerk, s from 0 to 1."""
+    s = np.clip(share, 0.0, 1.0)
+    result: FloatArray = s**3 * (10.0 + s * (6.0 * s - 15.0))
+    return result
+
+
+class Waypoints:
+    """What motions through way-points share: rest at each and minimum jerk between them."""
+
+    times_s: tuple[float, ...]
+    speed: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last way-point, s."""
+        return self.times_s[-1] / self.speed
+
+    def through(self, values: FloatArray, times: FloatArray) -> FloatArray:
+        """Return the path through values (W, …) of the way-points at times (K,): (K, …)."""
+        knots = np.array(self.times_s) / self.speed
+        leg = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+        share = smooth_step((times - knots[leg]) / (knots[leg + 1] - knots[leg]))
+        path: FloatArray = values[leg] + share[:, None] * (values[leg + 1] - values[leg])
+        return path
+
+    def _check(self, *lists: str) -> None:
+        times = self.times_s
+        if times[0] != 0 or any(b <= a for a, b in pairwise(times)):
+            allowed = "times_s that begin with 0 and increase"
+            raise InputError(type(self).__name__, "times_s", list(times), allowed)
+        for name in lists:
+            count = len(getattr(self, name))
+            if count != len(times):
+                raise InputError(
+                    type(self).__name__, name, f"{count} values", f"as many {name} as times_s"
+                )
+
+
+@part(("motion", "arm_motion"), "poses")
+class PoseMotion(Waypoints):
+    """An arm moves its last body, or the target it carries; or a target moves by itself.
+
+    A way-point is the pose in the frame that the body or target had at the start.
+    """
+
+    times_s: _Times = knob(unit="s")  # of the way-points, first 0, increasing
+    positions_m: Annotated[tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
+        unit="m"
+    )  # one for each time
+    rotations_rpy_deg: Annotated[tuple[Angles3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
+        unit="°"
+    )  # one for each time
+    speed: float = knob(1.0, least=1e-3, upto=1e3)  # the times are divided by it
+
+    def __post_init__(self) -> None:
+        self._check("positions_m", "rotations_rpy_deg")
+
+    def poses(self, T_start: FloatArray, times: FloatArray, seed: int = 0) -> FloatArray:
+        """Return the poses (K, 4, 4)."""
+        roll_pitch_yaw = np.deg2rad(self.rotations_rpy_deg)
+        values = np.hstack((np.array(self.positions_m), roll_pitch_yaw[:, ::-1]))
+        path = self.through(values, times)
+        return np.array([T_start @ se3(rpy_to_matrix(row[3:]), row[:3]) for row in path])
+
+
+@part("arm_motion", "joints")
+class JointMotion(Waypoints):
+    """The arm moves its joints through way-points, relative to its start."""
+
+    times_s: _Times = knob(unit="s")  # of the way-points, first 0, increasing
+    offsets_deg: Annotated[
+        tuple[Annotated[tuple[Angle, ...], Field(max_length=64)], ...],
+        Field(max_length=_MOST_WAYPOINTS),
+    ] = knob(unit="°")  # one row for each time; metres for sliding joints
+    speed: float = knob(1.0, least=1e-3, upto=1e3)  # the times are divided by it
+
+    def __post_init__(self) -> None:
+        self._check("offsets_deg")
