@@ -7,7 +7,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.errors import InputError, nearest
-from vergence.robot.chain import Chain, forward_kinematics, jacobian
+from vergence.robot.chain import Chain, axis_positions, forward_kinematics, jacobian
 
 if TYPE_CHECKING:
     import mujoco
@@ -107,6 +107,12 @@ class Arm:
         """Return the tip's Jacobian (6, n) in the tip's own axes: v_tip = J q̇."""
         J: FloatArray = jacobian(self.chain, frozen(q, (self.joint_count,), "q"))
         return J
+
+    def axis_positions(self, q: FloatArray) -> FloatArray:
+        """Return how far joint positions q (n,) move every axis of the chain, (m,), rad or m."""
+        positions = frozen(q, (self.joint_count,), "q")
+        coupled = len(self.chain.coupling) > 0
+        return axis_positions(self.chain, positions) if coupled else positions
 
     def outside(self, q: FloatArray) -> BoolArray:
         """Tell which joints of q (n,) are at or beyond a limit, (n,)."""

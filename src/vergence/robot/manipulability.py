@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.robot.chain import Chain, axes_jacobian, joint_columns
+from vergence.robot.chain import Chain, axis_positions, jacobian_at, joint_columns
 from vergence.robot.positive_definite import (
     invert_spd,
     invert_spd_any,
@@ -137,8 +137,12 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
 
     Where σ < damping, λ² = (damping - σ)²: the inverse stays bounded through a singularity.
     """
-    J_axes = axes_jacobian(chain, q)
-    J = joint_columns(chain, J_axes, len(q))
+    if len(chain.coupling) == 0:
+        J_axes = jacobian_at(chain, q)
+        J = J_axes
+    else:
+        J_axes = jacobian_at(chain, axis_positions(chain, q))
+        J = joint_columns(chain, J_axes, len(q))
     A = outer_square(J)
     inverse, det_JJt = invert_spd(A) if J.shape[1] >= 6 else pseudo_invert_square(J)
     trace = 0.0

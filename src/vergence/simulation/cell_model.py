@@ -13,7 +13,6 @@ from vergence.cell.joint_positions import joint_accelerations, joint_positions, 
 from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion, se3_inverse
 from vergence.robot import Arm
-from vergence.robot.chain import axis_positions
 from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics
 from vergence.simulation.motion import placement_pose
@@ -116,8 +115,7 @@ class CellModel:
 
     def write_position(self, data: Any, arm: str, position: FloatArray) -> None:
         """Write an arm's joint positions (n,) into a state, joints that follow them among them."""
-        chain = self.arms[arm].chain
-        data.qpos[self._axis_qpos[arm]] = axis_positions(chain, np.asarray(position, np.float64))
+        data.qpos[self._axis_qpos[arm]] = self.arms[arm].axis_positions(position)
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
         """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.

@@ -13,7 +13,6 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
 from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
-from vergence.robot.chain import axis_positions
 from vergence.robot.model_files import read_model
 from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import named_joints
@@ -199,7 +198,7 @@ def _sees(
     model: Any, data: Any, arm: Arm, q: FloatArray, T_world_camera: FloatArray, points: FloatArray
 ) -> bool:
     """Tell whether nothing of the arm at q is before points (N, 3)."""
-    for name, position in zip(arm.axis_names, axis_positions(arm.chain, q), strict=True):
+    for name, position in zip(arm.axis_names, arm.axis_positions(q), strict=True):
         data.joint(name).qpos[0] = position
     mujoco.mj_kinematics(model, data)
     eye = np.ascontiguousarray(T_world_camera[:3, 3])
