@@ -12,12 +12,13 @@ PYTEST_ARGS ?=
 export MUJOCO_GL ?= egl
 
 .PHONY: help setup test-images test-browser demo test docs bench peers format clean
-.PHONY: check lint lint-format lint-rules lint-types lint-page fuzz
+.PHONY: check test-wheel lint lint-format lint-rules lint-types lint-page fuzz
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
+	@echo "make test-wheel  build the wheel, install it into a bare environment and run a cell from it"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
 	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
 	@echo "make lint     formatting, lints and types only"
@@ -70,7 +71,10 @@ docs: $(INSTALLED)
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/_build
 	@echo "documentation: docs/_build/index.html"
 
-check: lint docs test
+test-wheel: setup
+	@scripts/try-wheel $(BIN)/python
+
+check: lint docs test test-wheel
 
 bench: setup
 	$(BIN)/python benchmarks/run.py

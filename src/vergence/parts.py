@@ -109,6 +109,23 @@ def as_part(role: str | tuple[str, ...], kind: str = "") -> Callable[[C], C]:
     return declare
 
 
+@dataclass_transform(frozen_default=True)
+def objective(cls: C) -> C:
+    """Declare a class with a method `quadratic` as an objective of one's own."""
+    return part("objective")(cls)
+
+
+@dataclass_transform(frozen_default=True)
+def limit(cls: C) -> C:
+    """Declare a class with a method `rows` as a limit of one's own."""
+    return part("limit")(cls)
+
+
+def feature(cls: C) -> C:
+    """Declare a class that inherits from `vergence.Feature` as a feature of one's own."""
+    return as_part("feature")(cls)
+
+
 def is_part(value: object) -> bool:
     """Tell whether a class, or what it is an instance of, was declared with `part`."""
     return hasattr(value, "__part_roles__")

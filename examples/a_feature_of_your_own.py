@@ -1,0 +1,29 @@
+"""A feature of one's own, the area of a triangle, stacked with its points."""
+
+import numpy as np
+
+import vergence as vg
+
+
+@vg.feature
+class Area(vg.Feature):
+    """Logarithm of the area of a triangle, a measure of its distance."""
+
+    def value(self) -> np.ndarray:
+        """Return s, (1,)."""
+        a, b, c = self.points
+        return np.log([abs(np.linalg.det([b - a, c - a])) / 2])
+
+    def interaction(self) -> np.ndarray:
+        """Return L (1, 6): the points' own, through ∂s/∂points."""
+        (a, b, c), (x, y) = self.points, self.points.T
+        twice = np.linalg.det([b - a, c - a])
+        slope = np.column_stack((np.roll(y, -1) - np.roll(y, 1), np.roll(x, 1) - np.roll(x, -1)))
+        return slope.reshape(1, -1) / twice @ vg.Points(self.points, self.depth_m).interaction()
+
+
+triangle = np.array([[-0.1, -0.1], [0.1, -0.1], [0.0, 0.1]])
+near, far = vg.Points(1.2 * triangle, 0.5), vg.Points(triangle, 0.6)
+stack = [vg.Term(vg.ImageBased()), vg.Term(vg.ImageBased(feature=Area), weight=0.5)]
+arm, q = vg.Arm.from_cell("puma560"), np.deg2rad([-125.6, 42.7, -172.7, 0, -50, 0])
+print(vg.Servo(arm, vg.Camera(640, 480, focal_px=600), stack).rates(near, far, q))
