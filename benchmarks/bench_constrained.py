@@ -1,6 +1,6 @@
 """One constrained tick: six and seven joints, four and nine points, every constraint in force.
 
-The peers do less: ViSP bends its law at joint limits, which it may pass; mink and pink hold joint
+The peers do less: ViSP changes its law at joint limits, which it may pass; mink and pink hold joint
 positions and rates while the flange goes to a pose, and know of no picture.
 """
 

@@ -167,7 +167,7 @@ def _arm(run: Run, name: str) -> str:
         _figure(
             run,
             constraints_figure(trace),
-            "What shaped the commands, and what gave way so that more important things were kept.",
+            "Limits that were active, and those that were relaxed so that others of higher priority hold.",
         ),
         _figure(
             run,

@@ -81,7 +81,7 @@ def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
 
 
 def constraint_rows(trace: ArmTrace) -> list[Row]:
-    """Return how often each constraint shaped the commands, and how far it gave way."""
+    """Return how often each limit was active, and by how much it was relaxed."""
     return [_constraint_row(trace, name) for name in constraint_names(trace)]
 
 
@@ -92,7 +92,7 @@ def _constraint_row(trace: ArmTrace, name: str) -> Row:
     if bent.any():
         worst, first = int(np.argmax(bent)), int(np.argmax(bent > 0.0))
         note += (
-            f"; gave way in {np.count_nonzero(bent)} ticks from {trace.time[first]:.2f} s on, by "
+            f"; relaxed in {np.count_nonzero(bent)} ticks from {trace.time[first]:.2f} s on, by "
             f"up to {bent[worst]:.2g} {_RATES.get(name, '1/s')} at {trace.time[worst]:.2f} s"
         )
     return Row(name, f"{100 * shaped.mean():.1f}", "%", note)
@@ -104,7 +104,7 @@ def _worst(distances: FloatArray) -> FloatArray:
     return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
 
 
-_RATES = {"joint margin": "rad/s or m/s"}  # of constraints that bend; the others have no length
+_RATES = {"joint margin": "rad/s or m/s"}  # of limits that can be relaxed; the others have no length
 
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
     "duration_s",

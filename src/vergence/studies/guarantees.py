@@ -236,7 +236,7 @@ def _outside_start(arm: Arm) -> Check:
 
 
 def _conflict(arm: Arm) -> Check:
-    """Let the target run off faster than the arm may follow: the view has to be given up."""
+    """Let the target run off faster than the arm may follow: the view has to be relaxed."""
     start = np.deg2rad(PUMA_START_DEG)
     cell = _line(arm, 6.0, 0.0)
     cell = replace(cell, features=_SQUARE, start=start)
@@ -246,7 +246,7 @@ def _conflict(arm: Arm) -> Check:
     lost = run.outcome.kind in (OutcomeKind.TARGET_LOST, OutcomeKind.COMPLETED)
     return Check(
         "conflict.named",
-        "what was given up is named; joint limits are not in it",
+        "what was relaxed is named; joint limits are not in it",
         len(named),
         "constraints",
         kept and lost and "view" in named and named <= set(RELAXED),

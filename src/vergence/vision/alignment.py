@@ -127,7 +127,7 @@ def resample(
     """Sample the area bilinearly at (x, y) + A u for every template pixel u, less the mean.
 
     The positions of a row are computed first, as vector code, then its pixels are gathered; the
-    unsigned indices spare numba the thought of negative ones. What lies outside is taken from the
+    unsigned indices avoid numba's negative-index check. What lies outside is taken from the
     nearest pixel inside.
     """
     first, last = -(PATCH_PX / 2 - 0.5), np.float32(AREA_PX - 1.001)

@@ -11,7 +11,7 @@ _PUSHED, _BENT = COLORS[4], COLORS[1]
 
 
 def constraints_figure(trace: ArmTrace) -> Panels | None:
-    """Draw when each constraint shaped the commands, and when it was given up."""
+    """Draw when each limit was active, and when it was relaxed."""
     names = constraint_names(trace)
     if not names:
         return None
@@ -20,7 +20,7 @@ def constraints_figure(trace: ArmTrace) -> Panels | None:
     for row, name in enumerate(names):
         pushed = np.array([name in active for active in trace.active])
         bent = np.array([name in slack for slack in trace.slack])
-        for label, when, color in (("pushed", pushed, _PUSHED), ("gave way", bent, _BENT)):
+        for label, when, color in (("pushed", pushed, _PUSHED), ("relaxed", bent, _BENT)):
             axes.broken_barh(
                 spans(trace.time, when),
                 (row - 0.35, 0.7),
