@@ -68,7 +68,7 @@ def test_what_gave_way_is_told_with_when_and_by_how_much(recording: Recording) -
     assert rows["joint rates"].value == f"{100 * pushed:.1f}"
     assert rows["joint rates"].note == "of the time"
     assert rows["view"].note == (
-        "of the time; gave way in 14 ticks from 2.03 s on, by up to 0.12 1/s at 2.47 s"
+        "of the time; relaxed in 14 ticks from 2.03 s on, by up to 0.12 1/s at 2.47 s"
     )
 
 
