@@ -104,7 +104,9 @@ def _worst(distances: FloatArray) -> FloatArray:
     return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
 
 
-_RATES = {"joint margin": "rad/s or m/s"}  # of limits that can be relaxed; the others have no length
+_RATES = {
+    "joint margin": "rad/s or m/s"
+}  # of limits that can be relaxed; the others have no length
 
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
     "duration_s",
