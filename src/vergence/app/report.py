@@ -167,7 +167,7 @@ def _arm(run: Run, name: str) -> str:
         _figure(
             run,
             constraints_figure(trace),
-            "Limits that were active, and those that were relaxed so that others of higher priority hold.",
+            "Limits that were active, and those relaxed for others of higher priority.",
         ),
         _figure(
             run,

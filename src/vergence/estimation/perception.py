@@ -250,7 +250,7 @@ class PosePerception(Generic[B]):
         return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
 
     def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:
-        """Drop a target that contradicts the images for too long; search for one that was dropped."""
+        """Drop a target that contradicts the images for too long; search for a dropped one."""
         belief = self._history.belief
         if not self._lost:
             if belief.seen == belief.time:
