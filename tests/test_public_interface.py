@@ -71,7 +71,7 @@ def test_a_mistake_in_a_run_is_said_in_one_sentence(cell: str, changes: dict, sa
 def test_laws_are_compared_in_one_table() -> None:
     table = vg.compare(
         "puma560", ["image_based", "constrained"], starts=2, spread=0.1, duration_s=0.5,
-        task={"feature_count": 4}, target={"motion": {"kind": "still"}},
+        task={"feature_count": 4}, target={"motion": {"kind": "stationary"}},
     )  # fmt: skip
     assert len(table.runs) == 4
     assert table.runs[3].labels == {"law": "constrained", "start": 1}
