@@ -19,8 +19,8 @@ def test_every_public_name_is_there_and_typed() -> None:
         for node in ast.parse(STUB.read_text()).body
         for alias in getattr(node, "names", [])
     }
-    assert typed == {*vg.__all__, "geometry"}
-    for name in (*vg.__all__, "geometry"):
+    assert typed == {*vg.__all__, "transforms"}
+    for name in (*vg.__all__, "transforms"):
         assert getattr(vg, name) is not None
         assert name in dir(vg)
 
@@ -119,3 +119,66 @@ def test_a_camera_has_its_principal_point_in_the_middle() -> None:
         camera.normalize([300, 180])
     with pytest.raises(vg.InputError, match="an array of numbers"):
         camera.normalize([["a", "b"]])
+
+
+URDF = """
+<robot name="two_joints">
+  <link name="base"/><link name="upper"/><link name="tool0"/>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="upper"/><origin xyz="0 0 0.5"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" velocity="1" effort="1"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="upper"/><child link="tool0"/><origin xyz="0.3 0 0"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="0.4" velocity="0.2" effort="1"/>
+  </joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> vg.Arm:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF)
+    return vg.Arm.from_urdf(path, tip="tool0")
+
+
+def test_an_arm_is_read_from_a_urdf_and_ends_where_its_tip_is_put(arm: vg.Arm) -> None:
+    assert arm.names == ("turn", "slide")
+    assert arm.q_max.tolist() == [2.0, 0.4]
+    turned = [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, 0.2], [0, 0, 0, 1]]
+    eye = arm.with_tip(turned)
+    q = [0.3, 0.1]
+    np.testing.assert_allclose(eye.forward_kinematics(q), arm.forward_kinematics(q) @ turned)
+    step, J = 1e-6, eye.jacobian(q)
+    T = eye.forward_kinematics(q)
+    for joint in range(2):
+        ahead = eye.forward_kinematics(np.add(q, step * np.eye(2)[joint]))
+        twist = vg.transforms.se3_log(np.linalg.inv(T) @ ahead) / step
+        np.testing.assert_allclose(J[:, joint], twist, atol=1e-5)
+
+
+def test_a_mistake_with_an_arm_names_what_is_wrong(arm: vg.Arm, tmp_path: Path) -> None:
+    with pytest.raises(vg.ShapeError, match=r"q has shape \(3,\); it must have shape \(2\)"):
+        arm.jacobian([0, 0, 0])
+    with pytest.raises(vg.InputError, match="a rotation and a translation"):
+        arm.with_tip(2 * np.eye(4))
+    with pytest.raises(vg.InputError, match="no such file"):
+        vg.Arm.from_urdf(tmp_path / "none.urdf", tip="tool0")
+    with pytest.raises(vg.InputError, match="did you mean tool0"):
+        vg.Arm.from_urdf(tmp_path / "arm.urdf", tip="tool1")
+
+
+def test_a_guard_takes_any_rates_and_keeps_every_limit(arm: vg.Arm) -> None:
+    guard = vg.Guard(arm, [0.0, 0.1], period_s=0.002)
+    for _ in range(3000):
+        setpoint = guard.step([9.0, -9.0])
+        assert (np.abs(setpoint.velocity) <= arm.rate_max).all()
+        assert ((arm.q_min <= setpoint.position) & (setpoint.position <= arm.q_max)).all()
+    np.testing.assert_allclose(setpoint.position, [2.0, 0.0], atol=1e-5)
+    with pytest.raises(vg.ShapeError, match=r"rates has shape \(1,\)"):
+        guard.step([0.0])
+    with pytest.raises(vg.InputError, match="period_s"):
+        vg.Guard(arm, [0.0, 0.1], period_s=0)
+    with pytest.raises(vg.InputError, match="finite joint positions"):
+        vg.Guard(arm, [0.0, np.nan], period_s=0.002)

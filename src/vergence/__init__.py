@@ -53,11 +53,11 @@ __all__ = sorted(_PLACES)
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name, or the room of geometry, when it is first asked for."""
+    """Load a public name, or the module of transforms, when it is first asked for."""
     from importlib import import_module
 
-    if name == "geometry":
-        return import_module("vergence.geometry")
+    if name == "transforms":
+        return import_module("vergence.geometry.transforms")
     if name not in _PLACES:
         raise AttributeError(f"module 'vergence' has no attribute {name!r}")
     value = getattr(import_module(f"vergence.{_PLACES[name]}"), name)
@@ -67,4 +67,4 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
-    return sorted({*globals(), *__all__, "geometry"})
+    return sorted({*globals(), *__all__, "transforms"})

@@ -1,4 +1,3 @@
-from vergence import geometry as geometry
 from vergence.app.report import report as report
 from vergence.assembly import plan as plan
 from vergence.assembly import run as run
@@ -32,6 +31,7 @@ from vergence.experiments import Comparison as Comparison
 from vergence.experiments import compare as compare
 from vergence.features import Feature as Feature
 from vergence.features import Points as Points
+from vergence.geometry import transforms as transforms
 from vergence.parts import Positive as Positive
 from vergence.parts import feature as feature
 from vergence.parts import knob as knob

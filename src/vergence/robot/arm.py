@@ -1,11 +1,13 @@
 """An arm as a controller sees it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray, as_floats, frozen
 from vergence.errors import InputError, nearest
 from vergence.robot.chain import Chain, axis_positions, forward_kinematics, jacobian
 
@@ -42,6 +44,44 @@ class Arm:
         for name in ("rate_max", "acceleration_max"):
             if not (getattr(self, name) > 0).all():
                 raise InputError("arm", name, getattr(self, name), "numbers above zero")
+
+    @classmethod
+    def from_urdf(cls, path: str | Path, tip: str) -> Self:
+        """Read the joints that carry a link off a URDF, with their limits.
+
+        Args:
+            path: of the file, expanded if it was an xacro.
+            tip: name of the link at the end of the chain, such as "tool0".
+
+        Raises:
+            InputError: if there is no such file or link, or it says what cannot be honoured.
+        """
+        from vergence.robot.urdf import read_urdf
+
+        if not Path(path).is_file():
+            raise InputError(str(path), "", "no such file", "a URDF file")
+        return cls.from_mujoco(read_urdf(Path(path), tip).compile(), tip, kind="body")
+
+    def with_tip(self, T_tip_new: ArrayLike) -> Self:
+        """Return the arm up to another tip that is fixed to its own, such as a mounted camera.
+
+        Args:
+            T_tip_new: (4, 4) pose of the new tip in the old one's frame, such as T_flange_camera of
+                a hand-eye calibration.
+
+        Raises:
+            InputError: if it is not a rigid motion.
+        """
+        T = as_floats(T_tip_new, (4, 4), "T_tip_new")
+        R, p = T[:3, :3], T[:3, 3]
+        rigid = np.allclose(R.T @ R, np.eye(3), atol=1e-6) and np.linalg.det(R) > 0
+        if not (rigid and np.isfinite(p).all() and (T[3] == (0.0, 0.0, 0.0, 1.0)).all()):
+            raise InputError("with_tip", "T_tip_new", T.tolist(), "a rotation and a translation")
+        rotation, position = self.chain.rotation.copy(), self.chain.position.copy()
+        position[-1] += rotation[-1] @ p
+        rotation[-1] = rotation[-1] @ R
+        chain = self.chain._replace(rotation=frozen(rotation), position=frozen(position))
+        return replace(self, chain=chain)
 
     @classmethod
     def from_mujoco(
@@ -98,12 +138,12 @@ class Arm:
         """Which joints slide, (n,)."""
         return _of_joints(self.chain.sliding, self.names, self.axis_names)
 
-    def forward_kinematics(self, q: FloatArray) -> FloatArray:
+    def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Return T_world_tip (4, 4) at joint positions q (n,)."""
         T: FloatArray = forward_kinematics(self.chain, frozen(q, (self.joint_count,), "q"))
         return T
 
-    def jacobian(self, q: FloatArray) -> FloatArray:
+    def jacobian(self, q: ArrayLike) -> FloatArray:
         """Return the tip's Jacobian (6, n) in the tip's own axes: v_tip = J q̇."""
         J: FloatArray = jacobian(self.chain, frozen(q, (self.joint_count,), "q"))
         return J
@@ -114,12 +154,13 @@ class Arm:
         coupled = len(self.chain.coupling) > 0
         return axis_positions(self.chain, positions) if coupled else positions
 
-    def outside(self, q: FloatArray) -> BoolArray:
+    def outside(self, q: ArrayLike) -> BoolArray:
         """Tell which joints of q (n,) are at or beyond a limit, (n,)."""
+        q = as_floats(q, (self.joint_count,), "q")
         result: BoolArray = (q <= self.q_min) | (q >= self.q_max)
         return result
 
-    def normalized(self, q: FloatArray) -> FloatArray:
+    def normalized(self, q: ArrayLike) -> FloatArray:
         """Return q (…, n) with its limits at -1 and 1; 0 for a joint without limits."""
         q = np.asarray(q, dtype=np.float64)
         limited = np.isfinite(self.q_max - self.q_min)

@@ -12,7 +12,7 @@ from vergence.signals import Outcome
 class Recorder:
     """A listener that records the run as MCAP; `Recording` reads it back."""
 
-    def __init__(self, folder: Path, image_every: int = 2, jpeg_quality: int = 85) -> None:
+    def __init__(self, folder: str | Path, image_every: int = 2, jpeg_quality: int = 85) -> None:
         """Choose what to keep and where; nothing is written before the run begins.
 
         Args:
@@ -20,7 +20,7 @@ class Recorder:
             image_every: keep every n-th image of each camera; 0 keeps none.
             jpeg_quality: 0 to 100.
         """
-        self.folder = folder
+        self.folder = Path(folder)
         self._image_every = image_every
         self._jpeg_quality = jpeg_quality
         self._writer: McapWriter | None = None

@@ -1,0 +1,54 @@
+"""Rotations and rigid motions for people: lists are taken, and a wrong shape is named.
+
+Each function is the kernel of that name in `vergence.geometry`, which validates nothing, behind a
+check.
+"""
+
+from collections.abc import Callable
+from functools import wraps
+from inspect import signature
+from typing import Any
+
+import numpy as np
+
+import vergence.geometry as kernels
+from vergence.arrays import as_floats
+
+
+def _checked(kernel: Any, *shapes: tuple[int | None, ...]) -> Callable[..., Any]:
+    """Return a kernel behind a check of its arguments: float64, in C order, of these shapes."""
+    takes = signature(kernel.py_func)
+
+    @wraps(kernel.py_func)
+    def function(*args: Any, **kwargs: Any) -> Any:
+        given = takes.bind(*args, **kwargs).arguments.items()
+        pairs = zip(given, shapes, strict=True)
+        # Copies, which are writeable whatever was given: each kernel is compiled for one type.
+        arrays = [np.array(as_floats(value, shape, name)) for (name, value), shape in pairs]
+        return kernel(*(array if array.ndim else float(array) for array in arrays))
+
+    return function
+
+
+_VECTOR, _TWIST, _ROTATION, _POSE = (3,), (6,), (3, 3), (4, 4)
+
+matrix_to_quaternion = _checked(kernels.matrix_to_quaternion, _ROTATION)
+matrix_to_rpy = _checked(kernels.matrix_to_rpy, _ROTATION)
+quaternion_to_matrix = _checked(kernels.quaternion_to_matrix, (4,))
+rpy_rates_to_omega = _checked(kernels.rpy_rates_to_omega, _VECTOR)
+rpy_to_matrix = _checked(kernels.rpy_to_matrix, _VECTOR)
+se3 = _checked(kernels.se3, _ROTATION, _VECTOR)
+se3_adjoint = _checked(kernels.se3_adjoint, _POSE)
+se3_compose = _checked(kernels.se3_compose, _POSE, _POSE)
+se3_distance = _checked(kernels.se3_distance, _POSE, _POSE, ())
+se3_exp = _checked(kernels.se3_exp, _TWIST)
+se3_inverse = _checked(kernels.se3_inverse, _POSE)
+se3_log = _checked(kernels.se3_log, _POSE)
+skew = _checked(kernels.skew, _VECTOR)
+so3_exp = _checked(kernels.so3_exp, _VECTOR)
+so3_left_jacobian = _checked(kernels.so3_left_jacobian, _VECTOR)
+so3_left_jacobian_inverse = _checked(kernels.so3_left_jacobian_inverse, _VECTOR)
+so3_log = _checked(kernels.so3_log, _ROTATION)
+transform_points = _checked(kernels.transform_points, _POSE, (None, 3))
+
+__all__ = list(kernels.__all__)
