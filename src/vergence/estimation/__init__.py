@@ -2,8 +2,10 @@
 
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
+from vergence.estimation.corner_view import CornerView
 from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.extrapolation import extrapolate
+from vergence.estimation.fit_pose import fit_pose
 from vergence.estimation.held_target import (
     HandPose,
     HeldTarget,
@@ -41,6 +43,7 @@ __all__ = [
     "CameraRig",
     "Candidates",
     "Consistency",
+    "CornerView",
     "ExactPoints",
     "Exposure",
     "FilterHistory",
@@ -73,6 +76,7 @@ __all__ = [
     "add_obstacles",
     "blocked_from_hand",
     "extrapolate",
+    "fit_pose",
     "pose_from_points",
     "predict_visibility",
     "seen_from_hand",

@@ -8,23 +8,31 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.estimation.measurement import POSE, mahalanobis_squared, whitened_rows
 from vergence.estimation.motion import correct_pose
-from vergence.estimation.view import Seen, View, together
-from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp
+from vergence.estimation.pose_minima import (
+    PoseMinimum,
+    is_apart,
+    pose_minima,
+    with_linear_translation,
+)
+from vergence.estimation.view import Seen, View, chosen_points, together
+from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
 
 GATE = 13.8  # χ² with 2 degrees of freedom, one in a thousand
-LEAST_POINTS = 4  # in the picture the search starts from
-RIVAL = 9.2  # how much worse, in squared deviations, a second pose must fit: one in a hundred
+LEAST_POINTS = 4  # in the image the search starts from
+CONTRADICTION = 16.0  # χ² for each degree of freedom, above which no noise explains the points
+RIVAL = 13.8  # by how much χ² of a second pose must be larger: odds of one to a thousand
 
 
 @dataclass(frozen=True, slots=True)
 class PoseFit:
-    """A pose that explains the points of some pictures."""
+    """A pose that explains the points of some images."""
 
     time: float  # s
     T_world_target: FloatArray  # (4, 4)
     covariance: FloatArray  # (6, 6) of (δp, δθ), world axes
-    inliers: int  # points explained, of all pictures
+    inliers: int  # points explained, of all images
     points: int  # points there were
+    weight: float = 1.0  # probability among the poses that explain the points as well
 
     def __bool__(self) -> bool:
         """A fit is true."""
@@ -36,6 +44,7 @@ class NoPose:
     """Why there is none."""
 
     reason: str
+    alternatives: tuple[PoseFit, ...] = ()  # if several poses explain the points, likeliest first
 
     def __bool__(self) -> bool:
         """A failure is false."""
@@ -43,56 +52,126 @@ class NoPose:
 
 
 def pose_from_points(views: Sequence[View]) -> PoseFit | NoPose:
-    """Find the pose of the target from pictures taken at nearly one time, without a prediction.
+    """Find the pose of the target from images taken at nearly one time, without a prediction.
 
-    Candidates come from the picture with the most points (perspective-n-point on deterministic
-    samples, so that wrong matches do no harm). Each is refined by least squares over the points of
-    all pictures that agree with it. The one that explains most is taken, if it explains three
-    points out of five and no clearly different pose explains them as well: a flat or distant target
-    seen by one camera has two, and a guess would be a wrong pose with a small covariance.
+    Candidates come from the images (perspective-n-point on deterministic samples, so that wrong
+    matches do no harm). Each is refined by least squares over the points of all images that agree
+    with it, and the one that explains most is taken, if it explains three points out of five.
+    Where no image shows four points, all points are taken to be right. Then all local minima over
+    the same points are compared: a nearly flat or distant target seen by one camera has two, and
+    one of them alone would be a wrong pose with a small covariance.
 
     Args:
-        views: pictures with usable points.
+        views: images with usable points.
+
+    Returns:
+        The pose; or why there is none, with all candidates if the points do not decide.
     """
     if not views:
-        return NoPose("no picture")
+        return NoPose("no image")
+    seen = together(views)
+    if seen.size < LEAST_POINTS:
+        return NoPose(f"{seen.size} points in all images, {LEAST_POINTS} needed")
     main = max(views, key=lambda view: view.size)
     if main.size < LEAST_POINTS:
-        return NoPose(f"{main.size} points in the fullest picture, {LEAST_POINTS} needed")
-    seen = together(views)
+        start = with_linear_translation(np.eye(3), seen.poses, seen.points, seen.measured)
+        return settle(seen, main.time, start, seen.size)
     fits = [fit for start in _candidates(main) if (fit := _refine(start, seen)) is not None]
-    total = seen.size
     if not fits:
         return NoPose("no pose explains the points")
     fits.sort(key=lambda fit: (-fit.inliers, fit.square))
-    best = fits[0]
+    best, total = fits[0], seen.size
     if 5 * best.inliers < 3 * total:
         return NoPose(f"the best pose explains {best.inliers} of {total} points")
-    if any(_rivals(best, other) for other in fits[1:]):
-        return NoPose("two different poses explain the points")
-    covariance = np.linalg.inv(best.information)
-    return PoseFit(main.time, best.pose, 0.5 * (covariance + covariance.T), best.inliers, total)
+    others = [fit for fit in fits[1:] if _rivals(best, fit, seen)]
+    return settle(
+        chosen_points(seen, best.kept), main.time, best.pose, total, [o.pose for o in others]
+    )
+
+
+def settle(
+    seen: Seen, time: float, known: FloatArray, total: int, others: Sequence[FloatArray] = ()
+) -> PoseFit | NoPose:
+    """Return the pose if all its rivals explain the points clearly worse, else all of them.
+
+    Posterior odds of two minima are exp(-½ Δχ²). Where even the best leaves more than the stated
+    noise, the noise is taken to be as large as what is left.
+
+    Args:
+        seen: the points without wrong matches.
+        time: of the fit, s.
+        known: one of the minima, T_world_target (4, 4).
+        total: how many points there were with the wrong matches.
+        others: poses that explain as many points, but not the same ones.
+    """
+    minima = pose_minima(seen, known)
+    if not minima:
+        return NoPose("no pose explains the points")
+    best = minima[0]
+    if np.linalg.cond(best.information) > 1e14:
+        return NoPose("the points leave the pose open: they lie on a line, or too close together")
+    scale = max(1.0, best.square / max(2 * seen.size - POSE, 1))
+    if scale > CONTRADICTION:
+        return NoPose(
+            f"the points contradict each other: they lie {np.sqrt(scale):.1f} times their stated "
+            "noise from the best pose"
+        )
+    likely = [m for m in minima if m.square - best.square <= RIVAL * scale]
+    likely += [
+        PoseMinimum(T, best.information, best.square)
+        for T in others
+        if all(is_apart(T, m.pose, seen.poses[0]) for m in likely)
+    ]
+    odds = np.exp([-0.5 * (m.square - best.square) / scale for m in likely])
+    fits = tuple(
+        _pose_fit(m, time, scale, seen.size, total, float(weight))
+        for m, weight in zip(likely, odds / odds.sum(), strict=True)
+    )
+    if len(fits) == 1:
+        return fits[0]
+    turn = fits[0].T_world_target[:3, :3].T @ fits[1].T_world_target[:3, :3]
+    angle = np.rad2deg(np.linalg.norm(so3_log(np.ascontiguousarray(turn))))
+    return NoPose(
+        f"{_NUMBERS.get(len(fits), 'several')} different poses explain the points, the likeliest "
+        f"{angle:.0f}° apart with odds of {odds[0] / odds[1]:.2g} to 1; another camera, a nearer "
+        "image or points farther off the target's plane would tell them apart",
+        fits,
+    )
+
+
+_NUMBERS = {2: "two", 3: "three", 4: "four"}
+
+
+def _pose_fit(
+    minimum: PoseMinimum, time: float, scale: float, inliers: int, total: int, weight: float
+) -> PoseFit:
+    covariance = scale * np.linalg.inv(minimum.information)
+    covariance = 0.5 * (covariance + covariance.T)
+    return PoseFit(time, minimum.pose, covariance, inliers, total, weight)
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
     pose: FloatArray  # (4, 4) T_world_target
-    information: FloatArray  # (6, 6)
-    inliers: int
+    kept: BoolArray  # (M,) points that agree
     square: float  # of the whitened residuals of the inliers
 
+    @property
+    def inliers(self) -> int:
+        return int(np.count_nonzero(self.kept))
 
-def _rivals(best: _Fit, other: _Fit) -> bool:
-    """Tell whether another fit is as good as the best and yet a different pose."""
+
+def _rivals(best: _Fit, other: _Fit, seen: Seen) -> bool:
+    """Tell whether a fit to other points is as good as the best and yet a different pose."""
     if other.inliers < best.inliers or other.square > best.square + RIVAL:
         return False
-    between = se3_compose(se3_inverse(best.pose), other.pose)
-    angle = np.arccos(np.clip(0.5 * (np.trace(between[:3, :3]) - 1.0), -1.0, 1.0))
-    return bool(angle > 0.05)
+    return not np.array_equal(best.kept, other.kept) and is_apart(
+        best.pose, other.pose, seen.poses[0]
+    )
 
 
 def _candidates(view: View) -> list[FloatArray]:
-    """Return poses T_world_target to start from, by perspective-n-point on samples of a picture."""
+    """Return poses T_world_target to start from, by perspective-n-point on samples of an image."""
     T_world_camera = se3_inverse(view.T_camera_world)
     rng = np.random.default_rng(view.size)  # the same samples for the same number of points
     return [
@@ -151,8 +230,7 @@ def _refine(T_world_target: FloatArray, seen: Seen, rounds: int = 8) -> _Fit | N
         better = np.sort(squares)[(3 * len(squares)) // 5]
         gate = GATE if k == rounds else max(GATE, 4.0 * better)
         kept: BoolArray = np.isfinite(squares) & (squares <= gate)
-        inliers = int(np.count_nonzero(kept))
-        if inliers < LEAST_POINTS - 1:
+        if np.count_nonzero(kept) < LEAST_POINTS - 1:
             return None
         H, r = rows[np.repeat(kept, 2), :POSE], rows[np.repeat(kept, 2), POSE]
         information = H.T @ H
@@ -162,4 +240,4 @@ def _refine(T_world_target: FloatArray, seen: Seen, rounds: int = 8) -> _Fit | N
             correction = np.zeros(2 * POSE)
             correction[:POSE] = np.linalg.solve(information, H.T @ r)
             pose = correct_pose(pose, correction)
-    return _Fit(pose, information, inliers, float(r @ r))
+    return _Fit(pose, kept, float(r @ r))

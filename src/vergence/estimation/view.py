@@ -74,6 +74,23 @@ def together(views: Sequence[View]) -> Seen:
     )
 
 
+def chosen_points(seen: Seen, kept: BoolArray) -> Exposure:
+    """Return the chosen points alone.
+
+    Args:
+        seen: points of any number of images.
+        kept: which of them, (M,).
+    """
+    return Exposure(
+        seen.time,
+        seen.pictures,
+        np.ascontiguousarray(seen.poses[kept]),
+        np.ascontiguousarray(seen.points[kept]),
+        np.ascontiguousarray(seen.measured[kept]),
+        np.ascontiguousarray(seen.covariance[kept]),
+    )
+
+
 def view_of(
     image_points: ImagePoints,
     camera: Camera,

@@ -143,13 +143,21 @@ def free_parameters(model: str) -> FloatArray:
 
 
 def board_pose(camera: Camera, seen: Sighting) -> FloatArray:
-    """Return T_camera_board (4, 4) that fits one image best."""
+    """Return T_camera_board (4, 4) that fits one image best.
+
+    A flat board has two poses that explain it nearly as well; both are refined before one is taken.
+    """
     import cv2
 
     rays = np.ascontiguousarray(camera.normalize(seen.points_px))
-    _, w, t = cv2.solvePnP(seen.points, rays, np.eye(3), np.zeros(5), flags=cv2.SOLVEPNP_IPPE)
-    T = _pose(w, t)
+    flags = cv2.SOLVEPNP_IPPE
+    _, ws, ts, _ = cv2.solvePnPGeneric(seen.points, rays, np.eye(3), np.zeros(5), flags=flags)
     lens = lens_of(camera)
+    fits = [_refined_pose(lens, _pose(w, t), seen) for w, t in zip(ws, ts, strict=True)]
+    return min(fits, key=lambda T: float(np.sum(residuals(lens, T, seen) ** 2)))
+
+
+def _refined_pose(lens: FloatArray, T: FloatArray, seen: Sighting) -> FloatArray:
     for _ in range(10):
         pixels, _, J = reproject(lens, T, seen.points)
         step = np.asarray(np.linalg.lstsq(J, (seen.points_px - pixels).ravel(), rcond=None)[0])

@@ -1,0 +1,19 @@
+"""The corners of a known shape in one image."""
+
+from dataclasses import dataclass
+
+from vergence.arrays import FloatArray, frozen
+from vergence.camera import Camera
+
+
+@dataclass(frozen=True, slots=True)
+class CornerView:
+    """What one camera sees of a shape, and where the camera is."""
+
+    camera: Camera
+    T_world_camera: FloatArray  # (4, 4)
+    corners_px: FloatArray  # (N, 2) of all corners of the shape in order, NaN where not seen
+
+    def __post_init__(self) -> None:
+        for name, shape in (("T_world_camera", (4, 4)), ("corners_px", (None, 2))):
+            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
