@@ -150,7 +150,7 @@ def scipy_two_view(m_star: FloatArray, m: FloatArray) -> Callable[[], object]:
     from scipy.spatial.transform import Rotation
 
     from vergence.vision.two_view.decomposition import inverse_depths
-    from vergence.vision.two_view.search import fit_general
+    from vergence.vision.two_view.motions import motion_minima
 
     def residuals(p: FloatArray) -> FloatArray:
         rays = np.column_stack((p[6:24].reshape(9, 2), np.ones(9)))
@@ -160,7 +160,8 @@ def scipy_two_view(m_star: FloatArray, m: FloatArray) -> Callable[[], object]:
         return np.concatenate(((rays[:, :2] - m_star).ravel(), (seen - m).ravel()))
 
     def solve() -> object:
-        R, t, _ = fit_general(m_star, m, 5, 1e-5)
+        found = motion_minima(m_star, m, 4, 1e-5)
+        R, t = found.R[0], found.t[0]
         w, _ = inverse_depths(R, t, m_star, m)
         start = np.concatenate((Rotation.from_matrix(R).as_rotvec(), t, m_star.ravel(), w))
         return least_squares(residuals, start, method="lm")

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from vergence.estimation import Consistency
-from vergence.estimation.consistency import chi_square_quantile
+from vergence.geometry.chi_square import chi_square_quantile
 
 
 @pytest.mark.parametrize("freedom", [2, 6, 16, 100, 1000])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vergence.cell import load_cell
+from vergence.errors import InputError
 from vergence.geometry import se3_inverse, so3_log
 from vergence.simulation import SimulatedDriver
 from vergence.vision.two_view import TwoView, estimate_two_view, match_features
@@ -39,5 +40,16 @@ def test_matches_of_a_textured_object_give_the_motion_between_the_pictures(drive
 def test_pictures_with_nothing_in_them_say_so():
     blank, noise = np.full((120, 160), 90, np.uint8), np.zeros((0, 0), np.uint8)
     assert "texture" in match_features(blank, blank).reason
-    assert match_features(noise, blank).reason.startswith("the current picture")
+    assert match_features(noise, blank).reason.startswith("the current image")
     assert not match_features(blank, blank)
+
+
+def test_matches_lie_inside_the_masks(driver):
+    now, then = driver.first_frame("wrist"), moved(driver, [6.0, -4.0, 5.0, 8.0, -6.0, 20.0])
+    left = np.zeros(now.image.shape, dtype=bool)
+    left[:, : left.shape[1] // 2] = True
+    matches = match_features(now.image, then.image, mask=left)
+    assert len(matches.points_px)
+    assert (matches.points_px[:, 0] < left.shape[1] // 2 + 1).all()
+    with pytest.raises(InputError, match="desired"):
+        match_features(now.image, then.image, mask_star=left[1:])

@@ -17,11 +17,7 @@ from vergence.vision.two_view.bundle import (
     moved,
     normal_blocks,
 )
-from vergence.vision.two_view.checks import (
-    chi_square_quantile,
-    distinct_count,
-    fewest_off_a_line,
-)
+from vergence.vision.two_view.checks import distinct_count, fewest_off_a_line
 from vergence.vision.two_view.covariance import (
     bundle_covariance,
     points_in_desired,
@@ -29,8 +25,15 @@ from vergence.vision.two_view.covariance import (
     reference_plane,
 )
 from vergence.vision.two_view.decomposition import decompose_homography
+from vergence.vision.two_view.evidence import least_false_alarms, log_densities
 from vergence.vision.two_view.linear import linear_essential, linear_homography
-from vergence.vision.two_view.sampson import sampson_jacobian, sampson_residuals, tangent_basis
+from vergence.vision.two_view.motions import motion_minima
+from vergence.vision.two_view.sampson import (
+    refine_essential,
+    sampson_jacobian,
+    sampson_residuals,
+    tangent_basis,
+)
 from vergence.vision.two_view.small import cholesky_inverse
 
 WEIGHT = np.array([700.0, 720.0])
@@ -169,12 +172,30 @@ def test_degeneracy_counts_match_their_brute_force_twins() -> None:
     assert distinct_count(np.vstack((points, points + 0.05)), 0.1) == 6
 
 
-def test_chi_square_quantile_is_close_to_the_exact_one() -> None:
-    from scipy.stats import chi2
+def test_agreement_by_chance_is_called_chance() -> None:
+    random = np.random.default_rng(8)
+    disc, _ = log_densities(*random.uniform(-0.3, 0.3, (2, 40, 2)))
+    for count in (8, 20, 60):
+        least = min(
+            least_false_alarms(random.uniform(0, 0.3, count), 4, 1, 2, disc, 1e-3, 0.02)[0]
+            for _ in range(200)
+        )
+        assert least > -2.5
+        fitting = np.concatenate((np.full(count // 2 + 3, 1e-3), np.full(count // 2 - 3, 0.3)))
+        alarms, threshold = least_false_alarms(fitting, 4, 1, 2, disc, 1e-3, 0.02)
+        assert alarms < -3.0
+        assert threshold == 1e-3
 
-    for freedom in (1, 4, 10, 50):
-        exact = chi2.ppf(0.999, freedom)
-        assert chi_square_quantile(freedom) == pytest.approx(exact, rel=0.04)
+
+def test_motion_minima_hold_the_motion_that_explains_best() -> None:
+    random = np.random.default_rng(9)
+    for _ in range(10):
+        views = pair(random, shape(random, 12), 0.3)
+        m, m_star = CAMERA.normalize(views.current_px), CAMERA.normalize(views.desired_px)
+        T = se3_inverse(views.T_star_camera)
+        R, t = np.ascontiguousarray(T[:3, :3]), T[:3, 3] / np.linalg.norm(T[:3, 3])
+        _, _, cost = refine_essential(R, t, m_star, m, 40)
+        assert motion_minima(m_star, m, 6, 1e-6).cost[0] <= cost * (1 + 1e-3)
 
 
 def test_cholesky_inverse_is_the_inverse() -> None:

@@ -1,19 +1,9 @@
 """Do the innovations agree with the covariance? The normalised innovation squared over a window."""
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import Self
 
-NORMAL_QUANTILE = 3.09  # one in a thousand
-
-
-def chi_square_quantile(freedom: float, z: float = NORMAL_QUANTILE) -> float:
-    """Return the quantile of χ² that a standard normal variable has at z.
-
-    n (1 - 2/(9n) + z √(2/(9n)))³, good to 3 % from two degrees of freedom on (Wilson, Hilferty).
-    """
-    spread = 2.0 / (9.0 * freedom)
-    return freedom * max(0.0, 1.0 - spread + z * sqrt(spread)) ** 3
+from vergence.geometry.chi_square import chi_square_quantile
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from vergence.geometry.se3 import (
     transform_points,
 )
 from vergence.geometry.so3 import (
+    nearest_rotation,
     skew,
     so3_exp,
     so3_left_jacobian,
@@ -27,6 +28,7 @@ from vergence.geometry.so3 import (
 __all__ = [
     "matrix_to_quaternion",
     "matrix_to_rpy",
+    "nearest_rotation",
     "quaternion_to_matrix",
     "rpy_rates_to_omega",
     "rpy_to_matrix",

@@ -127,3 +127,18 @@ def so3_left_jacobian_inverse(w: FloatArray) -> FloatArray:
         w: rotation vector, (3,), rad.
     """
     return _polynomial(w, -0.5, _cotangent_ratio(_angle_squared(w)))
+
+
+@njit(cache=True)
+def nearest_rotation(M: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) nearest to a matrix in the least-squares sense.
+
+    U diag(1, 1, det U Vᵀ) Vᵀ of M = U S Vᵀ.
+    """
+    U, _, Vt = np.linalg.svd(M)
+    sign = 1.0 if np.linalg.det(U) * np.linalg.det(Vt) > 0.0 else -1.0
+    R = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = U[i, 0] * Vt[0, j] + U[i, 1] * Vt[1, j] + sign * U[i, 2] * Vt[2, j]
+    return R

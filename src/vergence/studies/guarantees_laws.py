@@ -144,7 +144,7 @@ def plan_from_homography(scene: Scene) -> Path | None:
     normal = np.cross(goal[1] - goal[0], goal[2] - goal[0])
     normal *= np.sign(normal[2]) / np.linalg.norm(normal)
     now = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
-    view = estimate_two_view(now, scene.goal_px, scene.camera, normal_hint=normal)
+    view = estimate_two_view(now, scene.goal_px, scene.camera, normal_hint=normal, flat=True)
     if not isinstance(view, TwoView):
         return None
     problem = PlanningProblem.from_two_view(

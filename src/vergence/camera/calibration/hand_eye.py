@@ -17,7 +17,7 @@ import numpy as np
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera.calibration.reprojection import residuals, rms
 from vergence.camera.calibration.sighting import Sighting
-from vergence.geometry import se3, se3_inverse, so3_log
+from vergence.geometry import nearest_rotation, se3, se3_inverse, so3_log
 
 _SUBSETS = 150  # of three images, tried for the start
 TOLERATED = 0.08  # of the image's width: farther off, an image counts as contradicting
@@ -124,13 +124,6 @@ def agree(
             break
         best = found
     return best
-
-
-def nearest_rotation(M: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) nearest to a matrix in the least-squares sense."""
-    U, _, Vt = np.linalg.svd(M)
-    R: FloatArray = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    return R
 
 
 def _threes(count: int, rng: np.random.Generator) -> list[tuple[int, ...]]:

@@ -71,11 +71,3 @@ def widest_triples(m_star: FloatArray, m: FloatArray, wanted: int) -> IntArray:
                     areas[worst] = area
                     triples[worst] = np.array([a, b, c])
     return triples[np.argsort(-areas)]
-
-
-def chi_square_quantile(freedom: int, normal_quantile: float = 3.09) -> float:
-    """Return the χ² quantile by the formula of Wilson and Hilferty; 3.09 is 99.9 %."""
-    if freedom <= 0:
-        return 0.0
-    spread = 2.0 / (9.0 * freedom)
-    return float(freedom * (1.0 - spread + normal_quantile * spread**0.5) ** 3)

@@ -52,15 +52,6 @@ def decompose_homography(H: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
 
 
 @njit(cache=True)
-def nearest_rotation(M: FloatArray) -> FloatArray:
-    """Return the rotation closest to M, (3, 3)."""
-    U, _, Vt = np.linalg.svd(M)
-    if np.linalg.det(times(U, Vt)) < 0.0:
-        U[:, 2] = -U[:, 2]
-    return times(U, Vt)
-
-
-@njit(cache=True)
 def decompose_essential(E: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the four motions behind E = [t]× R: R (4, 3, 3) and unit t (4, 3)."""
     U, _, Vt = np.linalg.svd(E)

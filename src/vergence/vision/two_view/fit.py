@@ -1,36 +1,49 @@
-"""The models of what happened between two views, fitted and judged."""
+"""The models of what happened between two views, fitted and compared."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.geometry import so3_log
+from vergence.geometry.chi_square import chi_square_quantile
 from vergence.vision.two_view import bundle
 from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION, TwoViewState
-from vergence.vision.two_view.checks import chi_square_quantile
+from vergence.vision.two_view.covariance import bundle_covariance
 from vergence.vision.two_view.decomposition import decompose_homography, inverse_depths
 from vergence.vision.two_view.linear import linear_homography
-from vergence.vision.two_view.search import find_inliers, fit_general, rotation_between
+from vergence.vision.two_view.motions import AIMED, TURNED, motion_minima, rotation_between
 
 ITERATIONS = 25  # most steps of bundle adjustment
-GATE = 3.29  # standard deviations beyond which a match is wrong (one in a thousand)
+FEWEST_GENERAL = 8  # matches of an object that is not flat
+RIVAL = 13.8  # by how much χ² of a second motion must be larger: odds of one to a thousand
+LIKELY = 1.64  # standard deviations: 95 %
+_CAP = 13.8  # of χ² that a single match adds: one may be wrong
+_FAR = 21.1  # χ² of a rotation: one in ten thousand
+_MOTIONS = 4  # most that are adjusted
+_BEHIND = 0.1  # share of the points that may lie behind a camera: far ones, by the noise
 
 
 class Views:
     """The matches in normalized coordinates, with the noise they are judged by."""
 
-    def __init__(self, m_star: FloatArray, m: FloatArray, weight: FloatArray) -> None:
+    def __init__(
+        self, m_star: FloatArray, m: FloatArray, weight: FloatArray, index: IntArray | None = None
+    ) -> None:
         self.m_star, self.m, self.weight = m_star, m, weight
+        self.index = np.arange(len(m)) if index is None else index  # among all matches
 
     def __len__(self) -> int:
         return len(self.m)
 
     def take(self, chosen: BoolArray) -> "Views":
         """Return the chosen matches alone."""
-        return Views(self.m_star[chosen], self.m[chosen], self.weight)
+        return Views(self.m_star[chosen], self.m[chosen], self.weight, self.index[chosen])
 
     @property
-    def variance(self) -> float:
-        """Of a normalized coordinate."""
-        return float(np.mean(1.0 / self.weight) ** 2)
+    def noise(self) -> float:
+        """Standard deviation of a normalized coordinate."""
+        return float(np.mean(1.0 / self.weight))
 
     def adjust(self, model: int, state: TwoViewState) -> "Fit":
         """Return a model at its best, from a first guess."""
@@ -41,7 +54,7 @@ class Views:
 
 
 class Fit:
-    """A model at its best, and whether the noise explains what is left."""
+    """A model at its best."""
 
     def __init__(
         self, views: Views, model: int, state: TwoViewState, residuals: FloatArray
@@ -52,47 +65,108 @@ class Fit:
         self.freedom = (4 - a_point) * len(views) - poses
 
     @property
-    def accepted(self) -> bool:
-        """Whether noise explains the residuals, and the points lie before the camera."""
-        possible = self.model != GENERAL or bool((self.state.w > 0).all())
-        return possible and self.chi_square <= chi_square_quantile(self.freedom) + 1e-6
+    def front(self) -> BoolArray:
+        """Which points lie before both cameras, (N,)."""
+        before: BoolArray = (self.state.w > 0.0) & (self.depths > 0.0)
+        return before
+
+    @property
+    def depths(self) -> FloatArray:
+        """Of the points in the current camera over those in the desired one, (N,)."""
+        rays = np.column_stack((self.state.x_star, np.ones(len(self.views))))
+        depths: FloatArray = rays @ self.state.R[2] + self.state.w * self.state.t[2]
+        return depths
+
+    def misses(self, scale: float) -> float:
+        """Return χ² with what a single match adds to it capped: one may be wrong."""
+        squares = np.sum(self.residuals**2, axis=1) / scale
+        return float(np.minimum(squares, _CAP).sum())
+
+    def differs_from(self, other: "Fit") -> bool:
+        """Tell whether two motions of a general object are not one."""
+        turn = so3_log(np.ascontiguousarray(self.state.R.T @ other.state.R))
+        cosine = np.clip(self.state.t @ other.state.t, -1.0, 1.0)
+        return bool(np.linalg.norm(turn) > TURNED or np.arccos(cosine) > AIMED)
 
 
-def simplest_fit(views: Views) -> Fit | None:
-    """Return the simplest of turn, plane and general object that the noise explains."""
+class Comparison(NamedTuple):
+    """The simplest model that explains the matches, and its rivals."""
+
+    fits: list[Fit]  # the chosen one, and all that the noise cannot tell from it
+    plane: Fit  # the best plane, chosen or not
+    scale: float  # variance of the noise over the stated one, at least 1
+
+
+def compare_models(views: Views) -> Comparison:
+    """Choose among turn, plane and general object by likelihood ratio.
+
+    The models are nested, so 2 log of the ratio is χ² with as many degrees of freedom as the
+    larger has unknowns more [Wilks1938]: a simpler model is kept unless that is beyond 99.9 %, and
+    not alone unless it is within 95 %. The noise is estimated from the largest model, since lens
+    and matcher may add to the stated noise. All local minima of the general model are compared
+    with each other as well.
+    """
     count = len(views)
-    start = TwoViewState(
+    state = TwoViewState(
         rotation_between(views.m_star, views.m),
         np.zeros(3),
         np.array([0.0, 0.0, 1.0]),
         views.m_star,
         np.ones(count),
     )
-    turn = views.adjust(ROTATION, start)
-    if turn.accepted:
-        return turn
+    turn = views.adjust(ROTATION, state)
     rotations, translations, normals = decompose_homography(
         linear_homography(views.m_star, views.m)
     )
-    plane = views.adjust(PLANE, start._replace(R=rotations[0], t=translations[0], n=normals[0]))
-    if count < 8:
-        return plane if plane.accepted else None
-    R, t, _ = fit_general(views.m_star, views.m, 5, 9.0 * views.variance)
-    depths, _ = inverse_depths(R, t, views.m_star, views.m)
-    general = views.adjust(GENERAL, start._replace(R=R, t=t, w=np.maximum(depths, 1e-3)))
-    # A plane is a general object with N − 3 fewer unknowns: keep it unless the rest gains more.
-    shaped = plane.chi_square - general.chi_square > chi_square_quantile(count - 3)
-    if plane.accepted and not (general.accepted and shaped):
-        return plane
-    return general if general.accepted else None
+    plane = views.adjust(PLANE, state._replace(R=rotations[0], t=translations[0], n=normals[0]))
+    general = general_fits(views, state) if count >= FEWEST_GENERAL else []
+    largest = general[0] if general else plane
+    scale = max(1.0, largest.chi_square / max(largest.freedom, 1))
+
+    def gained(simple: Fit, full: Fit) -> float:
+        return simple.misses(scale) - full.misses(scale)
+
+    unknowns = {ROTATION: turn.freedom - largest.freedom, PLANE: plane.freedom - largest.freedom}
+    if gained(turn, plane) <= chi_square_quantile(5) + 1e-6 and gained(
+        turn, largest
+    ) <= chi_square_quantile(unknowns[ROTATION]):
+        return Comparison([turn], plane, scale)
+    rivals = [f for f in general if f.chi_square - general[0].chi_square <= RIVAL * scale]
+    gain = gained(plane, largest)
+    if gain <= chi_square_quantile(unknowns[PLANE], LIKELY) + 1e-6:
+        return Comparison([plane], plane, scale)
+    if gain <= chi_square_quantile(unknowns[PLANE]):
+        return Comparison([plane, *rivals], plane, scale)
+    return Comparison(rivals, plane, scale)
 
 
-def robust_inliers(views: Views) -> BoolArray:
-    """Return which matches agree on a plane's motion or, if clearly more do, on any motion."""
-    gate = GATE**2 * views.variance
-    # The mean of both directions of transfer has twice the freedom of one Sampson distance.
-    plane = find_inliers(False, views.m_star, views.m, 1.5 * gate)
-    if len(views) < 9:
-        return plane
-    general = find_inliers(True, views.m_star, views.m, gate)
-    return general if general.sum() >= max(8, plane.sum() + 3) else plane
+def hinging_on_one(views: Views, best: Fit, scale: float) -> list[Fit]:
+    """Return the fits to all matches but one that lie far from the fit to all.
+
+    A wrong match among few can bend the motion so that it agrees. If the motion without it is
+    another one, by the deviations of either, the matches do not decide.
+    """
+    others: list[Fit] = []
+    for j in range(len(views)):
+        kept = np.arange(len(views)) != j
+        state = best.state._replace(x_star=best.state.x_star[kept], w=best.state.w[kept])
+        fit = views.take(kept).adjust(best.model, state)
+        blocks = bundle.normal_blocks(fit.model, fit.state, fit.residuals, views.weight)
+        C = scale * bundle_covariance(blocks, np.zeros(0, dtype=np.int64))[:3, :3]
+        turn = so3_log(np.ascontiguousarray(fit.state.R @ best.state.R.T))
+        if turn @ np.linalg.solve(C, turn) > _FAR and all(fit.differs_from(o) for o in others):
+            others.append(fit)
+    return others[:_MOTIONS]
+
+
+def general_fits(views: Views, state: TwoViewState) -> list[Fit]:
+    """Return the local minima of the motion of an object of any shape, the best first."""
+    motions = motion_minima(views.m_star, views.m, 2 * _MOTIONS, 9.0 * views.noise**2)
+    fits: list[Fit] = []
+    for R, t in zip(motions.R[:_MOTIONS], motions.t, strict=False):
+        depths, _ = inverse_depths(R, t, views.m_star, views.m)
+        fit = views.adjust(GENERAL, state._replace(R=R, t=t, w=np.maximum(depths, 1e-3)))
+        possible = np.mean(~fit.front) <= _BEHIND
+        if possible and all(fit.differs_from(other) for other in fits):
+            fits.append(fit)
+    return sorted(fits, key=lambda fit: fit.chi_square)

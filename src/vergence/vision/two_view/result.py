@@ -27,11 +27,28 @@ class TwoView:
     inliers: BoolArray  # (N,) matches that agree with the motion
     planar: bool  # whether a plane explains the object within the noise
     rms_px: float  # of the reprojection in both views, inliers only
-    alternative: "TwoView | None" = None  # a planar object's second motion, if as possible
+    noise_px: float  # standard deviation of a coordinate that the covariance rests on
+    alternatives: "tuple[TwoView, ...]" = ()  # other motions that explain the matches as well
+    doubt: str = ""  # what the matches do not decide, and what would; empty if certain
 
     def __bool__(self) -> bool:
         """A reconstruction is a success."""
         return True
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether another motion explains the matches as well."""
+        return bool(self.alternatives)
+
+    @property
+    def alternative(self) -> "TwoView | None":
+        """The likeliest of the other motions, if there are any."""
+        return self.alternatives[0] if self.alternatives else None
+
+    def apart_deg(self, other: "TwoView") -> float:
+        """Return the angle between the two orientations of the current camera."""
+        turn = np.ascontiguousarray(self.rotation.T @ other.rotation)
+        return float(np.rad2deg(np.linalg.norm(so3_log(turn))))
 
     @property
     def homography(self) -> FloatArray:

@@ -1,167 +1,186 @@
-"""Motions tried: from every linear route without wrong matches, from random samples with them."""
+"""Models that many matches agree on, found by random samples and judged against chance."""
 
 from itertools import combinations
-from math import comb, log
+from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.geometry import skew
-from vergence.vision.two_view.checks import widest_triples
-from vergence.vision.two_view.decomposition import (
-    decompose_essential,
-    decompose_homography,
-    inverse_depths,
-    nearest_rotation,
-)
-from vergence.vision.two_view.linear import homogeneous, linear_essential, linear_homography
-from vergence.vision.two_view.sampson import refine_essential, sampson_residuals
-from vergence.vision.two_view.small import dot, inverse3, times, transposed_times, unit
+from vergence.vision.two_view.evidence import least_false_alarms, log_densities
+from vergence.vision.two_view.linear import homogeneous, linear_homography
+from vergence.vision.two_view.motions import choose_motion, essential
+from vergence.vision.two_view.sampson import refine_essential
+from vergence.vision.two_view.small import apply, inverse3, times, transposed_apply
 
-SAMPLES = 400  # most random samples of matches that are tried
-CONFIDENCE = 0.999  # with which one of the samples should be free of wrong matches
+PLANE_SAMPLES = 400  # most samples of four matches
+MOTION_SAMPLES = 150  # most samples of five
+_FLOOR = 1.0  # least threshold, standard deviations of the stated noise
+_MANY = 16  # matches from which on they tell how large the noise is
 
 
-@njit(cache=True)
-def rotation_between(m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the rotation R that best turns the desired rays into the current ones."""
-    a, b = homogeneous(m_star), homogeneous(m)
-    for j in range(len(a)):
-        a[j], b[j] = unit(a[j]), unit(b[j])
-    return nearest_rotation(transposed_times(b, a))
+class Agreement(NamedTuple):
+    """The matches that agree on one model."""
+
+    log_alarms: float  # log₁₀ of the number of false alarms
+    error: float  # largest of an agreeing match, normalized coordinates
+    kept: BoolArray  # (N,)
+    errors: FloatArray  # (N,) of all matches, normalized coordinates
+
+    @property
+    def size(self) -> int:
+        """How many agree."""
+        return int(np.count_nonzero(self.kept))
 
 
-@njit(cache=True)
-def choose_motion(
-    E: FloatArray, m_star: FloatArray, m: FloatArray
-) -> tuple[FloatArray, FloatArray, int]:
-    """Return the motion (R, t) of E that puts most points before both cameras, and their number."""
-    rotations, translations = decompose_essential(E)
-    best, most = 0, -1
-    for k in range(4):
-        _, front = inverse_depths(rotations[k], translations[k], m_star, m)
-        if front > most:
-            best, most = k, front
-    return rotations[best], translations[best], most
+def ceiling(count: int) -> float:
+    """Return the largest threshold, in standard deviations of the stated noise.
+
+    It is three deviations of noise up to four times as large as stated, or up to twice as large
+    if there are few matches.
+    """
+    return 12.0 if count >= _MANY else 6.0
 
 
-@njit(cache=True)
-def fit_general(
-    m_star: FloatArray, m: FloatArray, guesses: int, penalty: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return the motion of an object of any shape: linear guesses, each refined, the best kept.
+def find_plane(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
+    """Return the matches that agree on one homography, from samples of four.
 
-    The linear solution depends on the reference triple and is fragile, so several are tried, and
-    the two motions of the best common plane as well (an object may be nearly flat).
+    Args:
+        m_star: points in the desired view, normalized, (N, 2), N ≥ 5.
+        m: the same points in the current view, (N, 2).
+        noise: stated standard deviation of a normalized coordinate.
+    """
+    samples = _samples(len(m), 4, PLANE_SAMPLES)
+    disc, _ = log_densities(m_star, m)
+    return _agreement(
+        *_best_plane(samples, m_star, m, disc, _FLOOR * noise, ceiling(len(m)) * noise)
+    )
+
+
+def find_motion(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
+    """Return the matches that agree on one motion of an object of any shape, from samples of five.
 
     Args:
         m_star: points in the desired view, normalized, (N, 2), N ≥ 8.
         m: the same points in the current view, (N, 2).
-        guesses: how many reference triples to try.
-        penalty: what a point behind a camera adds to the cost.
-
-    Returns:
-        R (3, 3), unit t (3,) and the cost: squared Sampson distances plus penalties.
+        noise: stated standard deviation of a normalized coordinate.
     """
-    triples = widest_triples(m_star, m, guesses)
-    plane_R, plane_t, _ = decompose_homography(linear_homography(m_star, m))
-    best_R, best_t, best_cost = plane_R[0], np.array([0.0, 0.0, 1.0]), np.inf
-    for k in range(guesses + 2):
-        if k < guesses:
-            if triples[k, 0] == triples[k, 1]:
-                continue
-            E = linear_essential(m_star, m, triples[k])
-        else:
-            E = times(skew(plane_t[k - guesses]), plane_R[k - guesses])
-        if not np.isfinite(E).all() or np.linalg.norm(E) < 1e-9:
-            continue
-        R, t, _ = choose_motion(E, m_star, m)
-        R, t, cost = refine_essential(R, t, m_star, m, 15)
-        R, t, front = choose_motion(times(skew(t), R), m_star, m)
-        cost += penalty * (len(m) - front)
-        if cost < best_cost:
-            best_R, best_t, best_cost = R, t, cost
-    return best_R, best_t, best_cost
+    matrices = five_point_motions(m_star, m, MOTION_SAMPLES)
+    _, band = log_densities(m_star, m)
+    return _agreement(
+        *_best_motion(matrices, m_star, m, band, _FLOOR * noise, ceiling(len(m)) * noise)
+    )
 
 
-@njit(cache=True)
-def epipolar_errors(R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the squared Sampson distance of each match, infinite behind a camera."""
-    errors = sampson_residuals(times(skew(t), R), m_star, m) ** 2
-    w, _ = inverse_depths(R, t, m_star, m)
-    for j in range(len(m)):
-        a = np.array([m_star[j, 0], m_star[j, 1], 1.0])
-        if w[j] <= 0.0 or dot(R[2], a) + w[j] * t[2] <= 0.0:
-            errors[j] = np.inf
-    return errors
+def five_point_motions(m_star: FloatArray, m: FloatArray, most: int) -> FloatArray:
+    """Return the essential matrices (M, 3, 3) of samples of five matches, up to ten a sample.
+
+    By the five-point algorithm of Nistér, in OpenCV.
+    """
+    import cv2
+
+    found = []
+    for sample in _samples(len(m), 5, most):
+        matrices, _ = cv2.findEssentialMat(
+            np.ascontiguousarray(m_star[sample]), np.ascontiguousarray(m[sample]), np.eye(3)
+        )
+        if matrices is not None:
+            found.append(np.asarray(matrices, dtype=np.float64).reshape(-1, 3, 3))
+    return np.concatenate(found) if found else np.zeros((0, 3, 3))
+
+
+def _agreement(log_alarms: float, error: float, errors: FloatArray) -> Agreement:
+    return Agreement(log_alarms, error, errors <= error, errors)
+
+
+def _samples(count: int, size: int, most: int) -> IntArray:
+    """Return samples of matches, (S, size): all if there are few, else the same for one count.
+
+    Half of them are drawn from the better half of the matches, as the surest come first.
+    """
+    if comb(count, size) <= most:
+        return np.array(list(combinations(range(count), size)), dtype=np.int64)
+    random = np.random.default_rng(0)
+    halves = (max(count // 2, size + 1), count)
+    return np.array(
+        [random.permutation(min(halves[k % 2], count))[:size] for k in range(most)], dtype=np.int64
+    )
 
 
 @njit(cache=True)
 def transfer_errors(H: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the squared distance of each match from m ~ H m*, the mean of both directions."""
+    """Return the distance of each match from m ~ H m*, the larger of both directions, (N,)."""
     forward, back = times(homogeneous(m_star), H.T), times(homogeneous(m), inverse3(H).T)
-    errors = np.empty(len(m))
+    errors = np.full(len(m), np.inf)
     for j in range(len(m)):
-        if forward[j, 2] <= 0.0:
-            errors[j] = np.inf
-            continue
-        there = forward[j, :2] / forward[j, 2] - m[j]
-        here = back[j, :2] / back[j, 2] - m_star[j]
-        errors[j] = 0.25 * (dot(there, there) + dot(here, here))
+        if forward[j, 2] > 0.0 and back[j, 2] > 0.0:
+            there = forward[j, :2] / forward[j, 2] - m[j]
+            here = back[j, :2] / back[j, 2] - m_star[j]
+            square = max(there[0] ** 2 + there[1] ** 2, here[0] ** 2 + here[1] ** 2)
+            errors[j] = np.sqrt(square)
     return errors
 
 
 @njit(cache=True)
-def sample_errors(
-    general: bool, sample: IntArray, m_star: FloatArray, m: FloatArray, gate: float
-) -> FloatArray:
-    """Return every match's error under the model of one sample, refitted twice to its inliers."""
-    chosen = sample
-    errors = np.full(len(m), np.inf)
-    for _ in range(3):
-        if general:
-            R, t, _ = fit_general(m_star[chosen], m[chosen], 2, gate)
-            errors = epipolar_errors(R, t, m_star, m)
-        else:
-            errors = transfer_errors(linear_homography(m_star[chosen], m[chosen]), m_star, m)
-        inliers = np.flatnonzero(errors < gate)
-        if len(inliers) <= len(sample):
-            break
-        chosen = inliers
+def epipolar_errors(E: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
+    """Return the distance of each match from its epipolar line, the larger of both views, (N,)."""
+    errors = np.empty(len(m))
+    for j in range(len(m)):
+        a = np.array([m_star[j, 0], m_star[j, 1], 1.0])
+        b = np.array([m[j, 0], m[j, 1], 1.0])
+        line, line_star = apply(E, a), transposed_apply(E, b)
+        miss = abs(line[0] * b[0] + line[1] * b[1] + line[2])
+        smaller = min(np.hypot(line[0], line[1]), np.hypot(line_star[0], line_star[1]))
+        errors[j] = miss / max(smaller, 1e-150)
     return errors
 
 
-def find_inliers(general: bool, m_star: FloatArray, m: FloatArray, gate: float) -> BoolArray:
-    """Return which matches agree on one motion, (N,): random samples, scored by truncated errors.
-
-    The samples come from a fixed seed, and all of them are tried where there are few, so that the
-    same matches always give the same answer.
-
-    Args:
-        general: an object of any shape from samples of eight, or a plane from samples of four.
-        m_star: points in the desired view, normalized, (N, 2).
-        m: the same points in the current view, (N, 2).
-        gate: squared error above which a match is wrong.
-    """
-    size = 8 if general else 4
-    best_score, best = np.inf, np.zeros(len(m), dtype=np.bool_)
-    needed = float(SAMPLES)
-    for tried, sample in enumerate(_samples(len(m), size)):
-        if tried >= needed:
-            break
-        errors = sample_errors(general, sample, m_star, m, gate)
-        score = float(np.minimum(errors, gate).sum())
-        if score < best_score:
-            best_score, best = score, errors < gate
-            clean = float(best.mean()) ** size
-            if clean > 0.0:
-                needed = log(1 - CONFIDENCE) / log(1 - clean) if clean < 1.0 else 0.0
-    return best
+@njit(cache=True)
+def _best_plane(
+    samples: IntArray,
+    m_star: FloatArray,
+    m: FloatArray,
+    density: float,
+    floor: float,
+    ceiling: float,
+) -> tuple[float, float, FloatArray]:
+    """Return log₁₀ NFA, threshold and errors (N,) of the homography least likely by chance."""
+    least, threshold, errors = np.inf, 0.0, np.full(len(m), np.inf)
+    for sample in samples:
+        chosen = sample
+        for _ in range(3):  # of the sample, then twice of all that agree
+            H = linear_homography(m_star[chosen], m[chosen])
+            tried = transfer_errors(H, m_star, m)
+            alarms, gate = least_false_alarms(tried, 4, 1, 2, density, floor, ceiling)
+            if not alarms < least:
+                break
+            least, threshold, errors = alarms, gate, tried
+            chosen = np.flatnonzero(tried <= gate)
+    return least, threshold, errors
 
 
-def _samples(count: int, size: int) -> IntArray:
-    if comb(count, size) <= SAMPLES:
-        return np.array(list(combinations(range(count), size)), dtype=np.int64)
-    random = np.random.default_rng(0)
-    return np.array([random.permutation(count)[:size] for _ in range(SAMPLES)], dtype=np.int64)
+@njit(cache=True)
+def _best_motion(
+    matrices: FloatArray,
+    m_star: FloatArray,
+    m: FloatArray,
+    density: float,
+    floor: float,
+    ceiling: float,
+) -> tuple[float, float, FloatArray]:
+    """Return log₁₀ NFA, threshold and errors (N,) of the motion least likely by chance."""
+    least, threshold, errors = np.inf, 0.0, np.full(len(m), np.inf)
+    for k in range(len(matrices)):
+        E = matrices[k]
+        for _ in range(3):  # as found, then twice refined on all that agree
+            tried = epipolar_errors(E, m_star, m)
+            alarms, gate = least_false_alarms(tried, 5, 10, 1, density, floor, ceiling)
+            if not alarms < least:
+                break
+            least, threshold, errors = alarms, gate, tried
+            chosen = np.flatnonzero(tried <= gate)
+            R, t, _ = choose_motion(E, m_star[chosen], m[chosen])
+            R, t, _ = refine_essential(R, t, m_star[chosen], m[chosen], 10)
+            E = essential(R, t)
+    return least, threshold, errors

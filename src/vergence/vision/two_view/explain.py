@@ -1,0 +1,156 @@
+"""What explains the matches of two views: a motion, several, or none."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vergence.arrays import BoolArray
+from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION
+from vergence.vision.two_view.consensus import (
+    agreements,
+    errors_of,
+    log_alarms_of,
+    log_chance_of_flatness,
+    off_plane,
+)
+from vergence.vision.two_view.evidence import CHANCE
+from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
+from vergence.vision.two_view.fit import (
+    FEWEST_GENERAL,
+    Comparison,
+    Fit,
+    Views,
+    compare_models,
+    hinging_on_one,
+)
+
+_GATE = 3.7  # standard deviations within which a match agrees (99.9 % of two coordinates)
+FLAT_CHANCE = -4.0  # log₁₀ of the NFA above which a plane is taken for chance
+_FEWEST = 5  # matches that determine every model
+FEW = 16  # matches below which one alone may bend the motion
+_ROUNDS = 2  # of fitting and finding the matches that agree
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """The motions that explain the matches."""
+
+    fits: list[Fit]  # the best first
+    scale: float  # variance of the noise over the stated one, at least 1
+    turned: int = 0  # other matches, which a turn of the camera alone explains
+
+
+def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
+    """Find the motions that explain the matches.
+
+    If a turn of the camera explains most of them, they may be of a background: then the others are
+    tried alone, for an object that moves before it.
+
+    Args:
+        views: all matches.
+        usable: which may be used, (N,).
+        flat: whether the object is known to be flat.
+    """
+    found = _explain_once(views, usable, flat)
+    if isinstance(found, TwoViewFailure) or found.fits[0].model != ROTATION:
+        return found
+    rest = usable.copy()
+    rest[found.fits[0].views.index] = False
+    if np.count_nonzero(rest) >= FEWEST_GENERAL:
+        second = _explain_once(views, rest, flat)
+        if isinstance(second, Explanation) and second.fits[0].model != ROTATION:
+            return replace(second, turned=len(found.fits[0].views))
+    return TwoViewFailure(
+        TwoViewProblem.NO_TRANSLATION,
+        "a turn of the camera alone explains both views, so the object's shape is unknown; if that "
+        "is the background, give a mask of the object to match_features",
+        found.fits[0].state.R.T.copy(),
+    )
+
+
+def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
+    """Return the first explanation that is to be believed, or why the likeliest is not."""
+    tried = views.take(usable)
+    if len(tried) == 4 and flat:
+        sets = [np.ones(4, dtype=np.bool_)]
+    else:
+        sets = [agreement.kept for agreement in agreements(tried)] if len(tried) > 4 else []
+    failure: TwoViewFailure | None = None
+    perhaps_flat: list[Fit] = []
+    for kept in sets:
+        comparison = _settled(tried, kept)
+        doubt = _doubted(comparison, tried, flat)
+        if doubt is None:
+            best, scale = comparison.fits[0], comparison.scale
+            few = _FEWEST < len(best.views) < FEW and best.model != ROTATION
+            others = hinging_on_one(best.views, best, scale) if few else []
+            return Explanation([*perhaps_flat, *comparison.fits, *others], scale)
+        failure = doubt if failure is None else failure
+        if comparison.fits[0].model == PLANE and doubt.problem is TwoViewProblem.TOO_FEW:
+            perhaps_flat.append(comparison.fits[0])
+    return _by_chance(tried, 0) if failure is None else failure
+
+
+def _settled(views: Views, kept: BoolArray) -> Comparison:
+    """Return the models of the matches that agree with the best of them."""
+    comparison = compare_models(views.take(kept))
+    for _ in range(_ROUNDS):
+        again = _agreeing(comparison.fits[0], comparison.scale, views)
+        if comparison.fits[0].model == GENERAL:
+            again = _without_chance(comparison, views, again)
+        if np.count_nonzero(again) < 4 or np.array_equal(again, kept):
+            break
+        kept = again
+        comparison = compare_models(views.take(kept))
+    return comparison
+
+
+def _without_chance(comparison: Comparison, views: Views, kept: BoolArray) -> BoolArray:
+    """Leave out the matches off a plane, if the plane is none by chance but they may be."""
+    general, plane = comparison.fits[0], comparison.plane
+    near = kept & _agreeing(plane, comparison.scale, views)
+    if np.count_nonzero(near) < 5 or log_chance_of_flatness(plane, views, near) > FLAT_CHANCE:
+        return kept
+    error = max(float(errors_of(general, views)[kept].max()), views.noise)
+    return kept if off_plane(views, near, kept, error) else near
+
+
+def _agreeing(fit: Fit, scale: float, views: Views) -> BoolArray:
+    # The distance between two measured points, or a point and a line through another, has twice
+    # the variance of a coordinate.
+    gate = np.sqrt(2.0 * scale) * _GATE * views.noise
+    near: BoolArray = errors_of(fit, views) <= gate
+    return near
+
+
+def _doubted(comparison: Comparison, views: Views, flat: bool) -> TwoViewFailure | None:
+    """Return why an explanation is not to be believed, if it is not."""
+    fit = comparison.fits[0]
+    if flat and len(fit.views) == len(views):
+        return None
+    if log_alarms_of(fit, views) > CHANCE:
+        return _by_chance(views, len(fit.views))
+    on_plane = np.isin(views.index, fit.views.index)
+    chance = log_chance_of_flatness(fit, views, on_plane) if fit.model == PLANE else -np.inf
+    if chance > FLAT_CHANCE and not flat:
+        return TwoViewFailure(
+            TwoViewProblem.TOO_FEW,
+            f"a plane explains {len(fit.views)} of {len(views)} matches, but so few may lie on one "
+            "by chance; say that the object is flat if it is, or give eight matches or more",
+        )
+    if fit.model == GENERAL and len(fit.views) < FEWEST_GENERAL:
+        return _by_chance(views, len(fit.views))
+    return None
+
+
+def _by_chance(views: Views, count: int) -> TwoViewFailure:
+    if len(views) < FEWEST_GENERAL:
+        return TwoViewFailure(
+            TwoViewProblem.TOO_FEW,
+            f"no plane explains {len(views)} matches better than chance; an object that is not "
+            "flat takes eight",
+        )
+    return TwoViewFailure(
+        TwoViewProblem.WRONG_MATCHES,
+        f"the best motion explains {count} of {len(views)} matches, no more than chance would",
+    )

@@ -1,0 +1,149 @@
+"""From a fitted model to the scaled Euclidean reconstruction, with what it leaves open."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.vision.two_view import bundle
+from vergence.vision.two_view.bundle import GENERAL, PLANE
+from vergence.vision.two_view.checks import widest_triples
+from vergence.vision.two_view.covariance import (
+    points_in_desired,
+    reference_plane,
+    upsilon_covariance,
+)
+from vergence.vision.two_view.decomposition import decompose_homography
+from vergence.vision.two_view.explain import Explanation
+from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
+from vergence.vision.two_view.fit import Fit
+from vergence.vision.two_view.linear import homogeneous
+from vergence.vision.two_view.result import TwoView
+
+
+class Report(NamedTuple):
+    """What a reconstruction is to be told in."""
+
+    total: int  # matches
+    reference: IntArray | None  # indices of points that span the reference plane
+    hint: FloatArray  # (3,) where the normal of a flat object is thought to point
+    noise_px: float  # stated
+
+    def of(self, found: Explanation) -> TwoView | TwoViewFailure:
+        """Return the likeliest motion with its alternatives."""
+        motions: list[TwoView] = []
+        for fit in found.fits:
+            motions += (
+                self._of_plane(fit, found) if fit.model == PLANE else self._of_any(fit, found)
+            )
+        if not motions:
+            return TwoViewFailure(
+                TwoViewProblem.WRONG_MATCHES,
+                "what explains the matches lies behind a camera, or the points of the reference "
+                "plane are wrong matches",
+            )
+        return _with_doubt(motions, found.turned)
+
+    def _of_plane(self, fit: Fit, found: Explanation) -> list[TwoView]:
+        """Return the motions behind a homography, that whose normal is along the hint first."""
+        H = fit.state.R + np.outer(fit.state.t, fit.state.n)
+        H = H / np.linalg.svd(H)[1][1]
+        motions = zip(*decompose_homography(H), strict=True)
+        results = [self._planar_motion(fit, found, *motion) for motion in motions]
+        possible = sorted(
+            (result for result in results if result is not None),
+            key=lambda result: -float(result.normal @ self.hint),
+        )
+        if len(possible) == 2 and np.allclose(possible[0].upsilon, possible[1].upsilon, atol=1e-6):
+            return possible[:1]
+        return possible
+
+    def _planar_motion(
+        self, fit: Fit, found: Explanation, R: FloatArray, t: FloatArray, n: FloatArray
+    ) -> TwoView | None:
+        rays = homogeneous(fit.state.x_star)
+        inverse_rho_star = rays @ n
+        depth = rays @ R[2] + inverse_rho_star * t[2]
+        if inverse_rho_star.min() <= 0.0 or depth.min() <= 0.0:
+            return None
+        state = fit.state._replace(R=R, t=t, n=n)
+        blocks = bundle.normal_blocks(PLANE, state, fit.residuals, fit.views.weight)
+        covariance = upsilon_covariance(PLANE, state, blocks, np.zeros(0, dtype=np.int64))
+        return TwoView(
+            rotation=R.T.copy(),
+            translation=-R.T @ t,
+            normal=n,
+            m_star=self._spread(fit.state.x_star, fit),
+            rho_star=self._spread(1.0 / inverse_rho_star, fit),
+            rho=self._spread(depth / inverse_rho_star, fit),
+            delta=self._spread(np.zeros(len(rays)), fit),
+            covariance=found.scale * covariance,
+            inliers=self._inliers(fit),
+            planar=True,
+            rms_px=self._rms_px(fit),
+            noise_px=self.noise_px * float(np.sqrt(found.scale)),
+        )
+
+    def _of_any(self, fit: Fit, found: Explanation) -> list[TwoView]:
+        """Return the motion of an object of any shape, none without its reference plane."""
+        if self.reference is None:
+            chosen = widest_triples(fit.views.m_star, fit.views.m, 1)[0]
+        else:
+            chosen = np.flatnonzero(np.isin(fit.views.index, self.reference))
+        return [self._general_motion(fit, found, chosen)] if len(chosen) >= 3 else []
+
+    def _general_motion(self, fit: Fit, found: Explanation, chosen: IntArray) -> TwoView:
+        state = fit.state
+        N = reference_plane(points_in_desired(state, chosen))
+        inverse_distance = float(np.linalg.norm(N))
+        blocks = bundle.normal_blocks(GENERAL, state, fit.residuals, fit.views.weight)
+        rays = homogeneous(state.x_star)
+        rho_star = inverse_distance / state.w
+        covariance = upsilon_covariance(GENERAL, state, blocks, chosen)
+        return TwoView(
+            rotation=state.R.T.copy(),
+            translation=-state.R.T @ state.t * inverse_distance,
+            normal=N / inverse_distance,
+            m_star=self._spread(state.x_star, fit),
+            rho_star=self._spread(rho_star, fit),
+            rho=self._spread(rho_star * fit.depths, fit),
+            delta=self._spread(rays @ N / inverse_distance - 1.0 / rho_star, fit),
+            covariance=found.scale * covariance,
+            inliers=self._inliers(fit),
+            planar=False,
+            rms_px=self._rms_px(fit),
+            noise_px=self.noise_px * float(np.sqrt(found.scale)),
+        )
+
+    def _rms_px(self, fit: Fit) -> float:
+        return float(self.noise_px * np.sqrt(fit.chi_square / fit.residuals.size))
+
+    def _inliers(self, fit: Fit) -> BoolArray:
+        inliers = np.zeros(self.total, dtype=np.bool_)
+        inliers[fit.views.index] = True
+        return inliers
+
+    def _spread(self, values: FloatArray, fit: Fit) -> FloatArray:
+        """Return values of the inliers at their places among all matches, NaN elsewhere."""
+        result = np.full((self.total, *values.shape[1:]), np.nan)
+        result[fit.views.index] = values
+        return result
+
+
+def _with_doubt(motions: list[TwoView], turned: int) -> TwoView:
+    """Return the best with its alternatives, and in words what the matches do not decide."""
+    best, others, doubts = motions[0], motions[1:], []
+    if others:
+        apart = ", ".join(f"{best.apart_deg(other):.0f}°" for other in others)
+        cure = "points off the plane, its normal" if best.planar else "more matches"
+        doubts.append(
+            f"{len(motions)} motions explain the matches, {apart} apart; {cure} or a third image "
+            "from farther aside would tell them apart"
+        )
+    if turned:
+        doubts.append(
+            f"{turned} other matches show a turn of the camera alone: they are taken for a "
+            "background"
+        )
+    return replace(best, alternatives=tuple(others), doubt="; ".join(doubts))
