@@ -11,6 +11,7 @@ from watched import Watched
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+_TIMEOUT_S = 180.0  # the first run compiles
 STRANGER = "http://evil.example"
 WRONG = (
     '{"do":"law","name":"zzz"}',
@@ -54,7 +55,7 @@ class Page:
     def status(self) -> dict[str, Any]:
         """Return the next status; refusals that come before it are kept."""
         while True:
-            message = self.line.recv(30)
+            message = self.line.recv(_TIMEOUT_S)
             if isinstance(message, str):
                 self.refused.append(json.loads(message)["refused"])
                 continue
@@ -65,7 +66,7 @@ class Page:
     def read_on(self) -> None:
         """Read whatever comes."""
         while True:
-            self.line.recv(30)
+            self.line.recv(_TIMEOUT_S)
 
     def wait_for(self, key: str, later_than: float) -> float:
         for _ in range(3000):
@@ -79,7 +80,10 @@ class Page:
 def two_pages(watched: Watched) -> Iterator[tuple[Page, Page]]:
     origin = watched.address.rstrip("/")
     live = origin.replace("http", "ws") + "/live"
-    with connect(live, origin=origin) as first, connect(live, origin=origin) as second:
+    with (
+        connect(live, origin=origin, close_timeout=1) as first,
+        connect(live, origin=origin, close_timeout=1) as second,
+    ):
         yield Page(first), Page(second)
 
 

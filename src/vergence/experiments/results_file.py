@@ -1,14 +1,19 @@
 """The results of a campaign in a file that survives whatever happens to it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from vergence.errors import InputError
 from vergence.experiments.trial import TrialResult
 
 RESULTS = "results.jsonl"
+_LONGEST_LINE = 1 << 20  # bytes
+_MOST_RESULTS = 1_000_000
+_RESULT = TypeAdapter(TrialResult)
 
 
 class Ledger:
@@ -37,9 +42,9 @@ class Ledger:
                 f"results of another campaign: {', '.join(changed)} differ",
                 "an empty folder, or the one of the same campaign to go on with it",
             )
-        self.results = {line["key"]: TrialResult.from_json(line) for line in lines[1:]}
-        with self.path.open("w", encoding="utf-8") as file:  # without a line that was cut off
-            for line in lines or [header]:
+        self.results = _readable(lines[1:])
+        with self.path.open("w", encoding="utf-8") as file:  # without lines that were cut off
+            for line in (header, *(result.as_json() for result in self.results.values())):
                 file.write(json.dumps(line) + "\n")
 
     def add(self, result: TrialResult) -> None:
@@ -50,12 +55,31 @@ class Ledger:
 
 
 def _whole_lines(path: Path) -> list[dict[str, Any]]:
+    """Return the lines of a file up to the first that is cut off, damaged, or longer than any."""
     if not path.is_file():
         return []
-    lines = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        try:
-            lines.append(json.loads(line))
-        except json.JSONDecodeError:  # the line that was being written when the power went
-            break
+    lines: list[dict[str, Any]] = []
+    with path.open("rb") as file:
+        while (line := file.readline(_LONGEST_LINE)) and len(lines) <= _MOST_RESULTS:
+            try:
+                values = json.loads(line)
+            except (ValueError, RecursionError):
+                break
+            if not isinstance(values, dict):
+                break
+            lines.append(values)
+    if not lines and path.stat().st_size:
+        raise InputError(str(path), "", "a file that begins otherwise", "results of a campaign")
     return lines
+
+
+def _readable(lines: Sequence[dict[str, Any]]) -> dict[str, TrialResult]:
+    """Return the results that lines hold; a line that holds none is run again."""
+    results = {}
+    for line in lines:
+        try:
+            result = _RESULT.validate_python(line)
+        except ValueError:
+            continue
+        results[result.key] = result
+    return results

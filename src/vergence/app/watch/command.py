@@ -12,6 +12,7 @@ from vergence.errors import InputError
 from vergence.places import RECORDING, find_recording
 
 if TYPE_CHECKING:
+    from vergence.app.watch.live import Live
     from vergence.app.watch.server import Server
 
 
@@ -59,15 +60,15 @@ def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
     from vergence.app.watch.server import Server, listen
     from vergence.runtime import Recording
 
-    listener = listen(request.host, request.port)
-    with working("reading the recording"):
-        replay = Replay(Recording.open(path))
-    with closing(replay):
-        scene = replay.scene.path if replay.scene is not None else None
-        server = Server(listener, replay.view_state, replay.ask, scene, request.host)
-        with closing(server), suppress(KeyboardInterrupt):
-            _invite(server, request)
-            replay.run()
+    with listen(request.host, request.port) as listener:
+        with working("reading the recording"):
+            replay = Replay(Recording.open(path))
+        with closing(replay):
+            scene = replay.scene.path if replay.scene is not None else None
+            server = Server(listener, replay.view_state, replay.ask, scene, request.host)
+            with closing(server), suppress(KeyboardInterrupt):
+                _invite(server, request)
+                replay.run()
     return {"run": path.parent, "address": server.address}
 
 
@@ -82,25 +83,28 @@ def _watch_cell(request: Request) -> Mapping[str, object]:
     from vergence.app.watch.live import Live
     from vergence.app.watch.server import Server, listen
 
-    listener = listen(request.host, request.port)
     editor = LawEditor(request.source, settings, request.seed)
     out = request.out or new_folder(editor.cell.name)
-    with working("setting up the cell"):
-        live = Live(editor, request.images, out, request.image_every)
-    with (
-        closing(live),
-        closing(
-            Server(listener, live.view_state, live.ask, live.scene.path, request.host)
-        ) as server,
-    ):
-        try:
-            _invite(server, request)
-            outcome = live.run().outcome
-            end = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-        except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
-            end = {"kind": "stopped", "reason": "stopped by the user", "time": 0.0}
+    with listen(request.host, request.port) as listener:
+        with working("setting up the cell"):
+            live = Live(editor, request.images, out, request.image_every)
+        with closing(live):
+            scene = live.scene.path
+            server = Server(listener, live.view_state, live.ask, scene, request.host)
+            with closing(server):
+                end = _end(live, server, request)
     _say(f"recorded: `vergence watch {live.folder}` shows it again", request)
     return {"cell": editor.cell.name, "address": server.address, "run": live.folder, "outcome": end}
+
+
+def _end(live: "Live", server: "Server", request: Request) -> Mapping[str, object]:
+    """Run until Ctrl-C; return how it ended."""
+    try:
+        _invite(server, request)
+        outcome = live.run().outcome
+    except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
+        return {"kind": "stopped", "reason": "stopped by the user", "time": 0.0}
+    return {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
 
 
 def _invite(server: "Server", request: Request) -> None:

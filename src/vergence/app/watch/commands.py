@@ -1,6 +1,6 @@
 """What a page may ask for: each command, and the range of its numbers."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, get_args
 
 from pydantic import (
     BaseModel,
@@ -13,8 +13,9 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
 )
+from pydantic_core import ErrorDetails
 
-from vergence.errors import InputError
+from vergence.errors import InputError, echo
 
 _Name = Annotated[str, StringConstraints(strict=True, max_length=100)]
 _Place = Annotated[float, Field(ge=-1e5, le=1e5)]  # px, or normalized image coordinates
@@ -131,6 +132,7 @@ Command: TypeAlias = (
     | LetGo
 )
 
+_VERBS = [get_args(kind.model_fields["do"].annotation)[0] for kind in get_args(Command)]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])
 
 
@@ -143,6 +145,16 @@ def parse(message: str | bytes) -> Command:
     try:
         return _COMMANDS.validate_json(message)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
+        first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise InputError("message", key, first["input"], first["msg"]) from None
+        raise InputError("message", key, first["input"], _allowed(first)) from None
+
+
+def _allowed(complaint: ErrorDetails) -> str:
+    """Return what a message may say where it says something else."""
+    match complaint["type"]:
+        case "json_invalid":
+            return "a command as JSON"
+        case "union_tag_invalid" | "union_tag_not_found":
+            return f"do: {', '.join(_VERBS)}"
+    return echo(complaint["msg"].removeprefix("Input should be "))
