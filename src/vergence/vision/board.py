@@ -1,4 +1,4 @@
-"""Calibration boards: chessboards and ChArUco boards, their picture and their corners."""
+"""Calibration boards: chessboards, ChArUco boards and grids of circles."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,87 +8,123 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera.calibration import Sighting
 from vergence.errors import InputError, nearest
-from vergence.geometry import transform_points
+from vergence.geometry import se3, so3_exp, transform_points
+from vergence.vision.board_finders import (
+    Corners,
+    charuco_board,
+    find_charuco,
+    find_chessboard,
+    find_circles,
+)
 from vergence.vision.marks.coded import DICTIONARIES
 
 DICTIONARY = "aruco_5x5_250"  # of markers, where nothing else is said
+PATTERNS = ("squares", "circles", "asymmetric_circles")
+_MOST = 200  # corners in a row or column
 _QUIET = 0.5  # white around the squares, in squares
-_ROOM = 0.35  # of the least distance of two corners: half a window for refining one
-_FEWEST_CORNERS = 8  # of a ChArUco board, for a picture to count
+_CIRCLE = 0.25  # radius of a circle, in squares
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A flat board of black and white squares; with a marker in each white one, a ChArUco board.
+    """A flat board: a chessboard, a ChArUco board with a marker in each white square, or circles.
 
-    Corners are those inside, where four squares meet, row by row. The board's frame has its origin
-    in the first, x along the rows, y along the columns, and z into the board.
+    Corners are those inside, where four squares meet, row by row; of a grid of circles they are the
+    centres. The board's frame has its origin in the first, x along the rows, y along the columns,
+    and z into the board. In an asymmetric grid every other row is moved by one `square_m`, circles
+    in a row are two apart, and rows one: 4 columns and 11 rows is OpenCV's.
     """
 
-    columns: int  # inner corners in a row
+    columns: int  # inner corners, or circles, in a row
     rows: int
-    square_m: float
-    marker_m: float | None = None  # side of a marker; None for a chessboard
+    square_m: float  # side of a square, or distance of two circles
+    marker_m: float | None = None  # side of a marker; None without markers
     dictionary: str = DICTIONARY  # of the markers
+    pattern: str = PATTERNS[0]
 
     def __post_init__(self) -> None:
+        if self.pattern not in PATTERNS:
+            raise InputError("board", "pattern", self.pattern, nearest(self.pattern, PATTERNS))
         for key in ("columns", "rows"):
-            if getattr(self, key) < 2:
-                raise InputError("board", key, getattr(self, key), "two inner corners or more")
+            if not 2 <= getattr(self, key) <= _MOST:
+                allowed = f"2 to {_MOST} inner corners"
+                raise InputError("board", key, getattr(self, key), allowed)
         if not 0.0 < self.square_m < 10.0:
             raise InputError("board", "square", self.square_m, "the side of a square in metres")
-        if self.marker_m is None:
-            if self.columns == self.rows:
-                allowed = "not as many rows as columns: turned by a quarter it would look the same"
-                raise InputError("board", "rows", self.rows, allowed)
-        elif not 0.0 < self.marker_m < self.square_m:
-            raise InputError("board", "marker", self.marker_m, "less than the square's side")
         if self.dictionary not in DICTIONARIES:
             allowed = nearest(self.dictionary, DICTIONARIES)
             raise InputError("board", "dictionary", self.dictionary, allowed)
+        if self.marker_m is not None:
+            self._require_marker(self.marker_m)
+        elif self.pattern == "squares" and self.columns == self.rows:
+            allowed = "not as many rows as columns: turned by a quarter it would look the same"
+            raise InputError("board", "rows", self.rows, allowed)
+
+    def _require_marker(self, marker_m: float) -> None:
+        if self.pattern != "squares":
+            raise InputError("board", "marker", marker_m, "none in a grid of circles")
+        if not 0.0 < marker_m < self.square_m:
+            raise InputError("board", "marker", marker_m, "less than the square's side")
 
     @property
     def points(self) -> FloatArray:
         """The corners in the board's frame, (rows · columns, 3), m."""
         y, x = np.mgrid[: self.rows, : self.columns]
+        if self.pattern == "asymmetric_circles":
+            x = 2 * x + y % 2
         return np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size))) * self.square_m
 
     @property
     def outline_m(self) -> tuple[float, float]:
         """Width and height with the white around, m."""
-        width = (self.columns + 1 + 2 * _QUIET) * self.square_m
-        return width, (self.rows + 1 + 2 * _QUIET) * self.square_m
+        width, height = 2.0 * self.center[:2] + (2 + 2 * _QUIET) * self.square_m
+        return float(width), float(height)
 
     @property
     def center(self) -> FloatArray:
         """The middle in the board's frame, (3,), m."""
-        return np.array([(self.columns - 1) / 2, (self.rows - 1) / 2, 0.0]) * self.square_m
+        middle: FloatArray = 0.5 * self.points.max(axis=0)
+        return middle
 
     def find(self, image: ImageArray, name: str) -> Sighting | None:
-        """Find the board in a grey picture; None where it is not seen, or not enough of it."""
-        found = self._find_chessboard(image) if self.marker_m is None else self._find_charuco(image)
-        if found is None:
-            return None
-        numbers, pixels = found
-        return Sighting(name, self.points[numbers], pixels)
+        """Find the board in a grey image; None where it is not seen, or not enough of it."""
+        found = self._corners(image)
+        return None if found is None else Sighting(name, self.points[found.numbers], found.pixels)
 
     def orientations(self, seen: Sighting) -> tuple[Sighting, ...]:
-        """Return a sighting as it is, and turned by half where a chessboard does not tell.
+        """Return a sighting as it is, and turned in each way in which the board looks the same."""
+        return tuple(
+            seen._replace(points=transform_points(self._turned(quarters), seen.points))
+            for quarters in self._symmetry()
+        )
 
-        With both numbers of corners even, or both odd, its colours are the same either way.
+    def _symmetry(self) -> tuple[int, ...]:
+        """Return by how many quarters of a turn the board may be turned and looks the same.
+
+        A chessboard whose numbers of corners are both even or both odd has the same colours upside
+        down. An asymmetric grid with an even number of rows has the same circles.
         """
-        if self.marker_m is not None or (self.columns + self.rows) % 2:
-            return (seen,)
-        half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
-        half_turn[:3, 3] = 2.0 * self.center
-        return seen, seen._replace(points=transform_points(half_turn, seen.points))
+        if self.marker_m is not None:
+            return (0,)
+        if self.pattern == "circles":
+            return (0, 1, 2, 3) if self.columns == self.rows else (0, 2)
+        counted = self.rows if self.pattern == "asymmetric_circles" else self.columns + self.rows
+        return (0,) if counted % 2 else (0, 2)
+
+    def _turned(self, quarters: int) -> FloatArray:
+        """Return the turn (4, 4) of the board about its middle, in its plane."""
+        R = np.round(so3_exp(np.array([0.0, 0.0, 0.5 * np.pi * quarters])))
+        T: FloatArray = se3(R, self.center - R @ self.center)
+        return T
 
     def picture(self, square_px: int) -> ImageArray:
-        """Return the board as a grey picture for printing or rendering, white around included."""
+        """Return the board as a grey image for printing or rendering, white around included."""
         import cv2
 
         quiet = round(_QUIET * square_px)
-        if self.marker_m is None:
+        if self.pattern != "squares":
+            inside = self._circles(square_px)
+        elif self.marker_m is None:
             row, column = np.mgrid[: self.rows + 1, : self.columns + 1]
             colours = np.where((row + column) % 2 == 0, 255, 0).astype(np.uint8)
             inside = np.kron(colours, np.ones((square_px, square_px), dtype=np.uint8))
@@ -100,47 +136,30 @@ class Board:
         )
         return np.asarray(bordered, dtype=np.uint8)
 
-    def _charuco(self) -> Any:
+    def _circles(self, square_px: int) -> ImageArray:
+        """Return dark circles on white, one square of white around their centres."""
         import cv2
 
+        centers = (self.points[:, :2] / self.square_m + 1.0) * square_px - 0.5
+        width, height = (centers.max(axis=0) + square_px + 0.5).astype(int)
+        image = np.full((height, width), 255, np.uint8)
+        bits = 4  # of a fraction of a pixel
+        for u, v in np.round(centers * 2**bits).astype(int).tolist():
+            radius = round(_CIRCLE * square_px * 2**bits)
+            cv2.circle(image, (u, v), radius, 0, cv2.FILLED, cv2.LINE_AA, bits)
+        return image
+
+    def _corners(self, image: ImageArray) -> Corners | None:
+        if self.pattern != "squares":
+            asymmetric = self.pattern == "asymmetric_circles"
+            return find_circles(image, self.columns, self.rows, asymmetric=asymmetric)
+        if self.marker_m is None:
+            return find_chessboard(image, self.columns, self.rows)
+        layouts = (False, True) if self.rows % 2 else (False,)  # the same for odd rows of squares
+        boards = tuple(self._charuco(old) for old in layouts)
+        return find_charuco(image, boards, self.columns)
+
+    def _charuco(self, old: bool = False) -> Any:
         assert self.marker_m is not None
-        known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[self.dictionary]))
-        size = (self.columns + 1, self.rows + 1)
-        return cv2.aruco.CharucoBoard(size, self.square_m, self.marker_m, known)
-
-    def _find_charuco(self, image: ImageArray) -> tuple[Any, FloatArray] | None:
-        import cv2
-
-        corners, ids, _, _ = cv2.aruco.CharucoDetector(self._charuco()).detectBoard(image)
-        if ids is None or len(ids) < _FEWEST_CORNERS:
-            return None
-        numbers = np.ravel(ids)
-        rows, columns = numbers // self.columns, numbers % self.columns
-        if len(set(rows.tolist())) < 2 or len(set(columns.tolist())) < 2:
-            return None
-        return numbers, np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-
-    def _find_chessboard(self, image: ImageArray) -> tuple[Any, FloatArray] | None:
-        import cv2
-
-        flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-        found, corners = cv2.findChessboardCornersSB(image, (self.columns, self.rows), flags=flags)
-        if not found:
-            return None
-        return slice(None), self._refined(image, np.asarray(corners).reshape(-1, 2))
-
-    def _refined(self, image: ImageArray, corners: Any) -> FloatArray:
-        """Move all corners of a chessboard to where its edges cross.
-
-        The finder itself is off by some hundredths of a pixel, alike for a whole picture, and the
-        pose of the board with it.
-        """
-        import cv2
-
-        grid = corners.reshape(self.rows, self.columns, 2)
-        steps = [np.hypot(*np.diff(grid, axis=axis).reshape(-1, 2).T).min() for axis in (0, 1)]
-        half = int(np.clip(_ROOM * min(steps), 2, 10))
-        criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-3)
-        start = np.array(corners, dtype=np.float32).reshape(-1, 1, 2)
-        moved = cv2.cornerSubPix(image, start, (half, half), (-1, -1), criteria)
-        return np.asarray(moved, dtype=np.float64).reshape(-1, 2)
+        known = DICTIONARIES[self.dictionary]
+        return charuco_board(self.columns, self.rows, self.square_m, self.marker_m, known, old)

@@ -1,0 +1,140 @@
+"""The corners of boards in an image, by OpenCV's finders."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+
+_ROOM = 0.35  # of the least distance of two corners: half a window for refining one
+_FEWEST_CORNERS = 8  # of a ChArUco board, for an image to count
+_BENT = 0.2  # of a square: how far distortion may move a corner
+_SMALLEST_CIRCLE_PX = 20.0  # area
+
+
+class Corners(NamedTuple):
+    """Corners that were found."""
+
+    numbers: Any  # which of the board's corners they are: an index of its points
+    pixels: FloatArray  # (n, 2)
+
+
+def find_chessboard(image: ImageArray, columns: int, rows: int) -> Corners | None:
+    """Find all inner corners of a chessboard; None where not all of them are seen.
+
+    None of OpenCV's finders sees every whole and sharp board: they are asked in turns.
+    """
+    import cv2
+
+    size = (columns, rows)
+    accurate, normalized = cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_NORMALIZE_IMAGE
+    for flags in (accurate, accurate | normalized, normalized):
+        found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
+        if found:
+            return Corners(slice(None), _refined(image, corners, size))
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | normalized | cv2.CALIB_CB_FAST_CHECK
+    found, corners = cv2.findChessboardCorners(image, size, flags=flags)
+    return Corners(slice(None), _refined(image, corners, size)) if found else None
+
+
+def chessboard_size(image: ImageArray) -> tuple[int, int] | None:
+    """Return columns and rows of inner corners of a chessboard of any size; None without one."""
+    import cv2
+
+    best = None
+    for flags in (0, cv2.CALIB_CB_NORMALIZE_IMAGE, cv2.CALIB_CB_EXHAUSTIVE):
+        found, corners, meta = cv2.findChessboardCornersSBWithMeta(
+            image, (3, 3), flags | cv2.CALIB_CB_LARGER
+        )
+        if not found or not _is_grid(np.asarray(corners, dtype=np.float64).reshape(*meta.shape, 2)):
+            continue
+        if best is None or meta.size > best[0] * best[1]:
+            best = int(meta.shape[1]), int(meta.shape[0])
+    return best
+
+
+def _is_grid(corners: FloatArray) -> bool:
+    """Whether corners (R, C, 2) lie as those of a flat board, but for some distortion."""
+    import cv2
+
+    y, x = np.mgrid[: corners.shape[0], : corners.shape[1]]
+    grid = np.column_stack((x.ravel(), y.ravel())).astype(np.float32)
+    H, _ = cv2.findHomography(grid, corners.reshape(-1, 2).astype(np.float32))
+    if H is None:
+        return False
+    expected = np.asarray(cv2.perspectiveTransform(grid[None], H)).reshape(corners.shape)
+    step = np.hypot(*np.diff(corners, axis=1).reshape(-1, 2).T).min()
+    return bool(np.hypot(*(expected - corners).reshape(-1, 2).T).max() < _BENT * step)
+
+
+def charuco_board(
+    columns: int, rows: int, square_m: float, marker_m: float, dictionary: str, old: bool = False
+) -> Any:
+    """Return OpenCV's ChArUco board of inner corners; old: as OpenCV laid it out before 4.6."""
+    import cv2
+
+    known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
+    board = cv2.aruco.CharucoBoard((columns + 1, rows + 1), square_m, marker_m, known)
+    board.setLegacyPattern(old)
+    return board
+
+
+def find_charuco(image: ImageArray, boards: tuple[Any, ...], columns: int) -> Corners | None:
+    """Find the corners of a ChArUco board, of the layout of which most are seen.
+
+    Args:
+        image: grey.
+        boards: OpenCV's, one for each layout.
+        columns: inner corners in a row.
+
+    Returns:
+        None where too few are seen, or all in one line.
+    """
+    import cv2
+
+    best = None
+    for board in boards:
+        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
+        if ids is not None and (best is None or len(ids) > len(best.numbers)):
+            pixels = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+            best = Corners(np.ravel(ids), pixels)
+    if best is None or len(best.numbers) < _FEWEST_CORNERS:
+        return None
+    in_line = any(len(np.unique(part)) < 2 for part in np.divmod(best.numbers, columns))
+    return None if in_line else best
+
+
+def find_circles(image: ImageArray, columns: int, rows: int, *, asymmetric: bool) -> Corners | None:
+    """Find the centres of a grid of dark circles; None where not all of them are seen."""
+    import cv2
+
+    kind = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+    options = cv2.SimpleBlobDetector.Params()
+    options.minArea, options.maxArea = _SMALLEST_CIRCLE_PX, image.size / (columns * rows)
+    options.minDistBetweenBlobs = 3.0
+    detector = cv2.SimpleBlobDetector.create(options)
+    for flags in (kind | cv2.CALIB_CB_CLUSTERING, kind):
+        found, centers = cv2.findCirclesGrid(
+            image, (columns, rows), flags=flags, blobDetector=detector
+        )
+        if found:
+            pixels = np.asarray(centers, dtype=np.float64).reshape(-1, 2)
+            return Corners(slice(None), pixels)
+    return None
+
+
+def _refined(image: ImageArray, corners: Any, size: tuple[int, int]) -> FloatArray:
+    """Move all corners of a chessboard to where its edges cross.
+
+    The finder itself is off by some hundredths of a pixel, alike for a whole image, and the pose of
+    the board with it.
+    """
+    import cv2
+
+    grid = np.reshape(corners, (size[1], size[0], 2))
+    steps = [np.hypot(*np.diff(grid, axis=axis).reshape(-1, 2).T).min() for axis in (0, 1)]
+    half = int(np.clip(_ROOM * min(steps), 2, 10))
+    criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-3)
+    start = np.array(corners, dtype=np.float32).reshape(-1, 1, 2)
+    moved = cv2.cornerSubPix(image, start, (half, half), (-1, -1), criteria)
+    return np.asarray(moved, dtype=np.float64).reshape(-1, 2)
