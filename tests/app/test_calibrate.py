@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vergence.app import main as command_line
-from vergence.app.calibration.poses import read_poses, write_poses
 from vergence.camera import read_camera
+from vergence.camera.calibration.arm_poses import read_poses, write_poses
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.geometry import se3, so3_exp
@@ -69,7 +69,7 @@ def test_projected_corners_give_the_truth_back_at_a_tenth_of_a_pixel(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     for cell in ("panda", "eye_to_hand"):
-        words = ("--synthetic", cell, "--projected", "--json", "--out", tmp_path)
+        words = ("--synthetic", cell, "--projected", "--json", "--out", tmp_path / cell)
         assert call(*words, monkeypatch=monkeypatch) == 0
         said = answer(capsys)
         estimates = {e["name"]: e for e in said["estimates"]}
@@ -140,11 +140,11 @@ def test_bad_pictures_and_poses_are_named(
     write_poses(images / "poses.csv", poses)
     assert call(images, "--json", "--out", tmp_path / "o", monkeypatch=monkeypatch) == 0
     said = answer(capsys)
-    reasons = {entry["picture"]: entry["reason"] for entry in said["left_out"]}
+    reasons = {entry["image"]: entry["reason"] for entry in said["left_out"]}
     assert "no board found" in reasons.pop("003.png")
     assert "no pose of the arm" in reasons.pop("010.png")
     assert set(reasons) == {"005.png", "008.png"}
-    assert all("a pose of another picture" in reason for reason in reasons.values())
+    assert all("a pose of another image" in reason for reason in reasons.values())
     assert said["used"] == 8
     place = np.array(said["mounting"]["T_mount_camera"])[:3, 3]
     np.testing.assert_allclose(place, (0.0, 0.0, 0.05), atol=5e-4)
@@ -171,9 +171,10 @@ def test_poses_that_are_all_alike_end_with_a_reason_and_code_1(
         (2, "001.png,0,0,0,one,0,0,0", "row 3: quaternion_wxyz", "4 finite numbers"),
         (2, "001.png,0,0,0,2,0,0,0", "row 3: quaternion_wxyz", "a unit quaternion w, x, y, z"),
         (2, "001.png,436,200,10,1,0,0,0", "row 3: position_m", "metres"),
-        (2, "000.png,0,0,0,1,0,0,0", "row 3", "one pose a picture"),
+        (2, "000.png,0,0,0,1,0,0,0", "row 3", "one pose an image"),
         (2, "999.png,0,0,0,1,0,0,0", "999.png", "000.png"),
         (0, "image,x,y,z,qw,qx,qy,qz", "row 1", "x_m"),
+        (2, "x" * 200_000, "row 2", "a row of CSV"),
     ],
 )
 def test_a_bad_row_is_named_with_what_is_allowed(
@@ -192,13 +193,18 @@ def test_a_bad_row_is_named_with_what_is_allowed(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "either a folder of pictures, or --synthetic CELL"),
+        ((), "either a folder of images, or --synthetic CELL"),
         (("nowhere",), "nowhere/board.toml: given no such file"),
         (("nowhere", "--board", "9x6"), "--square-mm: given nothing"),
         (("nowhere", "--board", "nine", "--square-mm", 20), "such as 11x8"),
         (("nowhere", "--board", "7x7", "--square-mm", 20), "not as many rows as columns"),
         (("nowhere", "--square-mm", 20), "with --board COLUMNSxROWS"),
         (("nowhere", "--board", "9x6", "--square-mm", 20), "no such folder"),
+        (
+            ("nowhere", "--board", "4x11", "--square-mm", 20, "--pattern", "dots"),
+            "asymmetric_circles",
+        ),
+        (("nowhere", "--square-deviation", 90), "--square-deviation: given 90"),
         (("--synthetic", "ur6"), "did you mean ur5"),
         (("--synthetic", "ur5", "--watch", "wirst"), "wrist"),
         (("--synthetic", "ur5", "--projected", "--lens", "k4"), "k1k2p1p2"),
@@ -221,3 +227,16 @@ def test_poses_come_back_from_every_kind_of_file(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text('[[poses]]\nimage = "a.png"\nposition = [1, 2, 3]\n')
     with pytest.raises(InputError, match="number 1: position"):
         read_poses(tmp_path / "bad.toml")
+
+
+def test_a_calibration_is_replaced_only_when_that_is_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    words = ("--synthetic", "eye_to_hand", "--projected", "--pictures", 8, "--out", tmp_path)
+    assert call(*words, monkeypatch=monkeypatch) == 0
+    before = (tmp_path / "camera.yaml").read_text()
+    assert call(*words, "--seed", 3, monkeypatch=monkeypatch) == 2
+    assert "or --overwrite" in capsys.readouterr().err
+    assert (tmp_path / "camera.yaml").read_text() == before
+    assert call(*words, "--seed", 3, "--overwrite", monkeypatch=monkeypatch) == 0
+    assert (tmp_path / "camera.yaml").read_text() != before

@@ -1,4 +1,4 @@
-"""`vergence calibrate`: lens and mounting of a camera from pictures of a board."""
+"""`vergence calibrate`: lens and mounting of a camera from images of a board."""
 
 import tempfile
 from collections.abc import Sequence
@@ -30,6 +30,8 @@ class Request(NamedTuple):
     square_mm: float | None
     marker_mm: float | None
     dictionary: str | None
+    pattern: str | None
+    square_deviation_percent: float
     poses: Path | None
     fixed: bool
     camera: Path | None  # known already
@@ -50,7 +52,6 @@ class Calibration(NamedTuple):
     truth: "Truth | None"
     lens: "LensFit"
     mounting: "MountingFit | None"
-    known: bool  # whether the lens was given
 
     @property
     def camera(self) -> "Camera":
@@ -81,7 +82,7 @@ class Calibration(NamedTuple):
         ]
 
 
-def calibrate(request: Request, out: Path | None, seed: int, as_json: bool) -> int:
+def calibrate(request: Request, out: Path | None, overwrite: bool, seed: int, as_json: bool) -> int:
     """Calibrate, write what a cell file reads, and say how well it is known.
 
     Raises:
@@ -93,9 +94,13 @@ def calibrate(request: Request, out: Path | None, seed: int, as_json: bool) -> i
 
     _require_one_source(request)
     _require_lens(request.lens)
+    _require_deviation(request.square_deviation_percent)
     T_world_base = _base(request)
     name = request.synthetic or str(request.images)
     folder = out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
+    if not overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
+        given = f"{folder}, which holds a calibration"
+        raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
     data, truth = _data(request, folder, seed)
     if truth is not None:
@@ -116,7 +121,7 @@ def calibrate(request: Request, out: Path | None, seed: int, as_json: bool) -> i
 def _require_one_source(request: Request) -> None:
     if (request.images is None) == (request.synthetic is None):
         given = "both" if request.images else "nothing"
-        allowed = "either a folder of pictures, or --synthetic CELL"
+        allowed = "either a folder of images, or --synthetic CELL"
         raise InputError("vergence calibrate", "", given, allowed)
     if request.synthetic is None:
         for key, value in (("--watch", request.watch), ("--projected", request.projected)):
@@ -129,6 +134,11 @@ def _require_lens(lens: str) -> None:
 
     if lens not in MODELS:
         raise InputError("vergence calibrate", "--lens", lens, nearest(lens, MODELS))
+
+
+def _require_deviation(percent: float) -> None:
+    if not 0.0 <= percent <= 20.0:
+        raise InputError("vergence calibrate", "--square-deviation", percent, "0 … 20, in percent")
 
 
 def _base(request: Request) -> "FloatArray":
@@ -152,7 +162,11 @@ def _data(request: Request, folder: Path, seed: int) -> "tuple[Dataset, Truth | 
     if request.synthetic is None:
         assert request.images is not None
         board = board_of_options(
-            request.board, request.square_mm, request.marker_mm, request.dictionary
+            request.board,
+            request.square_mm,
+            request.marker_mm,
+            request.dictionary,
+            request.pattern,
         )
         return read_dataset(request.images, board, request.poses), None
     from vergence.app.calibration.synthetic import Studio, make_data
@@ -180,16 +194,15 @@ def _calibrated(
         fit_mounting,
         free_parameters,
     )
+    from vergence.camera.calibration.from_folder import with_reason
 
     file = request.camera
     known = None if file is None else read_camera(file, data.width, data.height)
     lens = fit_lens(data.sightings, data.width, data.height, request.lens, known)
-    if isinstance(lens, CalibrationFailure) or data.T_base_flange is None:
-        return (
-            lens
-            if isinstance(lens, CalibrationFailure)
-            else Calibration(data, truth, lens, None, known is not None)
-        )
+    if isinstance(lens, CalibrationFailure):
+        return with_reason(lens, data.blank)
+    if data.T_base_flange is None:
+        return Calibration(data, truth, lens, None)
     arm = {s.name: T for s, T in zip(data.sightings, data.T_base_flange, strict=True)}
     mounting = fit_mounting(
         [data.board.orientations(seen) for seen in lens.sightings],
@@ -198,11 +211,12 @@ def _calibrated(
         lens.noise_px,
         fixed=request.fixed if truth is None else truth.fixed,
         free=None if known else free_parameters(request.lens),
+        scale_deviation=request.square_deviation_percent / 100.0,
         rng=np.random.default_rng(seed),
     )
     if isinstance(mounting, CalibrationFailure):
         return mounting
-    return Calibration(data, truth, lens, mounting, known is not None)
+    return Calibration(data, truth, lens, mounting)
 
 
 def _failed(failure: "CalibrationFailure", data: "Dataset", as_json: bool) -> int:
@@ -221,7 +235,7 @@ def _failed(failure: "CalibrationFailure", data: "Dataset", as_json: bool) -> in
 
 
 def _left_out(bad: "Sequence[BadImage]") -> list[dict[str, Any]]:
-    return [{"picture": b.name, "residual_px": b.residual_px, "reason": b.reason} for b in bad]
+    return [{"image": b.name, "residual_px": b.residual_px, "reason": b.reason} for b in bad]
 
 
 def _answer(found: Calibration, files: dict[str, Path]) -> dict[str, Any]:
@@ -231,7 +245,7 @@ def _answer(found: Calibration, files: dict[str, Path]) -> dict[str, Any]:
     answer: dict[str, Any] = {
         "command": "calibrate",
         "outcome": {"kind": "completed", "reason": ""},
-        "pictures": len(found.data.sightings) + len(found.data.blank),
+        "images": len(found.data.sightings) + len(found.data.blank),
         "used": len(found.lens.sightings if mounting is None else mounting.sightings),
         "left_out": _left_out(found.bad),
         "warnings": found.warnings,
@@ -251,6 +265,8 @@ def _answer(found: Calibration, files: dict[str, Path]) -> dict[str, Any]:
             "fixed": mounting.fixed,
             "T_mount_camera": mounting.T_mount_camera.tolist(),
             "T_mount_board": mounting.T_mount_board.tolist(),
+            "board_scale": mounting.board_scale,
+            "board_scale_deviation": float(mounting.deviations[-1]),
             "rms_px": mounting.rms_px,
             "arm_noise_m": mounting.noise.arm_m,
             "arm_noise_rad": mounting.noise.arm_rad,
@@ -266,13 +282,13 @@ def _answer(found: Calibration, files: dict[str, Path]) -> dict[str, Any]:
 def _tell(found: Calibration, files: dict[str, Path]) -> None:
     lens, mounting = found.lens, found.mounting
     say(
-        f"{len(lens.sightings)} pictures of the board · residual {lens.rms_px:.3f} px · "
-        f"a picture left out {lens.left_out_px.mean():.3f} px"
+        f"{len(lens.sightings)} images of the board · residual {lens.rms_px:.3f} px · "
+        f"an image left out {lens.left_out_px.mean():.3f} px"
     )
     if mounting is not None:
         import numpy as np
 
-        where = "fixed camera" if mounting.fixed else "camera in the hand"
+        where = "fixed camera" if mounting.fixed else "camera on the arm"
         say(
             f"{where}, {len(mounting.sightings)} poses · residual {mounting.rms_px:.3f} px · a "
             f"pose left out {mounting.left_out_px.mean():.3f} px, "
@@ -280,13 +296,18 @@ def _tell(found: Calibration, files: dict[str, Path]) -> None:
             f"{np.rad2deg(mounting.left_out_rad.mean()):.3f}° · arm poses good to "
             f"{1e3 * mounting.noise.arm_m:.2f} mm, {np.rad2deg(mounting.noise.arm_rad):.3f}°"
         )
+        if mounting.scale_deviation > 0.0:
+            percent = 100.0 * mounting.board_scale
+            say(
+                f"board {percent:.2f} ± {percent * mounting.deviations[-1]:.2f} % of the size given"
+            )
     say()
     for line in _table(found):
         say(line)
     say()
     _tell_left_out(found.bad)
     for words in found.warnings:
-        say(f"  beware: {words}")
+        say(f"  warning: {words}")
     say(f"  camera  {files['camera']}  (calibration = … in a cell file, or --camera of track)")
     say(f"  table   {files['table']}  (to paste into a cell file)")
     say(f"  report  {files['report']}")
@@ -311,8 +332,6 @@ def _table(found: Calibration) -> list[str]:
 
 
 def _tell_left_out(bad: "Sequence[BadImage]") -> None:
-    for picture in bad:
-        size = (
-            "" if picture.residual_px != picture.residual_px else f" ({picture.residual_px:.2f} px)"
-        )
-        say(f"  left out: {picture.name}{size}: {picture.reason}")
+    for image in bad:
+        size = "" if image.residual_px != image.residual_px else f" ({image.residual_px:.2f} px)"
+        say(f"  left out: {image.name}{size}: {image.reason}")

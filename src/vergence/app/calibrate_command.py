@@ -19,18 +19,33 @@ def register(app: typer.Typer) -> None:
 def calibrate(
     images: Annotated[
         Path | None,
-        typer.Argument(help="A folder of pictures; board.toml and poses.csv may lie in it."),
+        typer.Argument(help="A folder of images; board.toml and poses.csv may lie in it."),
     ] = None,
     board: Annotated[
-        str | None, typer.Option(metavar="CxR", help="Inner corners in a row x rows, as 11x8.")
+        str | None,
+        typer.Option(metavar="CxR", help="Inner corners, or circles, in a row x rows, as 11x8."),
     ] = None,
-    square_mm: Annotated[float | None, typer.Option(help="Side of a square.")] = None,
+    square_mm: Annotated[
+        float | None, typer.Option(help="Side of a square, or distance of two circles.")
+    ] = None,
     marker_mm: Annotated[
         float | None, typer.Option(help="Side of a marker; without it, a chessboard.")
     ] = None,
     dictionary: Annotated[
         str | None, typer.Option(help="Of the markers; aruco_5x5_250 if absent.")
     ] = None,
+    pattern: Annotated[
+        str | None,
+        typer.Option(help="squares, circles or asymmetric_circles, as 4x11; squares if absent."),
+    ] = None,
+    square_deviation: Annotated[
+        float,
+        typer.Option(
+            "--square-deviation",
+            metavar="PERCENT",
+            help="Standard deviation of the square's side: how well it was measured.",
+        ),
+    ] = 0.5,
     poses: Annotated[
         Path | None,
         typer.Option(
@@ -53,26 +68,27 @@ def calibrate(
     ] = None,
     synthetic: Annotated[
         str | None,
-        typer.Option(
-            metavar="CELL", help="Make the pictures in a cell.", autocompletion=names.cells
-        ),
+        typer.Option(metavar="CELL", help="Make the images in a cell.", autocompletion=names.cells),
     ] = None,
     watch: Annotated[str | None, typer.Option(help="Which camera of the cell.")] = None,
     chessboard: Annotated[
         bool, typer.Option("--chessboard", help="Make a chessboard instead of ChArUco.")
     ] = False,
-    pictures: Annotated[int, typer.Option(min=1, help="How many to make.")] = 30,
+    pictures: Annotated[int, typer.Option(min=1, help="How many images to make.")] = 30,
     projected: Annotated[
-        bool, typer.Option("--projected", help="Project corners instead of rendering pictures.")
+        bool, typer.Option("--projected", help="Project corners instead of rendering images.")
     ] = False,
     noise_px: Annotated[float, typer.Option(min=0, help="Of projected corners.")] = 0.1,
     out: Out = None,
-    seed: Annotated[int, typer.Option(help="Of all chance.")] = 0,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a calibration that is in --out.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Random seed.")] = 0,
     as_json: Json = False,
 ) -> None:
-    """Find a camera's lens, and where it is mounted, from pictures of a board.
+    """Find a camera's lens, and where it is mounted, from images of a board.
 
-    Pictures alone give the lens. With the arm's pose at each picture, lens and mounting are
+    Images alone give the lens. With the arm's pose at each image, lens and mounting are
     refined together.
     """
     from vergence.app.calibrate import Request
@@ -84,6 +100,8 @@ def calibrate(
         square_mm,
         marker_mm,
         dictionary,
+        pattern,
+        square_deviation,
         poses,
         fixed,
         camera,
@@ -96,4 +114,4 @@ def calibrate(
         projected,
         noise_px,
     )
-    raise typer.Exit(command(request, out, seed, as_json))
+    raise typer.Exit(command(request, out, overwrite, seed, as_json))

@@ -1,6 +1,7 @@
 """Image points from windows of images, and what two views of them tell."""
 
 from vergence.vision.board import Board
+from vergence.vision.board_file import read_board
 from vergence.vision.image import grey_image
 from vergence.vision.picking import Picked, pick_features
 from vergence.vision.ssd_tracker import SsdTracker
@@ -23,5 +24,6 @@ __all__ = [
     "TwoViewProblem",
     "estimate_two_view",
     "grey_image",
+    "read_board",
     "pick_features",
 ]

@@ -91,6 +91,12 @@ class Board:
         found = self._corners(image)
         return None if found is None else Sighting(name, self.points[found.numbers], found.pixels)
 
+    def seen_instead(self, image: ImageArray) -> str:
+        """Return in words which other board a grey image shows; empty if none."""
+        from vergence.vision.board_diagnosis import other_board
+
+        return other_board(self, image)
+
     def orientations(self, seen: Sighting) -> tuple[Sighting, ...]:
         """Return a sighting as it is, and turned in each way in which the board looks the same."""
         return tuple(

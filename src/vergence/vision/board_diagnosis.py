@@ -8,6 +8,8 @@ from vergence.vision.board_finders import chessboard_size
 from vergence.vision.marks.coded import DICTIONARIES
 
 _FEWEST_MARKERS = 4  # fewer may be chance
+_SMALLER = ("_50", "_100", "_250")  # dictionaries that the one of 1000 markers contains
+_LARGEST = tuple(name for name in DICTIONARIES if not name.endswith(_SMALLER))
 
 
 def other_board(board: Board, image: ImageArray) -> str:
@@ -17,7 +19,7 @@ def other_board(board: Board, image: ImageArray) -> str:
     """
     if board.marker_m is not None:
         return _other_markers(board, image) or _chessboard(board, image)
-    dictionary, ids = _markers(image, tuple(DICTIONARIES))
+    dictionary, ids = _markers(image, _LARGEST)
     if len(ids) < _FEWEST_MARKERS:
         return _chessboard(board, image)
     return f"markers of {dictionary} are seen: a ChArUco board, which needs its marker's side"
@@ -37,8 +39,7 @@ def _chessboard(board: Board, image: ImageArray) -> str:
 def _other_markers(board: Board, image: ImageArray) -> str:
     _, ids = _markers(image, (board.dictionary,))
     if len(ids) < _FEWEST_MARKERS:
-        others = tuple(name for name in DICTIONARIES if name != board.dictionary)
-        dictionary, ids = _markers(image, others)
+        dictionary, ids = _markers(image, _LARGEST)
         if len(ids) < _FEWEST_MARKERS:
             return ""
         return f"markers of {dictionary} are seen, not of {board.dictionary}"
@@ -52,7 +53,10 @@ def _other_markers(board: Board, image: ImageArray) -> str:
 
 
 def _markers(image: ImageArray, dictionaries: tuple[str, ...]) -> tuple[str, IntArray]:
-    """Return the dictionary of which most different markers are seen, and their numbers."""
+    """Return the dictionary of which most different markers are seen, and their numbers.
+
+    Of dictionaries that contain each other it is the smallest that has them all.
+    """
     import cv2
 
     best = dictionaries[0]
@@ -63,4 +67,7 @@ def _markers(image: ImageArray, dictionaries: tuple[str, ...]) -> tuple[str, Int
         numbers = np.unique(np.ravel(ids)).astype(np.int64) if ids is not None else most[:0]
         if len(numbers) > len(most):
             best, most = name, numbers
+    for size in _SMALLER if best.endswith("_1000") and len(most) else ():
+        if most.max() < int(size[1:]):
+            return best.removesuffix("_1000") + size, most
     return best, most

@@ -1,4 +1,4 @@
-"""The page of a calibration: numbers with their uncertainty, residuals, coverage, pictures."""
+"""The page of a calibration: numbers with their uncertainty, residuals, coverage, images."""
 
 from html import escape
 from pathlib import Path
@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 _ASSUMES = (
     "Deviations follow from the normal equations. They assume that errors of corners are "
-    "independent and as large as the residuals, that the board is flat and as large as said, and "
-    "that the lens follows the model; where arm poses are used, also that their errors are "
-    "independent from picture to picture. “Leaving out” is the deviation seen when each picture in "
-    "turn is left out; where it is much larger, an assumption does not hold."
+    "independent and as large as the residuals, that the board is flat, and as large as said "
+    "within the deviation of its size, and that the lens follows the model; where arm poses are "
+    "used, also that their errors are independent from image to image. “Leaving out” is the "
+    "deviation seen when each image in turn is left out; where it is much larger, an assumption "
+    "does not hold."
 )
 
 
@@ -42,7 +43,7 @@ def write_calibration_page(folder: Path, name: str, found: "Calibration") -> Pat
 
 def _header(name: str, found: "Calibration") -> str:
     warnings = found.warnings
-    words = "nothing to beware of" if not warnings else f"{len(warnings)} to beware of"
+    words = "no warnings" if not warnings else f"warnings: {len(warnings)}"
     remarks = "".join(f"<li>{escape(text)}</li>" for text in warnings)
     return (
         '<header><span class="kicker">vergence calibrate</span>'
@@ -53,10 +54,10 @@ def _header(name: str, found: "Calibration") -> str:
 
 
 def _bad(found: "Calibration") -> str:
-    """Return how many pictures were not used; empty if all were."""
+    """Return how many images were not used; empty if all were."""
     count = len(found.bad)
-    pictures = "one picture was" if count == 1 else f"{count} pictures were"
-    return markup.badge(f"{pictures} not used", False) if count else ""
+    images = "one image was" if count == 1 else f"{count} images were"
+    return markup.badge(f"{images} not used", False) if count else ""
 
 
 def _result(found: "Calibration") -> str:
@@ -79,9 +80,9 @@ def _numbers(found: "Calibration") -> list[str]:
     lens, mounting = found.lens, found.mounting
     covered = coverage(lens.sightings, found.data.width, found.data.height)
     rows = [
-        Row("pictures", str(len(lens.sightings)), "", "with the board, kept"),
-        Row("residual", f"{lens.rms_px:.3f}", "px", "root mean square, each picture's pose free"),
-        Row("left out", f"{lens.left_out_px.mean():.3f}", "px", "a picture under the others' lens"),
+        Row("images", str(len(lens.sightings)), "", "with the board, kept"),
+        Row("residual", f"{lens.rms_px:.3f}", "px", "root mean square, each image's pose free"),
+        Row("left out", f"{lens.left_out_px.mean():.3f}", "px", "an image under the others' lens"),
         Row("coverage", f"{100 * covered:.0f}", "%", "of 8 × 6 fields with a corner"),
     ]
     cards = [markup.table("Lens", rows)]
@@ -102,7 +103,13 @@ def _numbers(found: "Calibration") -> list[str]:
             "error of its poses, estimated",
         ),
         Row("arm, rotation", f"{np.rad2deg(mounting.noise.arm_rad):.4f}", "°"),
-        Row("arm turned", turned, "°", "about three axes, root mean square between pictures"),
+        Row(
+            "board",
+            f"{100 * mounting.board_scale:.2f}",
+            "%",
+            f"of the size given, ± {100 * mounting.deviations[-1]:.2f}",
+        ),
+        Row("arm turned", turned, "°", "about three axes, root mean square between images"),
     ]
     if found.truth is not None:
         error = rotation_error_deg(mounting, found.truth)
@@ -115,7 +122,7 @@ def _left_out(found: "Calibration") -> str:
         Row(b.name, "–" if np.isnan(b.residual_px) else f"{b.residual_px:.2f}", "px", b.reason)
         for b in found.bad
     ]
-    return markup.table("Pictures that were not used", rows)
+    return markup.table("Images that were not used", rows)
 
 
 def _figures(found: "Calibration") -> list[str]:
@@ -129,14 +136,14 @@ def _figures(found: "Calibration") -> list[str]:
         ),
         markup.figure(
             residual_bars_figure(lens.sightings, lens.residuals, lens.left_out_px),
-            "Residuals of the lens, picture by picture; each picture's pose is its own.",
+            "Residuals of the lens, image by image; each image's pose is its own.",
         ),
     ]
     if mounting is not None:
         figures.append(
             markup.figure(
                 residual_bars_figure(mounting.sightings, mounting.residuals, mounting.left_out_px),
-                "Residuals through the arm's poses, picture by picture.",
+                "Residuals through the arm's poses, image by image.",
             )
         )
     return figures

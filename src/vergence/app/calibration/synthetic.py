@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from vergence.app.calibration.dataset import BOARD, Dataset, write_board
-from vergence.app.calibration.poses import write_poses
+from vergence.app.calibration.dataset import Dataset
 from vergence.app.progress import bar
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.calibration import Sighting
+from vergence.camera.calibration.arm_poses import write_poses
 from vergence.cell import Cell, load_cell
 from vergence.errors import InputError, nearest
 from vergence.geometry import rpy_to_matrix, se3, se3_inverse, transform_points
 from vergence.vision.board import Board
+from vergence.vision.board_file import BOARD, write_board
 
 _COLUMNS, _ROWS = 9, 6  # inner corners of the board that is made
 _MARKER, _DICTIONARY = 0.7, "aruco_4x4_50"  # its markers: their side in squares, and their kind

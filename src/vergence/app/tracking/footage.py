@@ -9,12 +9,12 @@ import numpy as np
 
 from vergence.arrays import ImageArray
 from vergence.camera.grey_levels import grey_levels, grey_values, white_level
-from vergence.camera.image_file import image_files, read_image_file, require_size
+from vergence.camera.image_file import image_files, require_size
+from vergence.camera.image_folder import grey_images, require_like
 from vergence.errors import InputError
 
 VIDEOS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
 DEFAULT_RATE_HZ = 25.0
-_SAMPLED = 8  # images of a folder that tell how deep all are
 
 
 class Picture(NamedTuple):
@@ -36,39 +36,22 @@ class Footage:
     stamped: bool = False  # whether a video's own time stamps count, not the rate
 
     def pictures(self) -> Iterator[Picture]:
-        """Yield the images, all of one size, their grey levels by one scale.
-
-        The scale is that of the brightest of some images throughout the folder. An image that is
-        brighter still raises it from there on.
+        """Yield the images, all of one size; those of a folder as `grey_images` does.
 
         Raises:
             InputError: if one cannot be read, is too large, or differs in size or depth from the
                 first.
         """
-        first, white = None, self._white()
-        for name, time, raw in self._raw():
+        if self.files:
+            for number, (file, image) in enumerate(grey_images(self.files)):
+                yield Picture(str(file), number / self.rate_hz, image)
+            return
+        first = None
+        for name, time, raw in _video(self.path, self.rate_hz, self.stamped):
             values = grey_values(raw, name)
             first = values if first is None else first
-            _require_like(values, first, name)
-            white = white_level(values, white)
-            yield Picture(name, time, grey_levels(values, white))
-
-    def _white(self) -> float:
-        """Return the white level of some images of a folder; 0 for a video."""
-        white, step = 0.0, max(1, len(self.files) // _SAMPLED)
-        for file in self.files[::step]:
-            values = grey_values(read_image_file(file), str(file))
-            if values.dtype == np.uint8:
-                return white
-            white = white_level(values, white)
-        return white
-
-    def _raw(self) -> Iterator[tuple[str, float, np.ndarray]]:
-        """Yield name, time and pixels of each image."""
-        if not self.files:
-            yield from _video(self.path, self.rate_hz, self.stamped)
-        for number, file in enumerate(self.files):
-            yield str(file), number / self.rate_hz, read_image_file(file)
+            require_like(values, first, name)
+            yield Picture(name, time, grey_levels(values, white_level(values)))
 
 
 def open_footage(path: str | Path, rate_hz: float | None = None) -> Footage:
@@ -141,13 +124,3 @@ def _video(path: Path, rate_hz: float, stamped: bool) -> Iterator[tuple[str, flo
         video.release()
     if not number:
         raise InputError(str(path), "", "no image that can be read", "a video")
-
-
-def _require_like(values: np.ndarray, first: np.ndarray, name: str) -> None:
-    """Raise InputError if an image differs in size or depth from the first."""
-    if values.shape != first.shape:
-        given = f"{values.shape[1]} x {values.shape[0]} pixels"
-        allowed = f"{first.shape[1]} x {first.shape[0]}, as the first image"
-        raise InputError(name, "", given, allowed)
-    if values.dtype != first.dtype:
-        raise InputError(name, "", f"{values.dtype} values", f"{first.dtype}, as the first image")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from vergence.camera.calibration.sighting import BadImage, Sighting, pixels
 from vergence.camera.pinhole import Camera
 from vergence.errors import InputError
 from vergence.geometry import se3, se3_exp, so3_exp
+
+if TYPE_CHECKING:
+    from vergence.camera.calibration.from_folder import CalibrationBoard
 
 FEWEST_IMAGES = 4
 FEWEST_CORNERS = 6
@@ -60,6 +64,7 @@ class LensFit:
     residuals: tuple[FloatArray, ...]  # (2n,) each, px
     left_out_px: FloatArray  # (N,) rms of each image under the lens that the others give
     bad: tuple[BadImage, ...]
+    board: "CalibrationBoard | None" = None  # whose orientations a mounting's fit tries
 
     @property
     def deviations(self) -> FloatArray:

@@ -1,7 +1,8 @@
-"""Files of recorded arm poses: which picture was taken where."""
+"""Files of recorded arm poses: which image was taken where."""
 
 import csv
 from collections.abc import Iterator, Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion, quaternion_to_matrix, se3
-from vergence.tables import numbers, read_table, require_known
+from vergence.tables import numbers, read_table, read_text, require_known
 
 NAMES = ("poses.csv", "poses.toml", "poses.json", "poses.yaml")
 COLUMNS = ("image", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _KEYS = ("image", "position_m", "quaternion_wxyz")
+_MOST_BYTES = 10_000_000
 _FARTHEST_M = 20.0  # no arm reaches farther: the numbers are no metres
 
 
@@ -24,7 +26,7 @@ def find_poses(folder: Path) -> Path | None:
 
 
 def read_poses(path: Path) -> dict[str, FloatArray]:
-    """Read T_base_flange (4, 4) for each picture, by the picture's file name.
+    """Read T_base_flange (4, 4) for each image, by the image's file name.
 
     A CSV file has the columns image, x_m, y_m, z_m, qw, qx, qy, qz; a TOML or JSON file a list
     `poses` of tables with image, position_m and quaternion_wxyz.
@@ -37,13 +39,13 @@ def read_poses(path: Path) -> dict[str, FloatArray]:
     for place, row in rows:
         name = Path(str(row["image"])).name
         if name in poses:
-            raise InputError(str(path), place, f"{name} a second time", "one pose a picture")
+            raise InputError(str(path), place, f"{name} a second time", "one pose an image")
         poses[name] = _pose(row, str(path), place)
     return poses
 
 
 def write_poses(path: Path, poses: Mapping[str, FloatArray]) -> None:
-    """Write T_base_flange of each picture as CSV."""
+    """Write T_base_flange of each image as CSV."""
     with path.open("w", newline="") as stream:
         table = csv.writer(stream)
         table.writerow(COLUMNS)
@@ -53,27 +55,29 @@ def write_poses(path: Path, poses: Mapping[str, FloatArray]) -> None:
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    if not path.is_file():
-        raise InputError(str(path), "", "no such file", "recorded arm poses")
-    with path.open(newline="", encoding="utf-8-sig") as stream:
-        table = csv.DictReader(stream, skipinitialspace=True)
+    text = read_text(path, "recorded arm poses", _MOST_BYTES)
+    table = csv.DictReader(StringIO(text, newline=""), skipinitialspace=True)
+    try:
         header = table.fieldnames or ()
         for name in COLUMNS:
             if name not in header:
                 given = ", ".join(header) or "nothing"
                 raise InputError(str(path), "row 1", given, ", ".join(COLUMNS))
         for row in table:
-            place = f"row {table.line_num}"
-            if None in row or None in row.values():
-                raise InputError(str(path), place, "another number of values", "as many as names")
-            yield (
-                place,
-                {
-                    "image": row["image"].strip(),
-                    "position_m": [row[name] for name in COLUMNS[1:4]],
-                    "quaternion_wxyz": [row[name] for name in COLUMNS[4:]],
-                },
-            )
+            yield f"row {table.line_num}", _pose_row(row, path, table.line_num)
+    except csv.Error as error:
+        raise InputError(str(path), f"row {table.line_num}", error, "a row of CSV") from None
+
+
+def _pose_row(row: dict[Any, Any], path: Path, number: int) -> Mapping[str, Any]:
+    if None in row or None in row.values():
+        given = "another number of values"
+        raise InputError(str(path), f"row {number}", given, "as many as names")
+    return {
+        "image": row["image"].strip(),
+        "position_m": [row[name] for name in COLUMNS[1:4]],
+        "quaternion_wxyz": [row[name] for name in COLUMNS[4:]],
+    }
 
 
 def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -90,7 +94,7 @@ def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
             if key not in _KEYS:
                 raise InputError(str(path), f"{place}: {key}", "not known", nearest(key, _KEYS))
         if "image" not in row:
-            raise InputError(str(path), f"{place}: image", "nothing", "the picture's file name")
+            raise InputError(str(path), f"{place}: image", "nothing", "the image's file name")
         yield place, row
 
 
