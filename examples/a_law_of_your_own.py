@@ -6,13 +6,12 @@ import numpy as np
 
 from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.estimation import ExactPoints
 from vergence.features import interaction_matrix_points
 from vergence.planning import FixedReference
 from vergence.robot import Arm
 from vergence.runtime import Loop
 from vergence.signals import JointCommand, JointState, Observation, Reference
-from vergence.simulation import SimulatedDriver
+from vergence.simulation import ExactPoints, SimulatedDriver
 
 SQUARE = "[[0.06, 0.06, 0.0], [-0.06, 0.06, 0.0], [-0.06, -0.06, 0.0], [0.06, -0.06, 0.0]]"
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from vergence.cell import load_cell
 from vergence.control import ImageBased, Law, Limits, PseudoInverse, Servo
-from vergence.estimation import ExactPoints
 from vergence.planning import FixedReference
 from vergence.runtime import Loop, Recorder, Recording, RunInfo
 from vergence.signals import Reference
-from vergence.simulation import SimulatedDriver
+from vergence.simulation import ExactPoints, SimulatedDriver
 
 MARGIN_PX = 20.0
 BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are desired

@@ -117,6 +117,24 @@ def test_imports_only_point_up_the_list_of_rooms(path: Path) -> None:
     assert wrong == []
 
 
+# Where ground truth may be read: what makes it, what compares with it, and what records it.
+TRUTHFUL = ("simulation", "experiments", "studies", "app", "runtime/recording", "runtime/results")
+
+
+def test_ground_truth_is_read_only_where_runs_are_simulated_compared_or_reported() -> None:
+    found = []
+    for path in MODULES:
+        place = path.relative_to(SOURCE).as_posix()
+        if any(place.startswith(f"{room}/") for room in TRUTHFUL):
+            continue
+        names = {
+            n.attr for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Attribute)
+        }
+        if told := names & {"truth", "first_frame"}:
+            found.append(f"{place}: {', '.join(sorted(told))}")
+    assert found == []
+
+
 @pytest.mark.parametrize("name", ROOT_MODULES)
 def test_the_root_modules_use_no_room(name: str) -> None:
     names = [imported for _, imported in imported_names(SOURCE / f"{name}.py")]

@@ -20,6 +20,12 @@ def still(driver: SimulatedDriver) -> dict[str, Setpoint]:
     return {name: Setpoint(state.position, 0 * state.position) for name, state in joints.items()}
 
 
+def test_the_first_read_delivers_what_was_exposed_one_latency_before_the_start() -> None:
+    driver = driver_with(cameras__wrist__latency_frames="2")
+    assert [frame.time for frame in driver.read().frames] == [pytest.approx(-2 / 30)]
+    assert driver.read().frames == ()
+
+
 @pytest.mark.parametrize(("rate", "latency"), [(30, 0), (30, 2), (26, 3), (60, 1)])
 def test_pictures_are_exposed_at_the_cameras_rate_and_arrive_its_latency_later(
     rate: int, latency: int
@@ -30,7 +36,7 @@ def test_pictures_are_exposed_at_the_cameras_rate_and_arrive_its_latency_later(
     setpoints, arrivals = {}, []
     for tick in range(500):
         sample = driver.read()
-        arrivals += [(tick, frame.time) for frame in sample.frames]
+        arrivals += [(tick, frame.time) for frame in sample.frames if frame.time >= 0]
         if not setpoints:
             setpoints = {n: Setpoint(s.position, 0 * s.position) for n, s in sample.joints.items()}
         driver.step(setpoints)

@@ -1,49 +1,45 @@
-"""The task `follow`: the hand kept at a wanted pose relative to the target."""
+"""The task `follow`: the camera, or the target before it, kept at a desired relative pose."""
 
 from vergence.arrays import FloatArray
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.pose import follow_pose, target_shape
-from vergence.cell import Cell
+from vergence.assembly.pose import camera_poses, follow_pose, target_shape
+from vergence.assembly.started_driver import StartedDriver
 from vergence.cell.schema import FollowTable, Placement
 from vergence.errors import InputError
-from vergence.geometry import se3_inverse
+from vergence.geometry import se3_compose, se3_inverse
 from vergence.planning import FixedReference
-from vergence.signals import Reference
-from vergence.simulation import SimulatedDriver, placement_pose
+from vergence.signals import Observation, Reference
+from vergence.simulation import placement_pose
 
 
-def follow_parts(cell: Cell, task: FollowTable, driver: SimulatedDriver, images: bool) -> Parts:
-    """Put together what estimates the target's pose and keeps the hand beside it.
+def follow_parts(
+    context: LawContext, task: FollowTable, driver: StartedDriver, images: bool
+) -> Parts:
+    """Put together what estimates the target's pose and keeps it where it is desired.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
     """
-    model = target_shape(cell, driver.world)
-    driver.look_for(model.corners)
-    _require_sight(cell, driver)
-    planner = FixedReference(Reference(0.0, T_camera_target=_wanted_pose(task, driver)))
-    perception = follow_pose(cell, driver, model, images)
-    context = LawContext.of(cell, driver)
-    return Parts(perception, planner, build_law(context), context)
+    cell, frames = context.cell, tuple(driver.frames.values())
+    shape = target_shape(cell, context.model)
+    begin = min(frame.time for frame in frames)
+    perception = follow_pose(context, shape, images, begin)
+    seen = perception.observe(frames)
+    if seen is None or not any(view.found.any() for view in seen.views):
+        given = f"at the start none of the cameras ({', '.join(cell.watched)}) sees a corner of it"
+        raise InputError(str(cell.path), "target", given, "a start from which a camera sees it")
+    desired = _desired_pose(context, task, seen)
+    planner = FixedReference(Reference(0.0, T_camera_target=desired))
+    return Parts(driver, perception, planner, build_law(context), context)
 
 
-def _wanted_pose(task: FollowTable, driver: SimulatedDriver) -> FloatArray:
-    """Return T_camera_target (4, 4) as the task wants it."""
+def _desired_pose(context: LawContext, task: FollowTable, seen: Observation) -> FloatArray:
+    """Return T_camera_target (4, 4): as the task states it, or as it is at the start."""
     if isinstance(task.desired, Placement):
         return placement_pose(task.desired)
-    truth = driver.first_frame(task.camera).truth
-    assert truth is not None
-    T_camera_target: FloatArray = se3_inverse(truth.T_world_camera) @ truth.T_world_target
-    return T_camera_target
-
-
-def _require_sight(cell: Cell, driver: SimulatedDriver) -> None:
-    names = cell.watched
-    for name in names:
-        truth = driver.first_frame(name).truth
-        if truth is not None and truth.visible.any():
-            return
-    given = f"at the start none of the cameras ({', '.join(names)}) sees a corner of it"
-    raise InputError(str(cell.path), "target", given, "a start from which a camera sees it")
+    assert seen.target is not None
+    T_world_camera = camera_poses(context)(task.camera, context.joints)
+    T: FloatArray = se3_compose(se3_inverse(T_world_camera), seen.target.T_world_target)
+    return T

@@ -2,20 +2,22 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
-from vergence.assembly.calibration_error import calibration_error
+from vergence.arrays import FloatArray
+from vergence.assembly.started_driver import StartedDriver
 from vergence.camera import Camera
 from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.robot import Arm
-from vergence.runtime.driver import Driver
-from vergence.simulation.cell_model import CellModel
+from vergence.simulation import placement_pose
 from vergence.simulation.solids import Solids
+
+if TYPE_CHECKING:
+    from vergence.simulation.cell_model import CellModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,37 +28,38 @@ class LawContext:
     """
 
     cell: Cell
-    model: CellModel  # arms at their start, the target at its placement
+    model: "CellModel"  # arms at their start, the target at its placement
     cameras: Mapping[str, Camera]  # by name
     inner_rate_hz: float
     joints: Mapping[str, FloatArray]  # positions at the start by arm name, (n,), rad or m
     points_px: Mapping[str, FloatArray]  # (M, 2) features in the first image, by camera name
 
+    joints_now: Callable[[], Mapping[str, FloatArray]]  # newest positions by arm name, (n,)
+
     @classmethod
-    def of(
-        cls,
-        cell: Cell,
-        driver: Driver,
-        points_px: Mapping[str, FloatArray] | None = None,
-        joints: Mapping[str, FloatArray] | None = None,
-    ) -> Self:
+    def of(cls, cell: Cell, driver: StartedDriver, model: "CellModel | None" = None) -> Self:
         """Return the context of a cell and a driver.
 
         Args:
             cell: the cell.
             driver: of its arms and cameras.
-            points_px: the features in the first image of each camera, (M, 2), where the task tracks
-                features.
-            joints: positions at the start by arm name, (n,); read from the driver if None.
+            model: of the cell, compiled already; it is placed at the start.
 
         Raises:
             InputError: if the models of the cell cannot be read.
         """
-        model = CellModel(cell)
-        if joints is None:
-            joints = {name: state.position for name, state in driver.read().joints.items()}
+        from vergence.simulation.cell_model import CellModel
+
+        model, joints = model or CellModel(cell), driver.joints
+        model.move_target(placement_pose(cell.target))
         model.place(joints)
-        return cls(cell, model, driver.cameras, driver.inner_rate_hz, joints, points_px or {})
+        return cls(
+            cell, model, driver.cameras, driver.inner_rate_hz, joints, {}, lambda: driver.joints
+        )
+
+    def with_points(self, points_px: Mapping[str, FloatArray]) -> Self:
+        """Return the context with the features in the first image, (M, 2) by camera name."""
+        return replace(self, points_px=points_px)
 
     @property
     def camera_name(self) -> str:
@@ -93,8 +96,7 @@ class LawContext:
 
     def arm_to_camera(self, name: str) -> Arm:
         """Return the arm that carries a camera, with the camera as its tip."""
-        arm = self.model.arm_to_camera(name)
-        return _moved_tip(arm, calibration_error(self.cell, name))
+        return self.model.arm_to_camera(name)
 
     def T_world_camera(self, name: str | None = None) -> FloatArray | None:
         """Return the pose (4, 4) of a fixed camera; None of one that an arm carries.
@@ -103,7 +105,8 @@ class LawContext:
             name: of the camera; the task's if None.
         """
         name = name or self.camera_name
-        return None if self.cell.cameras[name].arm is not None else self._fixed_pose(name)
+        carried = self.cell.cameras[name].arm is not None
+        return None if carried else self.model.camera_pose(name)
 
     def depth_m(self, camera: str, given: float | None) -> FloatArray:
         """Return the believed depth of a camera's features at the start, (M,), m.
@@ -119,10 +122,7 @@ class LawContext:
         count = len(self.points_px[camera])
         if given is not None:
             return np.full(count, given)
-        features, T_world_features = self._features(camera)
-        T_world_camera = self.model.camera_pose(camera) @ calibration_error(self.cell, camera)
-        T_camera_features = se3_compose(se3_inverse(T_world_camera), T_world_features)
-        depth: FloatArray = transform_points(T_camera_features, features)[:, 2]
+        depth: FloatArray = self.features_in_camera(camera)[:, 2]
         if not (depth > 0).all():  # false for NaN too
             given_text = "no depth, and the target's placement implies none"
             raise InputError("law", "depth_m", given_text, "a depth in metres")
@@ -141,11 +141,18 @@ class LawContext:
     @property
     def solids(self) -> Callable[[], FloatArray]:
         """What may come between the camera and the target, see `vergence.simulation.solids`."""
-        return Solids(self.model, self.cell.task.arm)
+        return Solids(self.model, self.cell.task.arm, self.joints_now)
 
-    def _fixed_pose(self, name: str) -> FloatArray:
-        T: FloatArray = self.model.camera_pose(name) @ calibration_error(self.cell, name)
-        return T
+    def features_in_camera(self, name: str) -> FloatArray:
+        """Return a camera's features in its frame at the start, (M, 3), m, by the placements.
+
+        Those that nobody named are where the rays of the first image meet the target; NaN where
+        they miss it.
+        """
+        features, T_world_features = self._features(name)
+        T_camera_features = se3_compose(se3_inverse(self.model.camera_pose(name)), T_world_features)
+        points: FloatArray = transform_points(T_camera_features, features)
+        return points
 
     def _features(self, camera: str) -> tuple[FloatArray, FloatArray]:
         """Return what a camera looks at: points (M, 3) in a frame, and its pose (4, 4)."""
@@ -153,15 +160,6 @@ class LawContext:
         if tool is not None and tool.camera == camera:
             return np.array(tool.features), self.model.tool_pose()
         known = self.cell.target.features
-        if known is not None:
-            return np.array(known), self.model.target_pose()
+        if known is not None or camera not in self.points_px:
+            return np.array(known or np.empty((0, 3))), self.model.target_pose()
         return self.model.anchor(camera, self.points_px[camera]), self.model.target_pose()
-
-
-def _moved_tip(arm: Arm, T: FloatArray) -> Arm:
-    """Return an arm whose tip is moved by T (4, 4) in its own frame."""
-    rotation, position = np.array(arm.chain.rotation), np.array(arm.chain.position)
-    position[-1] += rotation[-1] @ T[:3, 3]
-    rotation[-1] = rotation[-1] @ T[:3, :3]
-    chain = arm.chain._replace(rotation=frozen(rotation), position=frozen(position))
-    return replace(arm, chain=chain)

@@ -3,8 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-from vergence.assembly.reach import look_twice, plan_reach
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.run import changed_cell
+from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
@@ -37,9 +39,9 @@ def plan(
         raise InputError(str(loaded.path), "task.kind", loaded.task.kind, "reach")
     driver = SimulatedDriver(loaded, images)
     try:
-        seen = look_twice(loaded, loaded.task, driver, images)
-        if isinstance(seen, PlanFailure):
-            return seen
-        return plan_reach(loaded, loaded.task, driver, seen)
+        started = StartedDriver(driver, loaded.watched)
+        context = LawContext.of(loaded, started)
+        pair = measure_twice(context, loaded.task, started, images)
+        return pair if isinstance(pair, PlanFailure) else plan_reach(context, loaded.task, pair)
     finally:
         driver.close()

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.calibration_error import calibration_error, small_motion
-from vergence.assembly.measure import CornerWindows, ExactWindows, with_noise, with_outliers
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
 from vergence.cell import Cell
-from vergence.cell.schema import PerceptionTable
 from vergence.estimation import (
     Blocked,
     CameraPose,
@@ -29,10 +28,10 @@ from vergence.estimation import (
     blocked_from_hand,
     seen_from_hand,
 )
-from vergence.geometry import se3, se3_compose, se3_inverse
+from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import forward_kinematics
 from vergence.signals import Frame, Observation
-from vergence.simulation import SimulatedDriver
+from vergence.simulation import ExactCorners
 
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
@@ -69,24 +68,21 @@ def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
 
 
 def follow_pose(
-    cell: Cell, driver: SimulatedDriver, model: "ObjectModel", images: bool
+    context: LawContext, model: "ObjectModel", images: bool, begin: float = 0.0
 ) -> FollowedPose:
-    """Return the perception that a cell describes, for a target of known geometry."""
+    """Return the perception that a cell describes, for a target of known geometry.
+
+    Args:
+        context: of the cell, with the target at its placement.
+        model: the target's geometry.
+        images: whether frames carry images; if not, corners are exact projections with noise.
+        begin: time of the first frame, s.
+    """
+    cell, cameras = context.cell, context.cameras
     table = cell.perception
-    names = cell.watched
     expected = table.believed_noise_px or table.noise_px  # as wide as the windows must allow for
-    rig = CameraRig.of({name: driver.cameras[name] for name in names}, expected)
-    measure: Measure
-    if images:
-        measure = CornerWindows(model, driver.cameras)
-    else:
-        rng = np.random.default_rng([cell.seed, 3])
-        measure = ExactWindows(table.noise_px, rng)
-    if table.outliers:
-        measure = with_outliers(measure, table.outliers, np.random.default_rng([cell.seed, 5]))
-    if table.believed_noise_px is not None:
-        measure = with_noise(measure, table.believed_noise_px)
-    surroundings = _surroundings(cell, driver)
+    rig = CameraRig.of({name: cameras[name] for name in cell.watched}, expected)
+    surroundings = _surroundings(context)
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
         "settings": PerceptionSettings(budget=table.budget),
@@ -94,12 +90,34 @@ def follow_pose(
     }
     shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
     target_filter = _filter(cell)
-    start = target_filter.start(0.0, surroundings.start, covariance=_start_covariance(table))
+    start = target_filter.start(begin, surroundings.start, covariance=_start_covariance(cell))
     perception = PosePerception(
-        rig, shape, surroundings.camera_pose, measure, target_filter, start, **parts
+        rig,
+        shape,
+        surroundings.camera_pose,
+        _measure(context, model, images),
+        target_filter,
+        start,
+        **parts,
     )
     hand_pose = surroundings.hand_pose
     return perception if hand_pose is None else HeldTarget(perception, hand_pose)
+
+
+def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure:
+    """Return what measures corners, as a cell describes it."""
+    cell = context.cell
+    table = cell.perception
+    measure: Measure
+    if images:
+        measure = CornerWindows(model, context.cameras)
+    else:
+        measure = ExactCorners(table.noise_px, np.random.default_rng([cell.seed, 3]))
+    if table.outliers:
+        measure = with_outliers(measure, table.outliers, np.random.default_rng([cell.seed, 5]))
+    if table.believed_noise_px is not None:
+        measure = with_noise(measure, table.believed_noise_px)
+    return measure
 
 
 def _filter(cell: Cell) -> TargetFilter[Any]:
@@ -123,58 +141,48 @@ class Surroundings(NamedTuple):
     hand_pose: HandPose | None  # where that frame is in the world, if it is the arm's hand
 
 
-def _surroundings(cell: Cell, driver: SimulatedDriver) -> Surroundings:
+def _surroundings(context: LawContext) -> Surroundings:
     """Return the cell around the target: in the hand's frame if the task's arm holds it."""
-    camera_pose, blocked_at = camera_poses(cell, driver), _blocked_at(driver)
-    start, arm = _rough_pose(cell, driver), cell.task.arm
-    if cell.target.carried_by != arm:
+    camera_pose, blocked_at = camera_poses(context), _blocked_at(context)
+    start, arm = context.model.target_pose(), context.cell.task.arm
+    if context.cell.target.carried_by != arm:
         return Surroundings(camera_pose, blocked_at, start, None)
-    chain = driver.world.arm_to_target().chain
+    chain = context.arm_to_target.chain
 
     def hand_pose(joints: Joints) -> FloatArray:
         T_world_hand: FloatArray = forward_kinematics(chain, joints[arm])
         return T_world_hand
 
-    first = hand_pose({arm: driver.world.joint_position(arm)})
     return Surroundings(
         seen_from_hand(camera_pose, hand_pose),
         blocked_from_hand(blocked_at, hand_pose),
-        se3_compose(se3_inverse(first), start),
+        se3_compose(se3_inverse(hand_pose(context.joints)), start),
         hand_pose,
     )
 
 
-def camera_poses(cell: Cell, driver: SimulatedDriver) -> CameraPose:
-    """Return the function from a camera's name and joints at the exposure to T_world_camera.
-
-    It is off by each camera's calibration error, as a calibrated camera's is.
-    """
-    off = {name: calibration_error(cell, name) for name in cell.cameras}
-    fixed = {
-        n: driver.world.camera_pose(n) @ off[n] for n, t in cell.cameras.items() if t.arm is None
-    }
+def camera_poses(context: LawContext) -> CameraPose:
+    """Return the function from a camera's name and joints at the exposure to T_world_camera."""
+    cameras = context.cell.cameras
+    fixed = {n: context.model.camera_pose(n) for n, t in cameras.items() if t.arm is None}
     carried = {
-        n: (t.arm, driver.world.arm_to_camera(n).chain)
-        for n, t in cell.cameras.items()
-        if t.arm is not None
+        n: (t.arm, context.arm_to_camera(n).chain) for n, t in cameras.items() if t.arm is not None
     }
 
     def pose(camera: str, joints: Joints) -> FloatArray:
         if camera in fixed:
             return fixed[camera]
         arm, chain = carried[camera]
-        T_world_camera: FloatArray = se3_compose(
-            forward_kinematics(chain, joints[arm]), off[camera]
-        )
+        T_world_camera: FloatArray = forward_kinematics(chain, joints[arm])
         return T_world_camera
 
     return pose
 
 
-def _blocked_at(driver: SimulatedDriver) -> Callable[[Joints], Blocked]:
+def _blocked_at(context: LawContext) -> Callable[[Joints], Blocked]:
     from vergence.simulation.obstacles import Obstacles
 
-    obstacles = Obstacles(driver.world)
+    obstacles = Obstacles(context.model)
 
     def at(joints: Joints) -> Blocked:
         obstacles.move(joints)
@@ -183,20 +191,9 @@ def _blocked_at(driver: SimulatedDriver) -> Callable[[Joints], Blocked]:
     return at
 
 
-def _start_covariance(table: PerceptionTable) -> FloatArray:
+def _start_covariance(cell: Cell) -> FloatArray:
     """Return what is known of pose and velocity at the start, (12, 12)."""
-    position = max(table.start_error_m, _LEAST_M)
-    angle = max(np.deg2rad(table.start_error_deg), _LEAST_RAD)
-    deviations: FloatArray = np.repeat([position, angle, *_START_VELOCITY], 3)
+    distance, angle = cell.placement_error
+    known = max(distance, _LEAST_M), max(np.deg2rad(angle), _LEAST_RAD)
+    deviations: FloatArray = np.repeat([*known, *_START_VELOCITY], 3)
     return np.diag(deviations**2)
-
-
-def _rough_pose(cell: Cell, driver: SimulatedDriver) -> FloatArray:
-    """Return the target's pose at the start as well as it is known, (4, 4)."""
-    table = cell.perception
-    off = small_motion(
-        np.random.default_rng([cell.seed, 4]), table.start_error_m, table.start_error_deg
-    )
-    truth = driver.world.target_pose()
-    T: FloatArray = se3(off[:3, :3] @ truth[:3, :3], truth[:3, 3] + off[:3, 3])
-    return T

@@ -1,17 +1,21 @@
-"""The task `reach`: to where an object without a model looks as wanted, along a planned path."""
+"""The task `reach`: to where an object without a model looks as desired, along a planned path."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import FloatArray
+from vergence.arrays import FloatArray, IntArray
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.cell import Cell
+from vergence.assembly.started_driver import StartedDriver
+from vergence.camera.image_file import read_image_file
 from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
-from vergence.estimation import ExactPoints, TrackedPoints
+from vergence.errors import InputError
+from vergence.estimation import TrackedPoints
+from vergence.geometry import transform_points
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
@@ -19,58 +23,60 @@ from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.trajectory import Trajectory
 from vergence.runtime.stages import Perception
-from vergence.signals import Outcome, OutcomeKind
-from vergence.simulation import SimulatedDriver
+from vergence.signals import Frame, ImagePoints, Outcome, OutcomeKind
+from vergence.simulation import ExactPoints, SimulatedDriver
+from vergence.vision.image import grey_image
 from vergence.vision.marks import MarkTracker
 from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view
 
 SETTLE_S = 2.0  # at the goal
+_START, _GOAL = "the start", "task.goal_deg"
 
 
-class TwoPictures(NamedTuple):
+class TwoImages(NamedTuple):
     """The marks as the camera sees them now, and as it should see them."""
 
     points_px: FloatArray  # (N, 2)
-    wanted_px: FloatArray  # (N, 2)
+    desired_px: FloatArray  # (N, 2)
     perception: Perception  # goes on from the first
 
 
 def reach_parts(
-    cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool
+    context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
 ) -> Parts | Outcome:
     """Put together what plans a path in the image and tracks it; or why there is none."""
-    context = LawContext.of(cell, driver)
+    pair = measure_twice(context, task, driver, images)
+    if isinstance(pair, PlanFailure):
+        return pair.outcome(0.0)
+    context = context.with_points({task.camera: pair.points_px})
     law = build_law(context)
-    pictures = look_twice(cell, task, driver, images)
-    if isinstance(pictures, PlanFailure):
-        return pictures.outcome(0.0)
-    plan = plan_reach(cell, task, driver, pictures)
+    plan = plan_reach(context, task, pair)
     if isinstance(plan, TwoViewFailure):
         return Outcome(OutcomeKind.INFEASIBLE, str(plan), 0.0)
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
     trajectory = Trajectory.of(plan, task.camera_speed_m_s)
     duration = trajectory.duration + SETTLE_S
-    if duration > cell.duration_s:
-        reason = f"the way takes {duration:.1f} s, duration_s is {cell.duration_s:g}"
+    if duration > context.cell.duration_s:
+        reason = f"the way takes {duration:.1f} s, duration_s is {context.cell.duration_s:g}"
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
-    return Parts(pictures.perception, trajectory, law, context, duration)
+    return Parts(driver, pair.perception, trajectory, law, context, duration)
 
 
 def plan_reach(
-    cell: Cell, task: ReachTable, driver: SimulatedDriver, pictures: TwoPictures
+    context: LawContext, task: ReachTable, pair: TwoImages
 ) -> Path | PlanFailure | TwoViewFailure:
-    """Reconstruct the object from two pictures, up to the believed d*, and plan a path."""
-    camera = driver.cameras[task.camera]
-    view = estimate_two_view(pictures.points_px, pictures.wanted_px, camera)
+    """Reconstruct the object from two images, up to the believed d*, and plan a path."""
+    camera = context.cameras[task.camera]
+    view = estimate_two_view(pair.points_px, pair.desired_px, camera)
     if not isinstance(view, TwoView):
         return view
     problem = PlanningProblem.from_two_view(
         view,
         task.distance_m,
-        driver.world.arm_to_camera(task.camera),
+        context.arm_to_camera(task.camera),
         camera,
-        driver.read().joints[cell.task.arm].position,
+        context.joints[task.arm],
         margin_px=task.margin_px,
         margin_joint=task.margin_joint,
     )
@@ -79,46 +85,105 @@ def plan_reach(
     return PotentialFieldPlanner().plan(problem)
 
 
-def look_twice(
-    cell: Cell, task: ReachTable, driver: SimulatedDriver, images: bool
-) -> TwoPictures | PlanFailure:
-    """Measure the marks from the start and from where the desired picture was taken.
+def measure_twice(
+    context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
+) -> TwoImages | PlanFailure:
+    """Measure the marks from the start and from where the desired image was taken.
 
-    Which mark is which in the two pictures is taken from the simulation, to the nearest pixel, as a
-    person would click on them; where they are is measured.
+    Each mark is the one next to where the target's placement has it.
 
     Returns:
-        The two pictures, or which mark is out of sight in one of them.
+        The marks in both images, or which mark is out of sight in one of them.
 
     Raises:
-        InputError: if the arm cannot stand at the goal's joint positions.
+        InputError: if the arm cannot stand at the goal's joint positions, or there is no image from
+            there.
     """
-    arm = driver.arms[task.arm]
-    goal = joint_positions(cell, "task.goal_deg", task.goal_deg, arm)
-    now = driver.first_frame(task.camera)
-    then = driver.frame_at(task.camera, task.arm, goal)
-    assert now.truth is not None
-    assert then.truth is not None
-    for where, picture in (("the start", now.truth), ("task.goal_deg", then.truth)):
-        if not picture.visible.all():
-            mark = int(np.flatnonzero(~picture.visible)[0]) + 1
-            return _unseen(task.camera, mark, where, "out of sight")
+    arm = context.model.arms[task.arm]
+    goal = joint_positions(context.cell, _GOAL, task.goal_deg, arm)
+    now, then = driver.frames[task.camera], _goal_frame(context, task, driver, goal)
     if not images:
-        rng = np.random.default_rng([cell.seed, 3])
-        perception = ExactPoints(task.camera, rng=rng)
-        return TwoPictures(now.truth.points_px, then.truth.points_px, perception)
+        return _exact_pair(context, task, now, then)
+    expected = {}
+    for where, joints in ((_START, context.joints), (_GOAL, {task.arm: goal})):
+        expected[where], unseen = _expected(context, task.camera, joints)
+        if len(unseen):
+            return _unseen(task.camera, int(unseen[0]), where, "out of sight")
     assert now.image is not None
     assert then.image is not None
-    tracker = MarkTracker(now.image, np.round(now.truth.points_px))
-    seen = tracker.track(now.image, now.truth.points_px)
-    wanted = MarkTracker(then.image, np.round(then.truth.points_px)).track(then.image)
-    for where, tracks in (("the start", seen), ("task.goal_deg", wanted)):
+    tracker = MarkTracker(now.image, expected[_START])
+    seen = tracker.track(now.image)
+    desired = MarkTracker(then.image, expected[_GOAL]).track(then.image)
+    for where, tracks in ((_START, seen), (_GOAL, desired)):
         if not tracks:
             mark = int(np.flatnonzero(~tracks.found)[0])
-            return _unseen(task.camera, mark + 1, where, tracks.reasons[mark])
-    return TwoPictures(seen.points_px, wanted.points_px, TrackedPoints(task.camera, tracker))
+            return _unseen(task.camera, mark, where, tracks.reasons[mark])
+        if (same := _seen_twice(tracks.points_px)) is not None:
+            return _unseen(task.camera, same, where, "its place is that of another mark")
+    return TwoImages(seen.points_px, desired.points_px, TrackedPoints(task.camera, tracker))
+
+
+def _exact_pair(
+    context: LawContext, task: ReachTable, now: Frame, then: Frame
+) -> TwoImages | PlanFailure:
+    """Return the marks as a simulated camera truly projects them."""
+    perception = ExactPoints(task.camera, rng=np.random.default_rng([context.cell.seed, 3]))
+    views: list[ImagePoints] = []
+    for where, frame in ((_START, now), (_GOAL, then)):
+        observation = perception.observe((frame,))
+        assert observation is not None
+        views.append(observation.views[-1])
+        if not views[-1].found.all():
+            mark = int(np.flatnonzero(~views[-1].found)[0])
+            return _unseen(task.camera, mark, where, "out of sight")
+    return TwoImages(views[0].points_px, views[1].points_px, perception)
+
+
+def _goal_frame(
+    context: LawContext, task: ReachTable, driver: StartedDriver, goal: FloatArray
+) -> Frame:
+    """Return the desired image: from its file, or as a simulation takes it by driving there."""
+    cell = context.cell
+    if task.goal_image is None:
+        if isinstance(driver.driver, SimulatedDriver):
+            return driver.driver.frame_at(task.camera, task.arm, goal)
+        raise InputError(str(cell.path), "task.goal_image", "nothing", "an image taken at the goal")
+    path = cell.path.parent / task.goal_image
+    image, reason = grey_image(read_image_file(path))
+    if image is None:
+        raise InputError(str(path), "", reason, "an image of the task's camera")
+    camera = context.cameras[task.camera]
+    if image.shape != (camera.height, camera.width):
+        given, allowed = f"{image.shape[1]} x {image.shape[0]}", f"{camera.width} x {camera.height}"
+        raise InputError(str(path), "", f"an image of {given}", f"{allowed}, as {task.camera}")
+    return Frame(task.camera, 0.0, image, {task.arm: goal})
+
+
+def _expected(
+    context: LawContext, camera: str, joints: Mapping[str, FloatArray]
+) -> tuple[FloatArray, IntArray]:
+    """Return where a camera should see the marks, (N, 2), and which it should not see."""
+    model, lens = context.model, context.cameras[camera]
+    model.place(joints)
+    points = context.features_in_camera(camera)
+    visible = (points[:, 2] > 1e-3) & lens.in_view(points)
+    in_world = transform_points(model.camera_pose(camera), points[visible])
+    visible[visible] &= model.sees(camera, in_world)
+    model.place(context.joints)
+    points_px = np.full((len(points), 2), np.nan)
+    points_px[visible] = lens.project(points[visible])
+    return points_px, np.flatnonzero(~visible)
+
+
+def _seen_twice(points_px: FloatArray) -> int | None:
+    """Return a mark that is where another is, if there is one."""
+    between = np.linalg.norm(points_px[:, None] - points_px[None], axis=2)
+    close = np.argwhere(np.triu(between < 1.0, 1))
+    return int(close[0, 1]) if len(close) else None
 
 
 def _unseen(camera: str, mark: int, where: str, why: str) -> PlanFailure:
-    obstacle = Obstacle.START if where == "the start" else Obstacle.VISIBILITY
-    return PlanFailure(obstacle, f"camera {camera} does not see mark {mark} from {where}: {why}")
+    obstacle = Obstacle.START if where == _START else Obstacle.VISIBILITY
+    return PlanFailure(
+        obstacle, f"camera {camera} does not see mark {mark + 1} from {where}: {why}"
+    )

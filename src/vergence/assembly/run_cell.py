@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Sequence
 
-from vergence.assembly import Parts, assemble_parts
+from vergence.assembly.assemble import assemble_parts
+from vergence.assembly.parts import Parts
 from vergence.cell import Cell
 from vergence.runtime import Listener, Loop, Patience, Run, RunInfo, RunRecorder
+from vergence.runtime.driver import Driver
 from vergence.runtime.listeners import Listeners
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
@@ -31,7 +33,7 @@ def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True
 
 def run_driver(
     cell: Cell,
-    driver: SimulatedDriver,
+    driver: Driver,
     listeners: Sequence[Listener],
     images: bool,
     *,
@@ -45,7 +47,7 @@ def run_driver(
         cell: what to run.
         driver: of that cell.
         listeners: hear of every tick.
-        images: whether the driver renders images.
+        images: look through images; if not, at the exact projections of a simulated driver.
         duration_s: in place of the cell's; may be infinite.
         attend: is given the loop and its parts before it runs, to change the law during the run.
         most_ticks: how many to keep of a run without an end; all if None.
@@ -62,7 +64,7 @@ def run_driver(
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        loop = _loop(cell, driver, parts, everyone)
+        loop = _loop(cell, parts, everyone)
         if attend is not None:
             attend(loop, parts)
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
@@ -72,9 +74,9 @@ def run_driver(
     return run
 
 
-def _loop(cell: Cell, driver: SimulatedDriver, parts: Parts, listeners: Sequence[Listener]) -> Loop:
+def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
     return Loop(
-        driver,
+        parts.driver,
         cell.task.arm,
         parts.perception,
         parts.planner,

@@ -73,6 +73,16 @@ class Cell(Table):
         return self.task.tool if isinstance(self.task, TrackTable) else None
 
     @property
+    def placement_error(self) -> tuple[float, float]:
+        """How well the target's placement is known, m and degrees."""
+        usual = (0.01, 2.0) if self.task.kind == "follow" else (0.0, 0.0)
+        table = self.perception
+        return (
+            usual[0] if table.start_error_m is None else table.start_error_m,
+            usual[1] if table.start_error_deg is None else table.start_error_deg,
+        )
+
+    @property
     def watched(self) -> tuple[str, ...]:
         """The cameras that are looked through: all, unless the file names some to follow by."""
         named = self.perception.cameras if self.task.kind == "follow" else None

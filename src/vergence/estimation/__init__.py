@@ -3,7 +3,6 @@
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.corner_view import CornerView
-from vergence.estimation.exact_points import ExactPoints
 from vergence.estimation.extrapolation import extrapolate
 from vergence.estimation.fit_pose import fit_pose
 from vergence.estimation.held_target import (
@@ -44,7 +43,6 @@ __all__ = [
     "Candidates",
     "Consistency",
     "CornerView",
-    "ExactPoints",
     "Exposure",
     "FilterHistory",
     "Find",

@@ -14,6 +14,8 @@ from vergence.geometry import transform_points
 from vergence.runtime.loop import Patience
 from vergence.signals import Outcome
 from vergence.simulation import IdealCell, SimulatedDriver, target_poses
+from vergence.simulation.as_built import as_built
+from vergence.simulation.cell_model import CellModel
 from vergence.simulation.ideal_driver import Sees
 
 
@@ -44,7 +46,7 @@ class IdealBench:
 
     def __init__(self) -> None:
         self._key = ""
-        self._driver: SimulatedDriver | None = None
+        self._made: tuple[SimulatedDriver, CellModel] | None = None
 
     def run_of(self, cell: Cell) -> IdealRun:
         """Return the run of a cell that `is_ideal`.
@@ -52,14 +54,15 @@ class IdealBench:
         Raises:
             InputError: if the cell cannot be run as it is written.
         """
-        driver = self._driver_of(cell)
+        driver, model = self._driver_of(cell)
         arm, camera = cell.task.arm, cell.task.camera
-        poses = target_poses(cell.target, cell.target.motion, cell.seed)
+        poses = target_poses(as_built(cell).target, cell.target.motion, cell.seed)
         given = cell.arms[arm].start_deg
         start = joint_positions(cell, f"arms.{arm}.start_deg", given, driver.arms[arm])
         driver.world.move_target(poses(np.zeros(1))[0])
         driver.world.place_arm(arm, start)
-        parts = assemble_parts(cell, driver, images=False)
+        driver.restart_cameras()
+        parts = assemble_parts(cell, driver, images=False, model=model)
         assert not isinstance(parts, Outcome)
         wanted = parts.planner.reference(0.0).points_px
         assert wanted is not None
@@ -79,11 +82,11 @@ class IdealBench:
         patience = Patience(cell.task.image_timeout_s, cell.task.target_timeout_s)
         return IdealRun(ideal, parts.law, wanted, cell.duration_s, patience=patience)
 
-    def _driver_of(self, cell: Cell) -> SimulatedDriver:
-        key = cell.model_dump_json(exclude=_apart_from(cell))
-        if self._driver is None or key != self._key:
-            self._driver, self._key = SimulatedDriver(cell, images=False), key
-        return self._driver
+    def _driver_of(self, cell: Cell) -> tuple[SimulatedDriver, CellModel]:
+        key = as_built(cell).model_dump_json(exclude=_apart_from(cell))
+        if self._made is None or key != self._key:
+            self._made, self._key = (SimulatedDriver(cell, images=False), CellModel(cell)), key
+        return self._made
 
 
 def _eyesight(driver: SimulatedDriver, arm: str, camera: str) -> Sees:

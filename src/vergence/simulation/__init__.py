@@ -1,5 +1,7 @@
 """The cell in simulation: world, rendering, simulated and kinematic drivers, target motions."""
 
+from vergence.simulation.exact_corners import ExactCorners
+from vergence.simulation.exact_points import ExactPoints
 from vergence.simulation.ideal_driver import IdealCell, IdealDriver
 from vergence.simulation.motion import placement_pose, target_pose, target_poses
 from vergence.simulation.motions import Motion, TargetPose, TargetPoses
@@ -8,6 +10,8 @@ from vergence.simulation.simulated_driver import SimulatedDriver
 
 __all__ = [
     "CameraRenderer",
+    "ExactCorners",
+    "ExactPoints",
     "IdealCell",
     "IdealDriver",
     "Motion",

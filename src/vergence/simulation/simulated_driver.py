@@ -2,12 +2,14 @@
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera, picture_tick
 from vergence.cell.cell import Cell
+from vergence.cell.schema import FollowTable, TrackTable
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm
 from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
@@ -19,22 +21,28 @@ from vergence.simulation.renderer import CameraRenderer, choose_renderer
 class SimulatedDriver:
     """Renders the cameras and moves the arms of a cell, in lock-step with the loop.
 
-    Pictures are exposed at the camera's rate and arrive its latency later. With `images` off they
-    carry no image, only the truth, for perception that is exact by construction.
+    Images are exposed at the camera's rate and arrive its latency later. The cameras have been
+    running before the simulation begins: the first `read` delivers what they exposed one latency
+    before, at a time below zero. With `images` off frames carry no image, only the truth, for
+    perception that is exact by construction.
+
+    Target and cameras are where `as_built` has them: off the cell's placements by the errors that
+    the cell states.
     """
 
     def __init__(self, cell: Cell, images: bool = True) -> None:
         choose_renderer(needed=images)
+        from vergence.simulation.as_built import as_built
         from vergence.simulation.world import World
 
         self.cell = cell
-        self.world = World(cell)
-        self._pose = target_pose(cell.target, cell.target.motion, cell.seed)
-        features = cell.target.features
-        self._features = np.array(features if features else np.empty((0, 3)), dtype=np.float64)
+        built = as_built(cell)
+        self.world = World(built)
+        self._pose = target_pose(built.target, cell.target.motion, cell.seed)
         self._tick = 0
         self._exposed = dict.fromkeys(cell.cameras, 0)
         self._queue: deque[tuple[int, Frame]] = deque()  # tick of arrival, frame
+        self._before_motion: list[tuple[int, Frame]] = []  # all that was exposed until the start
         self._renderers = {}
         if images:
             self._renderers = {
@@ -51,7 +59,8 @@ class SimulatedDriver:
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self.world.move_target(self._pose(0.0))
         self.world.update()
-        self._expose()
+        self._features = self._first_features(images)
+        self.restart_cameras()
 
     @property
     def arms(self) -> Mapping[str, Arm]:
@@ -79,11 +88,27 @@ class SimulatedDriver:
         return self._features
 
     def look_for(self, features: FloatArray) -> None:
-        """Make points (M, 3) in the target's frame its features; the pictures start afresh."""
+        """Make points (M, 3) in the target's frame those of which frames tell the truth.
+
+        To be called before the first `step`; what `read` has delivered it delivers again.
+        """
         self._features = np.array(features, dtype=np.float64)
+        self._queue = deque(
+            (arrival, replace(frame, truth=self._truth(frame.camera, self._is_blind(frame.camera))))
+            for arrival, frame in self._before_motion
+        )
+        self._before_motion = list(self._queue)
+
+    def restart_cameras(self) -> None:
+        """Begin again with what the cameras see now; to be called before the first `step`."""
         self._queue.clear()
         self._exposed = dict.fromkeys(self._exposed, 0)
+        for name, table in self.cell.cameras.items():
+            if table.latency_frames:
+                frame = replace(self._frame(name), time=-table.latency_frames / table.rate_hz)
+                self._queue.append((0, frame))
         self._expose()
+        self._before_motion = list(self._queue)
 
     def first_frame(self, camera: str) -> Frame:
         """Return what a camera sees at the start, without its latency."""
@@ -101,9 +126,9 @@ class SimulatedDriver:
         return frame
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
-        """Make image points the target's features: where their rays meet it, (M, 3).
+        """Make image points (M, 2) at the start the target's features, and return those, (M, 3).
 
-        So the truth is known of features that were picked in the image. A ray that misses the
+        So frames tell the truth of features that were picked in the image. A ray that misses the
         target gives NaN.
         """
         points = self.world.anchor(camera, points_px)
@@ -170,11 +195,32 @@ class SimulatedDriver:
         return picture_tick(picture, self.inner_rate_hz, rate_hz)
 
     def _frame(self, camera: str) -> Frame:
-        blind = any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
+        blind = self._is_blind(camera)
         renderer = self._renderers.get(camera)
         image = None if renderer is None else renderer.take(self.world.data, blind)
         joints = {name: self.world.joint_position(name) for name in self.arms}
         return Frame(camera, self.time, image, joints, self._truth(camera, blind))
+
+    def _is_blind(self, camera: str) -> bool:
+        return any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
+
+    def _first_features(self, images: bool) -> FloatArray:
+        """Return the points (M, 3) of the target that its task follows, where they are known.
+
+        Without images nobody picks features: they are spread over the middle of the task's image.
+        """
+        task, known = self.cell.task, self.cell.target.features
+        if known:
+            return np.array(known, dtype=np.float64)
+        if isinstance(task, FollowTable):
+            from vergence.vision.known_object import object_model_of
+
+            return object_model_of(self.world.model, "target").corners
+        if images or not isinstance(task, TrackTable):
+            return np.empty((0, 3))
+        camera = self.cameras[task.camera]
+        points_px = grid_points(camera.width, camera.height, task.feature_count)
+        return self.world.anchor(task.camera, points_px)
 
     def _truth(self, camera: str, blind: bool) -> FrameTruth:
         T_world_target, features = self._subject(camera)
@@ -199,3 +245,11 @@ class SimulatedDriver:
         if tool is None or tool.camera != camera:
             return self.world.target_pose(), self._features
         return self.world.tool_pose(), np.array(tool.features)
+
+
+def grid_points(width: int, height: int, count: int) -> FloatArray:
+    """Return points (count, 2) spread over the middle of an image; one alone in its centre."""
+    side = int(np.ceil(np.sqrt(count)))
+    share = (np.arange(side) + 0.5) / side
+    u, v = np.meshgrid(width * (0.25 + 0.5 * share) - 0.5, height * (0.25 + 0.5 * share) - 0.5)
+    return np.column_stack((u.ravel(), v.ravel()))[:count]

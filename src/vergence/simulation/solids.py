@@ -1,5 +1,7 @@
 """What stands about in a cell, as a constrained law keeps it out of its camera's lines of sight."""
 
+from collections.abc import Callable, Mapping
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +21,21 @@ class Solids:
     around it, a cylinder for one with rounded ends.
 
     Args:
-        model: of the cell; the arms are where it has them.
+        model: of the cell; its state is copied.
         arm: that carries the camera.
+        joints: gives where the arms are now, arm name to positions (n,); where the model has them
+            if None.
     """
 
-    def __init__(self, model: "CellModel", arm: str) -> None:
-        self._data = model.data
+    def __init__(
+        self,
+        model: "CellModel",
+        arm: str,
+        joints: Callable[[], Mapping[str, FloatArray]] | None = None,
+    ) -> None:
+        self._model, self._data = model, copy(model.data)
+        self._joints = joints
+        self._placed: Mapping[str, FloatArray] | None = None
         own = model.bodies_of(arm)
         self._geoms = np.array(
             [
@@ -43,11 +54,24 @@ class Solids:
 
     def __call__(self) -> FloatArray:
         """Return the solids now, (K, 16); see `vergence.control.limits`."""
+        if self._joints is not None:
+            self._place(self._joints())
         axes = self._data.geom_xmat[self._geoms]
         self._solids[:, AXES : AXES + 9] = axes
         turned = (axes.reshape(-1, 3, 3) @ self._offset[:, :, None])[:, :, 0]
         self._solids[:, MIDDLE : MIDDLE + 3] = self._data.geom_xpos[self._geoms] + turned
         return self._solids
+
+    def _place(self, joints: Mapping[str, FloatArray]) -> None:
+        """Put the arms where they are, unless they are there."""
+        if joints is self._placed:
+            return
+        import mujoco
+
+        for arm, position in joints.items():
+            self._model.write_position(self._data, arm, position)
+        mujoco.mj_kinematics(self._model.model, self._data)
+        self._placed = joints
 
 
 def _hides(model: Any, geom: int) -> bool:

@@ -19,13 +19,12 @@ from vergence.control import (
     Servo,
     Situation,
 )
-from vergence.estimation import ExactPoints
 from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajectory
 from vergence.runtime import Loop, Patience
 from vergence.runtime.stages import Planner
 from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
-from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation import ExactPoints, IdealCell, IdealDriver
 from vergence.simulation.ideal_driver import ARM, CAMERA
 from vergence.studies.ideal_loop import Ending
 from vergence.studies.reach_scene import Scene

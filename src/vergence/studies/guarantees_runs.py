@@ -25,14 +25,13 @@ from vergence.control import (
     Servo,
     Situation,
 )
-from vergence.estimation import ExactPoints
 from vergence.geometry import se3, se3_inverse, so3_exp
 from vergence.planning import FixedReference
 from vergence.robot import Arm
 from vergence.runtime import Loop, RunInfo, RunRecorder
 from vergence.runtime.stages import Planner
 from vergence.signals import FrameTruth, Outcome, Reference, Sample, Setpoint
-from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation import ExactPoints, IdealCell, IdealDriver
 from vergence.simulation.ideal_driver import ARM, CAMERA
 from vergence.studies.wrong_beliefs import MovingGoal, WrongDepthPose
 

@@ -72,7 +72,6 @@ class _TimedPerception:
 
     def __init__(self, cell: Cell, driver: SimulatedDriver, count: int) -> None:
         model = target_shape(cell, driver.world)
-        driver.look_for(model.corners)
         T_world_camera = driver.world.camera_pose("fixed")
         self._picture = driver.first_frame("fixed")
         self._names = [f"camera {n}" for n in range(count)]

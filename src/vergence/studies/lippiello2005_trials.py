@@ -8,7 +8,9 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.assembly import run_cell
+from vergence.assembly.law_context import LawContext
 from vergence.assembly.pose import follow_pose, target_shape
+from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
 from vergence.runtime.results import PoseErrors, angle_between
 from vergence.signals import Outcome
@@ -123,12 +125,15 @@ def past_singular_pitch(cell: Cell, images: bool) -> FloatArray:
 
 
 def _watch(cell: Cell, driver: SimulatedDriver, images: bool, duration_s: float) -> FloatArray:
-    model = target_shape(cell, driver.world)
-    driver.look_for(model.corners)
-    perception = follow_pose(cell, driver, model, images)
+    started = StartedDriver(driver, cell.watched)
+    context = LawContext.of(cell, started)
+    first = tuple(started.frames.values())
+    shape = target_shape(cell, context.model)
+    perception = follow_pose(context, shape, images, min(frame.time for frame in first))
+    perception.observe(first)
     errors = []
     while driver.time < duration_s:
-        frames = driver.read().frames
+        frames = started.read().frames
         observation = perception.observe(frames) if frames else None
         if observation is not None and observation.time > 1.0:
             truth = frames[-1].truth

@@ -7,7 +7,9 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.assembly import run_cell
-from vergence.assembly.reach import look_twice, plan_reach
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.reach import measure_twice, plan_reach
+from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
 from vergence.cell.schema import ReachTable
@@ -97,11 +99,13 @@ def plan_section6(cell: Cell, images: bool) -> Section6:
     assert isinstance(task, ReachTable)
     driver = SimulatedDriver(cell, images)
     try:
-        pictures = look_twice(cell, task, driver, images)
-        if isinstance(pictures, PlanFailure):
-            raise VergenceError(f"{cell.name}: {pictures}")
+        started = StartedDriver(driver, cell.watched)
+        context = LawContext.of(cell, started)
+        pair = measure_twice(context, task, started, images)
+        if isinstance(pair, PlanFailure):
+            raise VergenceError(f"{cell.name}: {pair}")
         plans = {
-            name: plan_reach(cell, task.model_copy(update={"planner": planner}), driver, pictures)
+            name: plan_reach(context, task.model_copy(update={"planner": planner}), pair)
             for name, planner in PLANNERS.items()
         }
         goal = joint_positions(cell, "task.goal_deg", task.goal_deg, driver.arms[task.arm])

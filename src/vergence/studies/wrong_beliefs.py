@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.estimation import ExactPoints
 from vergence.signals import Frame, Observation, Reference, TargetState
+from vergence.simulation import ExactPoints
 
 
 class WrongDepthPose:

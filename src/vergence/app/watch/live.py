@@ -28,6 +28,7 @@ from vergence.app.watch.scene import Scene, world_state
 from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.assembly import LawContext, Parts, run_driver
+from vergence.assembly.started_driver import StartedDriver
 from vergence.control import Law
 from vergence.runtime import Loop, Recorder, Run
 from vergence.signals import Outcome, OutcomeKind
@@ -193,7 +194,8 @@ class Live:
 
     @property
     def _law_context(self) -> LawContext:
-        return self._context or LawContext.of(self._editor.cell, self._driver)
+        cell = self._editor.cell
+        return self._context or LawContext.of(cell, StartedDriver(self._driver, cell.watched))
 
     def _replace_law(self, law: Law) -> None:
         if self._loop is not None:

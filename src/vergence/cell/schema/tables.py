@@ -87,8 +87,8 @@ class CameraTable(Placement):
     blind_s: Annotated[
         tuple[tuple[Time, Time], ...], Field(max_length=1000)
     ] = ()  # from when to when its pictures are black
-    calibration_error_m: Distance = 0.0  # how far its believed pose is off
-    calibration_error_deg: _Angle = 0.0  # and by what angle
+    calibration_error_m: Distance = 0.0  # of its placement, in simulation
+    calibration_error_deg: _Angle = 0.0  # and of its angles
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":
@@ -144,6 +144,9 @@ class TrackTable(Table):
     arm: Text  # which moves, or carries the target
     camera: Text  # carried by the arm, or fixed
     feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
+    points_px: Annotated[tuple[Point2, ...], Field(max_length=MOST_POINTS)] | None = (
+        None  # (u, v) of the features in the first image; found by the target's placement if absent
+    )
     desired: _Desired = (
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
@@ -169,7 +172,8 @@ class ReachTable(Table):
     kind: Literal["reach"]
     arm: Text  # which moves
     camera: Text  # carried by the arm
-    goal_deg: _Joints  # joints when the desired picture was taken; metres if they slide
+    goal_deg: _Joints  # joints when the desired image was taken; metres if they slide
+    goal_image: Path | None = None  # that image; a simulation without one takes it by itself
     distance_m: Length  # believed distance of that camera from the reference plane, d*
     planner: Literal["optimised", "potential_field"] = "optimised"  # optimised, or the paper's
     margin_px: Pixels = 10.0  # kept from the border of the image
@@ -208,7 +212,9 @@ class PerceptionTable(Table):
     believed_noise_px: _Noise | None = None  # in place of what each measurement says of itself
     outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches made on purpose
     occlusion: bool = True  # whether arms and fixtures in the way are predicted
-    start_error_m: Distance = 0.01  # how well the first pose is known
-    start_error_deg: _Angle = 2.0  # and its angle
+    start_error_m: Distance | None = (
+        None  # how well the target's placement is known: 0.01 to follow, else 0
+    )
+    start_error_deg: _Angle | None = None  # and its angle: 2 to follow
     acceleration_density: _Density = 0.01  # m²/s³, of the target, for the filter on SE(3)
     angular_acceleration_density: _Density = 0.25  # rad²/s³

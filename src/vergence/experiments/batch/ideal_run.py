@@ -6,11 +6,10 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control import Law
-from vergence.estimation import ExactPoints
 from vergence.planning import FixedReference
 from vergence.runtime import Loop, Patience, Run, RunInfo, RunRecorder
 from vergence.signals import Reference
-from vergence.simulation import IdealCell, IdealDriver
+from vergence.simulation import ExactPoints, IdealCell, IdealDriver
 from vergence.simulation.ideal_driver import ARM, CAMERA
 
 

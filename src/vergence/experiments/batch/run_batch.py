@@ -10,7 +10,6 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import picture_times
 from vergence.control import Servo, TrackingSetup, pack_setup, singular_fault
-from vergence.estimation.exact_points import OUT_OF_SIGHT
 from vergence.experiments.batch import closed_loop
 from vergence.experiments.batch.closed_loop import (
     LoopInputs,
@@ -21,6 +20,7 @@ from vergence.experiments.batch.closed_loop import (
 from vergence.experiments.batch.ideal_run import IdealRun
 from vergence.runtime import endings
 from vergence.signals import Outcome
+from vergence.simulation.exact_points import OUT_OF_SIGHT
 
 
 @dataclass(frozen=True, slots=True)

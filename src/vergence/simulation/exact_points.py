@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vergence.errors import InputError
 from vergence.signals import Frame, ImagePoints, Observation
 
 OUT_OF_SIGHT = "out of sight"
@@ -29,8 +30,9 @@ class ExactPoints:
         return Observation(views[-1].time, views) if views else None
 
     def _view(self, frame: Frame) -> ImagePoints:
-        assert frame.truth is not None
         truth = frame.truth
+        if truth is None:
+            raise no_truth(frame.camera)
         noise = self._rng.normal(0.0, 1.0, truth.points_px.shape) * self._noise_px
         covariance = np.eye(2) * max(self._noise_px, 1e-3) ** 2
         return ImagePoints(
@@ -41,3 +43,8 @@ class ExactPoints:
             truth.visible,
             tuple("" if seen else OUT_OF_SIGHT for seen in truth.visible),
         )
+
+
+def no_truth(camera: str) -> InputError:
+    """Say that only a simulated camera projects exactly."""
+    return InputError(f"camera {camera}", "", "frames without truth", "images, or a simulation")

@@ -1,0 +1,102 @@
+"""A driver whose cameras have delivered their first images, with the clock of the run."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.camera import Camera
+from vergence.robot import Arm
+from vergence.runtime.driver import Driver
+from vergence.signals import Frame, Sample, Setpoint
+
+_TIMEOUT_S = 5.0  # for a first image
+
+
+class StartedDriver:
+    """Passes on to a driver, after it has waited for an image of each camera with the arms held.
+
+    What a task begins with is read off these images. Time 0 is the first `read` after that, however
+    long it took to assemble the loop; only what is exposed from then on is delivered.
+
+    Args:
+        driver: of arms and cameras.
+        cameras: names of those that are needed.
+
+    Attributes:
+        driver: the same.
+        frames: the newest image of each camera that delivered one, by name, at times up to 0.
+        missing: names of cameras that delivered none in time.
+        joints: newest positions by arm name, (n,), rad or m.
+
+    Raises:
+        DriverSilent: if the driver does not answer.
+    """
+
+    def __init__(self, driver: Driver, cameras: Sequence[str]) -> None:
+        self.driver = driver
+        first: dict[str, Frame] = {}
+        sample = driver.read()
+        still = {
+            name: Setpoint(state.position, np.zeros(len(state.position)))
+            for name, state in sample.joints.items()
+        }
+        for _ in range(int(_TIMEOUT_S * driver.inner_rate_hz)):
+            first |= {frame.camera: frame for frame in sample.frames}
+            if all(name in first for name in cameras):
+                break
+            driver.step(still)
+            sample = driver.read()
+        self.missing = tuple(name for name in cameras if name not in first)
+        self.joints = {name: state.position for name, state in sample.joints.items()}
+        self.frames = {name: _since(sample.time, frame) for name, frame in first.items()}
+        self._waited_until = sample.time
+        self._begin: float | None = None
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return self.driver.arms
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The cameras by name."""
+        return self.driver.cameras
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """How often `step` returns."""
+        return self.driver.inner_rate_hz
+
+    def read(self) -> Sample:
+        """Return joints now and the images that arrived since the last call."""
+        sample = self.driver.read()
+        self.joints = {name: state.position for name, state in sample.joints.items()}
+        frames = sample.frames
+        if self._begin is None:
+            self._begin = sample.time
+            if sample.time == self._waited_until:  # nothing moved: what was seen is of the run
+                known = {(frame.camera, frame.time) for frame in frames}
+                unread = (_since(-sample.time, frame) for frame in self.frames.values())
+                frames += tuple(f for f in unread if (f.camera, f.time) not in known)
+        return Sample(
+            sample.time - self._begin,
+            {n: replace(s, time=s.time - self._begin) for n, s in sample.joints.items()},
+            _in_run(_since(self._begin, frame) for frame in frames),
+        )
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Hand set-points to the arms and wait for the next inner tick."""
+        self.driver.step(setpoints)
+
+    def close(self) -> None:
+        """Let go of the cell."""
+        self.driver.close()
+
+
+def _since(begin: float, frame: Frame) -> Frame:
+    return replace(frame, time=frame.time - begin) if begin else frame
+
+
+def _in_run(frames: Iterable[Frame]) -> tuple[Frame, ...]:
+    return tuple(sorted((f for f in frames if f.time >= 0), key=lambda frame: frame.time))
