@@ -46,7 +46,9 @@ class ScriptedDriver:
     arms: Mapping[str, Arm] = field(
         default_factory=lambda: {"left": flat_arm(), "right": flat_arm(3)}
     )
-    cameras: Mapping[str, Camera] = field(default_factory=dict)
+    cameras: Mapping[str, Camera] = field(
+        default_factory=lambda: {"eye": Camera(64, 48, 60.0, 60.0, 31.5, 23.5)}
+    )
     tick: int = 0
     setpoints: list[Mapping[str, Setpoint]] = field(default_factory=list)
     reads: list[int] = field(default_factory=list)

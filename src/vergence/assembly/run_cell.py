@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.parts import Parts
 from vergence.cell import Cell
-from vergence.runtime import Listener, Loop, Patience, Run, RunInfo, RunRecorder
+from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.runtime.driver import Driver
 from vergence.runtime.listeners import Listeners
 from vergence.signals import Outcome
@@ -83,5 +83,5 @@ def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
         listeners=listeners,
-        patience=Patience(cell.task.image_timeout_s, cell.task.target_timeout_s),
+        timeouts=Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s),
     )

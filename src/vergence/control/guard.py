@@ -226,6 +226,16 @@ class Guard:
         )
         return self.setpoint
 
+    def brake(self) -> Setpoint:
+        """Return the next set-point on the way to rest, also where that is outside the range."""
+        limits, self._wanted[:] = self._limits.copy(), 0.0
+        limits[0] = np.minimum(limits[0], self._position)
+        limits[1] = np.maximum(limits[1], self._position)
+        self._position, self._velocity, self.at_limit = guarded_step(
+            self._position, self._velocity, self._wanted, limits, self._dt
+        )
+        return self.setpoint
+
     def approach(self, position: FloatArray) -> Setpoint:
         """Return the next set-point on the way to a position (n,), where it comes to rest."""
         if np.shape(position) != self._wanted.shape:

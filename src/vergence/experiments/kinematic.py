@@ -11,7 +11,7 @@ from vergence.cell.joint_positions import joint_positions
 from vergence.control import OptimalTracking, PseudoInverse
 from vergence.experiments.batch import IdealRun
 from vergence.geometry import transform_points
-from vergence.runtime.loop import Patience
+from vergence.runtime.timeouts import Timeouts
 from vergence.signals import Outcome
 from vergence.simulation import IdealCell, SimulatedDriver, target_poses
 from vergence.simulation.as_built import as_built
@@ -79,8 +79,8 @@ class IdealBench:
             seed=cell.seed,
             sees=_eyesight(driver, arm, camera),
         )
-        patience = Patience(cell.task.image_timeout_s, cell.task.target_timeout_s)
-        return IdealRun(ideal, parts.law, wanted, cell.duration_s, patience=patience)
+        timeouts = Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s)
+        return IdealRun(ideal, parts.law, wanted, cell.duration_s, timeouts=timeouts)
 
     def _driver_of(self, cell: Cell) -> tuple[SimulatedDriver, CellModel]:
         key = as_built(cell).model_dump_json(exclude=_apart_from(cell))

@@ -107,7 +107,7 @@ def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
     """
     cell = run.cell
     assert cell.sees is not None
-    step = max(1, int(run.patience.target_s * cell.rate_hz))
+    step = max(1, int(run.timeouts.target_s * cell.rate_hz))
     times = picture_times(len(trace.position), cell.inner_rate_hz, cell.rate_hz)
     poses = cell.target(times[::step])
     return any(

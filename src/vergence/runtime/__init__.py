@@ -1,20 +1,22 @@
 """Runtime: the loop, what it asks of a driver, and what is kept of a run."""
 
 from vergence.runtime.driver import Driver
+from vergence.runtime.following import FollowingBound
 from vergence.runtime.listener import Listener
-from vergence.runtime.loop import Loop, Patience
+from vergence.runtime.loop import Loop
 from vergence.runtime.recording import Recorder, Recording
 from vergence.runtime.results import Run, RunRecorder
 from vergence.runtime.run_info import ArmInfo, RunInfo
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.tick import TickRecord
+from vergence.runtime.timeouts import Timeouts
 
 __all__ = [
     "ArmInfo",
     "Driver",
+    "FollowingBound",
     "Listener",
     "Loop",
-    "Patience",
     "Perception",
     "Planner",
     "Recorder",
@@ -23,4 +25,5 @@ __all__ = [
     "RunInfo",
     "RunRecorder",
     "TickRecord",
+    "Timeouts",
 ]

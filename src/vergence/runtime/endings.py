@@ -2,8 +2,21 @@
 
 import re
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from vergence.signals import Outcome, OutcomeKind
+
+
+class Fault(NamedTuple):
+    """Why a run cannot go on."""
+
+    kind: OutcomeKind
+    reason: str  # one sentence for a person
+
+
+def bad_sample(reason: str) -> Fault:
+    """Return what is wrong with a sample."""
+    return Fault(OutcomeKind.BAD_SAMPLE, reason)
 
 
 def completed(duration_s: float, time: float) -> Outcome:

@@ -1,61 +1,53 @@
 """The one loop: driver, perception, planning, control, and back to the driver."""
 
 import logging
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import picture_tick
-from vergence.control import Guard, InnerLaw, Law
+from vergence.control import InnerLaw, Law
 from vergence.errors import DriverSilent
 from vergence.runtime import endings
+from vergence.runtime.border import Border
 from vergence.runtime.driver import Driver
+from vergence.runtime.endings import Fault
+from vergence.runtime.following import Follower, FollowingBound
 from vergence.runtime.interrupt import Interrupt
 from vergence.runtime.listener import Listener
 from vergence.runtime.listeners import Listeners
+from vergence.runtime.losses import LossReports, reasons, shows_target
+from vergence.runtime.schedule import Schedule, command_share
 from vergence.runtime.stages import Perception, Planner
 from vergence.runtime.stopping import brake, raised
 from vergence.runtime.tick import TickRecord
-from vergence.signals import (
-    ImagePoints,
-    JointCommand,
-    Observation,
-    Outcome,
-    OutcomeKind,
-    Reference,
-    Sample,
-    Setpoint,
-)
+from vergence.runtime.timeouts import Timeouts
+from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Reference, Sample
 
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Patience:
-    """How long the loop holds the arm still and hopes before it ends the run."""
-
-    image_s: float = 0.5  # without any picture
-    target_s: float = 0.2  # with pictures, but none of the features found
+_OUTSIDE = 0.5  # rad or m outside its range from which a joint is brought back, not farther
+_IMAGE_AGE_S = 0.5  # the least age that every image may have when it arrives
 
 
 class Loop:
     """Runs one arm's task; simulated or real is the driver's business.
 
-    Each outer tick reads the cell, looks, and asks the law for joint rates; each inner tick hands a
-    guarded set-point to the driver, so that whatever the law says no joint passes its limits. An
-    `InnerLaw` is asked for new rates at each inner tick, any other keeps them between pictures.
+    Each inner tick reads a sample, checks it, and hands guarded set-points to the driver. An image
+    is looked at in the tick in which it arrives: perception, planner and law then give new joint
+    rates. An `InnerLaw` is asked for rates at each inner tick, any other's are kept until the next
+    image is due. Without it the rates fade to zero.
 
     Args:
         driver: the cell.
         arm: name of the arm that is moved; the others hold their place.
-        perception: looks at the pictures.
-        planner: says what is wanted.
+        perception: looks at the images.
+        planner: says what is desired.
         law: says how to get there.
-        outer_rate_hz: how often to look.
-        listeners: hear of every tick and event.
-        patience: how long to hold before giving up.
+        outer_rate_hz: how often an image is due.
+        listeners: hear of every turn and event.
+        timeouts: how long to hold before the run ends.
+        following: how far the arm may be from its set-points.
     """
 
     def __init__(
@@ -68,49 +60,49 @@ class Loop:
         *,
         outer_rate_hz: float,
         listeners: Sequence[Listener] = (),
-        patience: Patience | None = None,
+        timeouts: Timeouts | None = None,
+        following: FollowingBound | None = None,
     ) -> None:
         self._driver, self._arm = driver, arm
         self._perception, self._planner, self._law = perception, planner, law
-        self._outer_rate_hz = outer_rate_hz
+        self._timeouts, self._following = timeouts or Timeouts(), following or FollowingBound()
+        self._period_s = 1.0 / outer_rate_hz
+        self._schedule = Schedule(driver.inner_rate_hz, outer_rate_hz)
+        age_s = max(self._timeouts.image_s, _IMAGE_AGE_S)
+        self._border = Border(driver, lambda: not self._moving, age_s)
         self._listeners = Listeners(listeners)
-        self._part = "driver"  # the one at work, to be named if it raises
-        self._patience = patience or Patience()
-        dt = 1.0 / driver.inner_rate_hz
-        self._first = driver.read()
-        self._guards = {
-            name: Guard(arm, self._first.joints[name].position, dt)
-            for name, arm in driver.arms.items()
-        }
+        self._losses = LossReports(self._listeners)
         self._interrupt = Interrupt()
-        self._still = np.zeros(driver.arms[arm].joint_count)
-        self._inner_tick = 0
-        self._last_picture = self._last_seen = 0.0
-        self._lost: dict[str, set[int]] = {}  # features, by camera
-        self._target_lost = False
-        self._last_command: JointCommand | None = None
+        self._part = "driver"  # the one at work, to be named if it raises
+        self._inner_law = law if isinstance(law, InnerLaw) else None
+        self._followers: dict[str, Follower] = {}
+        self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
+        self._tick, self._now = 0, 0.0
+        self._last_image = self._last_seen = 0.0  # s, when an image came, and one with the target
+        self._command: JointCommand | None = None  # what the arm goes by; None while it is held
+        self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
+        self._held = ""  # kind of what the arm is held for, as it was told last
 
     def run(self, duration_s: float) -> Outcome:
         """Run until the time is over, the task has failed, or a signal; then stop the arm.
 
         Whatever a part raises, the arm is braked and the outcome says so; the traceback goes to the
-        log. An arm whose driver is silent cannot be stopped from here: its own watchdog does that.
+        log. If the driver does not even take set-points, the robot's watchdog has to stop the arm.
         """
         with self._interrupt:
             try:
                 outcome = self._outcome(duration_s)
             except BaseException:
-                brake(self._driver, self._guards)
+                self._brake()
                 raise
-            if outcome.kind is not OutcomeKind.DRIVER_SILENT:
-                outcome = self._braked(outcome)
+            outcome = self._braked(outcome)
         if not outcome.succeeded:
             self._listeners.event(outcome.time, outcome.kind.value, outcome.reason)
         return outcome
 
     @property
     def stopping(self) -> bool:
-        """Whether Ctrl-C was pressed or `stop` called: who waits inside the loop should not."""
+        """True once a signal came or `stop` was called; code waiting in the loop should return."""
         return self._interrupt.asked
 
     def stop(self) -> None:
@@ -118,11 +110,12 @@ class Loop:
         self._interrupt.asked = True
 
     def replace_law(self, law: Law) -> None:
-        """Go on with another law from the next picture; until then the arm is held.
+        """Go on with another law from the next image; until then the arm is held.
 
         To be called from the thread that runs the loop, such as by its driver.
         """
-        self._law, self._last_command = law, None
+        self._law, self._command = law, None
+        self._inner_law = law if isinstance(law, InnerLaw) else None
 
     def _outcome(self, duration_s: float) -> Outcome:
         try:
@@ -135,136 +128,177 @@ class Loop:
             _LOG.exception("the %s raised", self._part)
             return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
 
+    def _run(self, duration_s: float) -> Outcome:
+        while True:
+            sample = self._border.admit(self._driver.read())
+            if isinstance(sample, Fault):
+                return Outcome(*sample, self._now)
+            self._now = sample.time
+            if not self._followers and (outcome := self._begin(sample)):
+                return outcome
+            if self._interrupt.asked:
+                return self._stopped()
+            if outcome := self._turn(sample, duration_s) or self._step(sample):
+                return outcome
+
+    def _begin(self, sample: Sample) -> Outcome | None:
+        """Take the set-points from the measured joints; refuse a start far outside the limits."""
+        dt, timeouts = 1.0 / self._driver.inner_rate_hz, self._timeouts
+        for name, arm in self._driver.arms.items():
+            start = sample.joints[name].position
+            outside = np.maximum(arm.q_min - start, start - arm.q_max)
+            if (worst := float(outside.max())) > _OUTSIDE:
+                joint = f"{arm.names[int(outside.argmax())]} of {name}"
+                reason = f"{joint} starts {worst:.3g} outside its range"
+                return Outcome(OutcomeKind.JOINT_LIMIT, reason, sample.time)
+            self._followers[name] = Follower(
+                arm, name, start, dt, self._following, timeouts.robot_s
+            )
+        return None
+
+    def _turn(self, sample: Sample, duration_s: float) -> Outcome | None:
+        """Look at what arrived and decide how to go on; return how the run ends, if it does."""
+        turns = self._schedule.turns(self._tick, bool(sample.frames))
+        if self._schedule.period_over:
+            stuck, self._stuck[:] = self._stuck.copy(), True
+            if self._tick and stuck.any():
+                names = self._driver.arms[self._arm].names
+                at_limit = [name for name, held in zip(names, stuck, strict=True) if held]
+                return endings.joint_limit(at_limit, sample.time)
+        if not turns:
+            return None
+        if sample.time >= duration_s:
+            return self._completed(duration_s, sample.time)
+        self._part = "perception"
+        observation = self._perception.observe(sample.frames)
+        self._part = "planner"
+        if observation is None:
+            return self._wait(sample)
+        self._last_image = sample.time
+        self._losses.report(sample.time, observation)
+        reference = self._planner.reference(observation.time)
+        self._part = "law"
+        return self._decide(sample, observation, reference)
+
+    def _wait(self, sample: Sample) -> Outcome | None:
+        """Go on without an image, for a while."""
+        waited = sample.time - self._last_image
+        if waited > self._timeouts.image_s:
+            return endings.image_late(waited, sample.time)
+        self._record(sample, None, self._planner.reference(sample.time))
+        return None
+
+    def _decide(
+        self, sample: Sample, observation: Observation, reference: Reference
+    ) -> Outcome | None:
+        """Ask the law for a command, unless the target is lost or the arm is held."""
+        time, self._command = sample.time, None
+        if not shows_target(observation):
+            self._record(sample, observation, reference)
+            if time - self._last_seen > self._timeouts.target_s:
+                return endings.target_lost(reasons(observation), time)
+            return None
+        self._last_seen = time
+        if self._followers[self._arm].holding is not None:
+            self._record(sample, observation, reference)
+            return None
+        command = self._law.command(observation, reference, sample.joints[self._arm])
+        if fault := self._border.check_command(self._arm, command):
+            return Outcome(*fault, time)
+        self._command = command
+        self._record(sample, observation, reference)
+        return None if command.fault is None else Outcome(*command.fault, time)
+
+    def _step(self, sample: Sample) -> Outcome | None:
+        """Hand the next set-points to the driver; return how the run ends, if it does."""
+        for name, follower in self._followers.items():
+            robot = sample.robots.get(name)
+            if name == self._arm or robot is not None:
+                measured = sample.joints[name].position
+                if fault := follower.observe(sample.time, measured, robot):
+                    return Outcome(*fault, sample.time)
+        self._tell_of_hold(sample.time)
+        rates = self._rates(sample.time)
+        if isinstance(rates, Fault):
+            return Outcome(*rates, sample.time)
+        setpoints = {
+            name: follower.step(rates if name == self._arm else self._rest[name])
+            for name, follower in self._followers.items()
+        }
+        self._stuck &= self._followers[self._arm].guard.at_limit
+        self._part = "driver"
+        self._driver.step(setpoints)
+        self._tick += 1
+        return None
+
+    def _rates(self, time: float) -> FloatArray | Fault:
+        """Return the rates to move at: the command's, less what its age has taken from them."""
+        share = 0.0
+        if self._command is not None:
+            share = command_share(time - self._last_image, self._period_s, self._timeouts.decay_s)
+        self._part = "law"
+        if share == 0.0:
+            self._command = None
+            if self._inner_law is not None:
+                self._inner_law.hold()
+            return self._rest[self._arm]
+        assert self._command is not None
+        rates = self._command.velocity
+        if self._inner_law is not None:
+            rates = self._inner_law.follow(self._followers[self._arm].guard.setpoint)
+            if fault := self._border.check_rates(self._arm, rates):
+                return fault
+        return rates if share == 1.0 else share * rates
+
+    def _tell_of_hold(self, time: float) -> None:
+        holding = self._followers[self._arm].holding
+        kind = holding.kind.value if holding else ""
+        if holding is not None:
+            self._command = None
+        if kind != self._held:
+            self._held = kind
+            reason = holding.reason if holding else f"{self._arm} follows again"
+            self._listeners.event(time, kind or "following", reason)
+
+    def _record(
+        self, sample: Sample, observation: Observation | None, reference: Reference
+    ) -> None:
+        commands = {}
+        if self._command is not None:
+            share = command_share(
+                sample.time - self._last_image, self._period_s, self._timeouts.decay_s
+            )
+            faded = replace(
+                self._command,
+                velocity=share * self._command.velocity,
+                v_camera=share * self._command.v_camera,
+            )
+            commands = {self._arm: self._command if share == 1.0 else faded}
+        setpoints = {name: follower.guard.setpoint for name, follower in self._followers.items()}
+        record = TickRecord(sample.time, sample, observation, reference, commands, setpoints)
+        self._listeners.tick(record)
+
+    def _completed(self, duration_s: float, time: float) -> Outcome:
+        holding = self._followers[self._arm].holding
+        if holding is not None:
+            return Outcome(*holding, time)
+        return endings.completed(duration_s, time)
+
+    def _stopped(self) -> Outcome:
+        return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)
+
     def _braked(self, outcome: Outcome) -> Outcome:
         """Brake every arm; a driver that falls silent meanwhile is the outcome instead."""
-        failure = brake(self._driver, self._guards)
-        if not failure:
+        failure = self._brake()
+        if not failure or outcome.kind is OutcomeKind.DRIVER_SILENT:
             return outcome
         if outcome.succeeded or outcome.kind is OutcomeKind.STOPPED:
             return Outcome(OutcomeKind.DRIVER_SILENT, failure, self._now)
         return replace(outcome, reason=f"{outcome.reason}; not braked from here: {failure}")
 
-    def _run(self, duration_s: float) -> Outcome:
-        outer_tick, sample = 0, self._first
-        while True:
-            if self._interrupt.asked:
-                return self._stopped()
-            if sample.time >= duration_s:
-                return endings.completed(duration_s, sample.time)
-            self._part = "perception"
-            observation = self._perception.observe(sample.frames)
-            command, outcome = self._decide(sample, observation)
-            if outcome is not None:
-                return outcome
-            outer_tick += 1
-            next_tick = picture_tick(outer_tick, self._driver.inner_rate_hz, self._outer_rate_hz)
-            self._part = "driver"
-            if limited := self._move(self._rates(command), next_tick):
-                return endings.joint_limit(limited, self._now)
-            sample = self._driver.read()
-
-    def _stopped(self) -> Outcome:
-        return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)
+    def _brake(self) -> str:
+        return brake(self._driver, {name: f.guard for name, f in self._followers.items()})
 
     @property
-    def _now(self) -> float:
-        return self._inner_tick / self._driver.inner_rate_hz
-
-    def _decide(
-        self, sample: Sample, observation: Observation | None
-    ) -> tuple[JointCommand | None, Outcome | None]:
-        """Return the command for the next period, None to hold, or how the run ends."""
-        time = sample.time
-        if observation is None:
-            if time - self._last_picture > self._patience.image_s:
-                return None, endings.image_late(time - self._last_picture, time)
-            self._record(sample, None, self._planner.reference(time), self._last_command)
-            return self._last_command, None
-        self._last_picture = time
-        self._report_losses(time, observation)
-        self._part = "planner"
-        reference = self._planner.reference(observation.time)
-        if not _shows_target(observation):
-            self._last_command = None
-            self._record(sample, observation, reference, None)
-            if time - self._last_seen > self._patience.target_s:
-                return None, endings.target_lost(_reasons(observation), time)
-            return None, None
-        self._last_seen = time
-        self._part = "law"
-        command = self._law.command(observation, reference, sample.joints[self._arm])
-        self._last_command = command
-        self._record(sample, observation, reference, command)
-        if command.fault is not None:
-            return None, Outcome(*command.fault, time)
-        return command, None
-
-    def _rates(self, command: JointCommand | None) -> Callable[[Setpoint], FloatArray]:
-        """Return what says, given the last set-point, how fast it shall move."""
-        law = self._law
-        if isinstance(law, InnerLaw):
-            if command is not None:
-                return law.follow
-            law.hold()
-        rates = self._still if command is None else command.velocity
-        return lambda _: rates
-
-    def _move(self, rates: Callable[[Setpoint], FloatArray], until_tick: int) -> list[str]:
-        """Step the driver to an inner tick; return the joints stuck at a limit all the while."""
-        guard = self._guards[self._arm]
-        stuck = np.ones(guard.joint_count, dtype=np.bool_)
-        while self._inner_tick < until_tick and not self._interrupt.asked:
-            wanted = rates(guard.setpoint)
-            setpoints = {
-                name: other.step(wanted if name == self._arm else np.zeros(other.joint_count))
-                for name, other in self._guards.items()
-            }
-            stuck &= guard.at_limit
-            self._driver.step(setpoints)
-            self._inner_tick += 1
-        if self._interrupt.asked:
-            return []
-        names = self._driver.arms[self._arm].names
-        return [name for name, at_limit in zip(names, stuck, strict=True) if at_limit]
-
-    def _record(
-        self,
-        sample: Sample,
-        observation: Observation | None,
-        reference: Reference,
-        command: JointCommand | None,
-    ) -> None:
-        commands = {} if command is None else {self._arm: command}
-        setpoints = {name: guard.setpoint for name, guard in self._guards.items()}
-        record = TickRecord(sample.time, sample, observation, reference, commands, setpoints)
-        self._listeners.tick(record)
-
-    def _report_losses(self, time: float, observation: Observation) -> None:
-        lost = not _shows_target(observation)
-        if lost != self._target_lost:
-            self._target_lost = lost
-            text = endings.why_lost(_reasons(observation)) if lost else "it is back"
-            self._listeners.event(time, "target out of sight" if lost else "target in sight", text)
-        if observation.target is None and not lost:
-            for view in {view.camera: view for view in observation.views}.values():
-                self._report_features(time, view)
-
-    def _report_features(self, time: float, view: ImagePoints) -> None:
-        before = self._lost.get(view.camera, set())
-        lost = set(np.flatnonzero(~view.found).tolist())
-        for feature in sorted(lost - before):
-            text = f"feature {feature} in {view.camera}: {view.reasons[feature]}"
-            self._listeners.event(time, "feature lost", text)
-        for feature in sorted(before - lost):
-            self._listeners.event(
-                time, "feature found", f"feature {feature} in {view.camera} is back"
-            )
-        self._lost[view.camera] = lost
-
-
-def _shows_target(observation: Observation) -> bool:
-    return bool(observation.target) or any(view.found.any() for view in observation.views)
-
-
-def _reasons(observation: Observation) -> list[str]:
-    return [reason for view in observation.views for reason in view.reasons]
+    def _moving(self) -> bool:
+        return any(follower.guard.moving for follower in self._followers.values())

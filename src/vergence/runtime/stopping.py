@@ -3,8 +3,6 @@
 import logging
 from collections.abc import Mapping
 
-import numpy as np
-
 from vergence.control import Guard
 from vergence.errors import DriverSilent
 from vergence.runtime.driver import Driver
@@ -25,7 +23,7 @@ def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
     """
     refused = 0
     while any(guard.moving for guard in guards.values()):
-        rest = {name: guard.step(np.zeros(guard.joint_count)) for name, guard in guards.items()}
+        rest = {name: guard.brake() for name, guard in guards.items()}
         try:
             driver.step(rest)
         except DriverSilent as silence:

@@ -6,6 +6,7 @@ from vergence.signals.joints import JointState, Sample, Setpoint
 from vergence.signals.observation import ImagePoints, Observation, SearchWindows, TargetState
 from vergence.signals.outcome import Outcome, OutcomeKind
 from vergence.signals.reference import Reference
+from vergence.signals.robot_state import RobotMode, RobotState
 
 __all__ = [
     "Frame",
@@ -17,6 +18,8 @@ __all__ = [
     "Outcome",
     "OutcomeKind",
     "Reference",
+    "RobotMode",
+    "RobotState",
     "Sample",
     "SearchWindows",
     "Setpoint",

@@ -1,10 +1,11 @@
 """Where an arm is, and where it should be."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from vergence.arrays import FloatArray, frozen
 from vergence.signals.frame import Frame
+from vergence.signals.robot_state import RobotState
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,8 @@ class Setpoint:
 class Sample:
     """What a cell has to say at one instant."""
 
-    time: float  # s since the start of the run
+    time: float  # s, of one monotonic clock; behind the border, since the start of the run
     joints: Mapping[str, JointState]  # of every arm, by name
-    frames: tuple[Frame, ...]  # the pictures that arrived since the last sample, oldest first
+    frames: tuple[Frame, ...]  # the images that arrived since the last sample, oldest first
+    # By arm, from drivers that know; an arm without one is running.
+    robots: Mapping[str, RobotState] = field(default_factory=dict)

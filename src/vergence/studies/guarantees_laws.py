@@ -21,7 +21,7 @@ from vergence.control import (
 )
 from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajectory
-from vergence.runtime import Loop, Patience
+from vergence.runtime import Loop, Timeouts
 from vergence.runtime.stages import Planner
 from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
 from vergence.simulation import ExactPoints, IdealCell, IdealDriver
@@ -198,7 +198,7 @@ def _run(
 ) -> Ending:
     loop = Loop(
         driver, ARM, _StrictView(), planner, law, outer_rate_hz=RATE_HZ,
-        patience=Patience(image_s=0.0),
+        timeouts=Timeouts(image_s=0.0),
     )  # fmt: skip
     outcome = loop.run(duration_s)
     if outcome.kind is OutcomeKind.COMPLETED:

@@ -7,8 +7,14 @@ from numba import njit, prange
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import picture_tick
-from vergence.control import guarded_steps, optimal_tracking_tick, unpack_chain
+from vergence.control import (
+    guarded_step,
+    guarded_steps,
+    optimal_tracking_tick,
+    unpack_chain,
+)
 from vergence.robot.chain import Axes, tip_frame
+from vergence.runtime.schedule import command_share
 
 COMPLETED, IMAGE_LATE, TARGET_LOST, SINGULAR, STUCK = range(5)  # how a run ends
 _IN_FRONT_M = 1e-3  # depth from which a feature can be seen
@@ -29,7 +35,7 @@ class LoopInputs(NamedTuple):
     noise_px: FloatArray  # (K, M, 2) on the features found in it
     rates_hz: FloatArray  # (2,) of set-points and of pictures
     latency: IntArray  # (1,) from exposure to arrival, pictures
-    ends_s: FloatArray  # (3,) duration; patience without a picture, and without the target
+    ends_s: FloatArray  # (4,) duration, and of `Timeouts` image_s, target_s, decay_s
     singular_below: FloatArray  # (1,) smallest singular value of J at which the run ends
 
 
@@ -85,6 +91,21 @@ def look(
 
 
 @njit(cache=True, error_model="numpy")
+def faded_step(
+    q: FloatArray,
+    velocity: FloatArray,
+    rates: FloatArray,
+    limits: FloatArray,
+    dt: float,
+    stuck: BoolArray,
+) -> None:
+    """Take one guarded step in place; joints stay stuck as long as a limit holds them back."""
+    step = guarded_step(q, velocity, rates, limits, dt)
+    q[:], velocity[:] = step.position, step.velocity
+    stuck &= step.at_limit
+
+
+@njit(cache=True, error_model="numpy")
 def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, float]:
     """Run [Nelson1995] in the loop, on an arm that moves exactly as it is told.
 
@@ -99,7 +120,12 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
     found = np.empty((len(run.features), 5))
     chain = unpack_chain(run.joints)
     inner_hz, outer_hz = run.rates_hz[0], run.rates_hz[1]
-    duration, image_patience, target_patience = run.ends_s[0], run.ends_s[1], run.ends_s[2]
+    duration, image_s, target_s, decay_s = (
+        run.ends_s[0],
+        run.ends_s[1],
+        run.ends_s[2],
+        run.ends_s[3],
+    )
     tick, last_picture, last_seen = 0, 0.0, 0.0
     for k in range(len(run.arrived)):
         time, seen = tick / inner_hz, k - run.latency[0]
@@ -122,12 +148,19 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
                     return SINGULAR, tick, seen + 1, sigma
             else:
                 rates[:] = 0.0
-                if time - last_seen > target_patience:
+                if time - last_seen > target_s:
                     return TARGET_LOST, tick, seen + 1, time - last_seen
-        elif time - last_picture > image_patience:
+        elif time - last_picture > image_s:
             return IMAGE_LATE, tick, seen, time - last_picture
         steps = picture_tick(k + 1, inner_hz, outer_hz) - tick
-        guarded_steps(q, velocity, rates, run.limits, 1.0 / inner_hz, steps, record.stuck)
+        if last_picture == time:
+            guarded_steps(q, velocity, rates, run.limits, 1.0 / inner_hz, steps, record.stuck)
+        else:
+            record.stuck[:] = True
+            for step in range(steps):
+                age_s = (tick + step) / inner_hz - last_picture
+                share = command_share(age_s, 1.0 / outer_hz, decay_s)
+                faded_step(q, velocity, share * rates, run.limits, 1.0 / inner_hz, record.stuck)
         tick += steps
         if record.stuck.any():
             return STUCK, tick, seen + 1, 0.0

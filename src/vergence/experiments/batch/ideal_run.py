@@ -7,7 +7,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.control import Law
 from vergence.planning import FixedReference
-from vergence.runtime import Loop, Patience, Run, RunInfo, RunRecorder
+from vergence.runtime import Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.signals import Reference
 from vergence.simulation import ExactPoints, IdealCell, IdealDriver
 from vergence.simulation.ideal_driver import ARM, CAMERA
@@ -22,7 +22,7 @@ class IdealRun:
     wanted_px: FloatArray  # (M, 2) where the features are to be
     duration_s: float
     noise_px: float = 0.0  # standard deviation on each coordinate
-    patience: Patience = field(default_factory=Patience)
+    timeouts: Timeouts = field(default_factory=Timeouts)
 
     def noise(self) -> np.random.Generator:
         """Return what draws the noise."""
@@ -40,7 +40,7 @@ class IdealRun:
             self.law,
             outer_rate_hz=self.cell.rate_hz,
             listeners=[recorder],
-            patience=self.patience,
+            timeouts=self.timeouts,
         )
         recorder.close(loop.run(self.duration_s), {})
         return recorder.run()

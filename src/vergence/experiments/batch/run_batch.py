@@ -120,7 +120,7 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
         noise_px,
         np.array([(run.cell.inner_rate_hz, run.cell.rate_hz) for run in runs]),
         np.array([[run.cell.latency_frames] for run in runs]),
-        np.array([(run.duration_s, run.patience.image_s, run.patience.target_s) for run in runs]),
+        np.array([_ends(run) for run in runs]),
         np.array([[_setup(run).damping] for run in runs]),
     )
 
@@ -136,6 +136,10 @@ def _setup(run: IdealRun) -> TrackingSetup:
     setup = run.law.tracking
     assert setup is not None
     return setup
+
+
+def _ends(run: IdealRun) -> tuple[float, ...]:
+    return run.duration_s, run.timeouts.image_s, run.timeouts.target_s, run.timeouts.decay_s
 
 
 def _limits(run: IdealRun) -> FloatArray:
