@@ -89,7 +89,10 @@ class Cell(Table):
         return named or tuple(self.cameras)
 
     def replace(self, **tables: Any) -> "Cell":
-        """Return a copy with some tables replaced; nested keys by dictionaries, as in the file."""
+        """Return a copy with some values replaced, by nested dictionaries as in the file.
+
+        A table that names its kind replaces the whole table.
+        """
         values = _merge(self.model_dump(), tables)
         return _validate(values, self._path, self._text + settings_text(tables, values))
 
@@ -140,18 +143,14 @@ def _with(values: Any, keys: list[str], value: Any) -> Any:
 
 
 def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables with changes put in; one that names its kind replaces the table whole."""
     merged = dict(values)
     for key, change in changes.items():
         old = merged.get(key)
-        if isinstance(change, Mapping) and isinstance(old, dict) and not _other_kind(old, change):
+        if isinstance(change, Mapping) and isinstance(old, dict) and "kind" not in change:
             change = _merge(old, change)
         merged[key] = change
     return merged
-
-
-def _other_kind(old: Mapping[str, Any], change: Mapping[str, Any]) -> bool:
-    """Whether a table is to become one of another kind, whose keys have nothing in common."""
-    return "kind" in change and change["kind"] != old.get("kind")
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
