@@ -1,5 +1,7 @@
 """A feature of one's own, the area of a triangle, stacked with its points."""
 
+from pathlib import Path
+
 import numpy as np
 
 import vergence as vg
@@ -25,5 +27,6 @@ class Area(vg.Feature):
 triangle = np.array([[-0.1, -0.1], [0.1, -0.1], [0.0, 0.1]])
 near, far = vg.Points(1.2 * triangle, 0.5), vg.Points(triangle, 0.6)
 stack = [vg.Term(vg.ImageBased()), vg.Term(vg.ImageBased(feature=Area), weight=0.5)]
-arm, q = vg.Arm.from_cell("puma560"), np.deg2rad([-125.6, 42.7, -172.7, 0, -50, 0])
+arm = vg.Arm.from_urdf(Path(__file__).with_name("my_arm.urdf"), tip="tool0")
+q = [0, -1.2, 1.5, -1.6, -1.5, 0]
 print(vg.Servo(arm, vg.Camera(640, 480, focal_px=600), stack).rates(near, far, q))

@@ -1,4 +1,4 @@
-"""Where a camera is, and how it moves with the joints of one's own arm."""
+"""Joint rates of one's own arm, with a camera where a hand-eye calibration says it is."""
 
 from pathlib import Path
 
@@ -6,7 +6,9 @@ import vergence as vg
 
 T_flange_camera = [[0, -1, 0, 0.02], [1, 0, 0, 0], [0, 0, 1, 0.05], [0, 0, 0, 1]]  # of calibration
 arm = vg.Arm.from_urdf(Path(__file__).with_name("my_arm.urdf"), tip="tool0")
-eye = arm.with_tip(T_flange_camera)
-q = [0, -1.2, 1.5, -1.6, -1.5, 0]
-print("camera at", eye.forward_kinematics(q)[:3, 3].round(3), "m in the world")
-print("v_camera of the first joint alone:", eye.jacobian(q)[:, 0].round(3))
+camera = vg.Camera(640, 480, focal_px=600)
+points = vg.Points(camera.normalize([[300, 180], [400, 180], [400, 280], [300, 280]]), depth_m=0.5)
+desired = vg.Points(camera.normalize([[270, 190], [370, 190], [370, 290], [270, 290]]), depth_m=0.5)
+limits = vg.Limits(order=["view", "joint margin"])
+servo = vg.Servo(arm.with_tip(T_flange_camera), camera, vg.ImageBased(gain=2.0), limits=limits)
+print(servo.rates(points, desired, q=[0, -1.2, 1.5, -1.6, -1.5, 0]))  # rad/s

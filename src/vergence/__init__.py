@@ -8,6 +8,7 @@ _ROOMS = {
     "app.report": ("report",),
     "assembly": ("plan", "run"),
     "camera": ("Camera", "read_camera", "write_camera"),
+    "camera.calibration": ("calibrate_lens", "calibrate_mounting"),
     "cell": ("Cell", "built_in_cells", "load_cell"),
     "control": (
         "CameraMounting",
@@ -27,6 +28,7 @@ _ROOMS = {
         "least_squares",
     ),
     "errors": ("DriverSilent", "InputError", "RenderingError", "ShapeError", "VergenceError"),
+    "estimation": ("CornerView", "fit_pose"),
     "experiments": ("Comparison", "compare"),
     "features": ("Feature", "Points"),
     "parts": ("Positive", "feature", "knob", "limit", "objective"),
@@ -45,6 +47,7 @@ _ROOMS = {
         "Setpoint",
         "TargetState",
     ),
+    "vision": ("Board",),
     "studies": ("StudyResult", "reproduce"),
 }
 _PLACES = {name: room for room, names in _ROOMS.items() for name in names}

@@ -4,6 +4,8 @@ from vergence.assembly import run as run
 from vergence.camera import Camera as Camera
 from vergence.camera import read_camera as read_camera
 from vergence.camera import write_camera as write_camera
+from vergence.camera.calibration import calibrate_lens as calibrate_lens
+from vergence.camera.calibration import calibrate_mounting as calibrate_mounting
 from vergence.cell import Cell as Cell
 from vergence.cell import built_in_cells as built_in_cells
 from vergence.cell import load_cell as load_cell
@@ -27,6 +29,8 @@ from vergence.errors import InputError as InputError
 from vergence.errors import RenderingError as RenderingError
 from vergence.errors import ShapeError as ShapeError
 from vergence.errors import VergenceError as VergenceError
+from vergence.estimation import CornerView as CornerView
+from vergence.estimation import fit_pose as fit_pose
 from vergence.experiments import Comparison as Comparison
 from vergence.experiments import compare as compare
 from vergence.features import Feature as Feature
@@ -58,3 +62,4 @@ from vergence.signals import Setpoint as Setpoint
 from vergence.signals import TargetState as TargetState
 from vergence.studies import StudyResult as StudyResult
 from vergence.studies import reproduce as reproduce
+from vergence.vision import Board as Board

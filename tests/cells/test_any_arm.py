@@ -76,7 +76,9 @@ def test_a_spare_joint_is_drawn_to_better_postures():
     measure = {}
     for S in (0.0, 1e-5):
         listener = Extremes("panda")
-        assert run_cell(cell.replace(law={"solver": {"S": S}}), [listener], images=False).outcome.succeeded
+        assert run_cell(
+            cell.replace(law={"solver": {"S": S}}), [listener], images=False
+        ).outcome.succeeded
         measure[S] = listener.manipulability
     assert measure[0.0][-1] == pytest.approx(measure[0.0][0], rel=1e-3)
     assert measure[1e-5][-1] > 1.05 * measure[0.0][-1]
