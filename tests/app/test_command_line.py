@@ -179,7 +179,7 @@ def test_a_recording_is_neither_written_over_nor_taken_for_a_cell(
 def test_an_interrupted_run_leaves_a_recording_and_says_where(
     command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import vergence.runtime as runtime
+    import vergence.assembly as assembly
 
     def interrupted(cell: object, listeners: object, images: bool) -> None:
         for listener in listeners:
@@ -189,7 +189,7 @@ def test_an_interrupted_run_leaves_a_recording_and_says_where(
                 listener.tick(record)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runtime, "run_cell", interrupted)
+    monkeypatch.setattr(assembly, "run_cell", interrupted)
     assert command("run", "puma560", "--out", "cut") == 1
     assert "vergence report cut" in capsys.readouterr().err
     recording = Recording.open("cut")

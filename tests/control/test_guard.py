@@ -123,7 +123,7 @@ def test_a_start_beyond_a_limit_is_brought_back_within_rate_and_acceleration(
 
 def test_a_start_that_is_no_position_is_refused() -> None:
     arm = arm_with([-1.0], [1.0], [2.0], [8.0])
-    with pytest.raises(ValueError, match="not finite"):
+    with pytest.raises(ValueError, match="finite joint positions"):
         Guard(arm, np.array([np.nan]), 2e-3)
     with pytest.raises(ShapeError, match="start"):
         Guard(arm, np.zeros(2), 2e-3)

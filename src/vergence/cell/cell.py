@@ -154,58 +154,41 @@ def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = _with_motions(_with_laws(_with_calibrations(values, path), path), path)
+    values = _with_calibrations(values, path)
     try:
         cell = Cell.model_validate(values)
     except ValidationError as error:
         raise explain(error, str(path), values, _known_keys) from None
     cell._path, cell._text = path, text
     _check_names(cell)
-    return cell
+    return _with_parts(cell)
 
 
-def _with_laws(values: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Put in the laws that the tables describe."""
-    if "law" not in values:
-        return values
+def _with_parts(cell: Cell) -> Cell:
+    """Return the cell with the parts that its tables describe; imports them, so it comes last."""
+    place = Place(str(cell.path), "", cell.path.parent)
     settings = find("law", "servo")
 
     def law(key: str, table: Any) -> Any:
         if not isinstance(table, Mapping):
-            raise InputError(str(path), key, table, "a table")
-        return settings.from_table(table, Place(str(path), key, path.parent))
+            raise InputError(str(cell.path), key, table, "a table")
+        return settings.from_table(table, place.at(key))
 
-    laws = values.get("laws", {})
-    if not isinstance(laws, Mapping):
-        raise InputError(str(path), "laws", laws, "a table")
-    return {
-        **values,
-        "law": law("law", values["law"]),
-        "laws": {name: law(f"laws.{name}", table) for name, table in laws.items()},
+    def moved(table: Any, role: str, key: str) -> Any:
+        motion = load_part(role, table.motion, place.at(f"{key}.motion"))
+        return table.model_copy(update={"motion": motion})
+
+    arms = {
+        name: arm if arm.motion is None else moved(arm, "arm_motion", f"arms.{name}")
+        for name, arm in cell.arms.items()
     }
-
-
-def _with_motions(values: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Put in the motions of the target and of the arms."""
-
-    def with_motion(table: Any, role: str, key: str, default: str | None) -> Any:
-        if not isinstance(table, Mapping):
-            return table  # what cannot be one is left as it is
-        given = table.get("motion")
-        if given is None and default is None:
-            return table
-        place = Place(str(path), f"{key}.motion", path.parent)
-        return {**table, "motion": load_part(role, given or {"kind": default}, place)}
-
-    changed = dict(values)
-    if "target" in values:
-        changed["target"] = with_motion(values["target"], "motion", "target", "stationary")
-    if isinstance(arms := values.get("arms"), Mapping):
-        changed["arms"] = {
-            name: with_motion(table, "arm_motion", f"arms.{name}", None)
-            for name, table in arms.items()
-        }
-    return changed
+    update = {
+        "law": law("law", cell.law),
+        "laws": {name: law(f"laws.{name}", table) for name, table in cell.laws.items()},
+        "target": moved(cell.target, "motion", "target"),
+        "arms": arms,
+    }
+    return cell.model_copy(update=update)
 
 
 def _with_calibrations(values: dict[str, Any], path: Path) -> dict[str, Any]:

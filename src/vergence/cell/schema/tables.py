@@ -1,5 +1,6 @@
 """Arms, cameras, target, task and perception in a cell file."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -107,21 +108,24 @@ class CameraTable(Placement):
         return intervals
 
 
+def _kind(motion: Any) -> Any:
+    """Return the kind of a motion, also while it is the name or the table of one."""
+    if isinstance(motion, Mapping):
+        return motion.get("kind")
+    return motion if isinstance(motion, str) else kind_of(motion)
+
+
 class TargetTable(Placement):
     """The object; its placement is where its motion starts, or its pose in what carries it."""
 
     model: Path  # MJCF or URDF
     carried_by: Text | None = None  # an arm, whose last body it is fixed to
-    motion: Part = None  # what it does by itself; stationary if absent
+    motion: Part = "stationary"  # what it does by itself
     features: _Features | None = None  # m, in the target; picked in the image if absent
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":
-        if (
-            self.carried_by is not None
-            and self.motion is not None
-            and kind_of(self.motion) != "stationary"
-        ):
+        if self.carried_by is not None and _kind(self.motion) != "stationary":
             raise ValueError("either carried_by or a motion of its own")
         return self
 
