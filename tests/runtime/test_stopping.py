@@ -44,7 +44,7 @@ def failing(part: object, method: str, from_call: int, error: BaseException) -> 
 def test_what_a_part_raises_is_the_outcome_and_goes_to_the_log(part, error, caplog) -> None:
     driver, eyes, law = ScriptedDriver(), ScriptedEyes(), ScriptedLaw(RATES)
     method = {"law": (law, "command"), "perception": (eyes, "observe"), "driver": (driver, "read")}
-    failing(*method[part], 10, error)
+    failing(*method[part], 300 if part == "driver" else 10, error)  # read once a tick
     outcome = looped(driver, eyes, law).run(5.0)
     assert outcome.kind is OutcomeKind.PART_RAISED
     assert f"the {part} raised {type(error).__name__}" in outcome.reason
