@@ -60,10 +60,11 @@ def drawn_run(seed: int) -> IdealRun:
     )
     truth = IdealDriver(cell).frame().truth
     assert truth is not None
-    depth_factor = float(np.exp(rng.uniform(-0.7, 0.7)))
     axes = tuple(str(a) for a in rng.choice(AXES, rng.integers(2, 7), replace=False))
+    depth_factor = float(np.exp(rng.uniform(-0.7, 0.7)))
     objective = OptimalTracking(
         axes=axes,
+        Q=2e-6 * count,  # it is shared by the features
         avoidance_axes=axes[: rng.integers(0, len(axes) + 1)],
         S=float(rng.choice([0.0, 1e-3])),
         penalty=str(rng.choice(["product", "per_joint"])),
