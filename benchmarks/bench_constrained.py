@@ -1,7 +1,7 @@
 """One constrained tick: six and seven joints, four and nine points, every constraint in force.
 
 The peers do less: ViSP changes its law at joint limits, which it may pass; mink and pink hold joint
-positions and rates while the flange goes to a pose, and know of no picture.
+positions and rates while the flange goes to a pose, and know of no image.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ class Tick(NamedTuple):
 
 
 def tick_of(cell: str, count: int, posts: int = 0) -> Tick:
-    """Make a tick in which a corner of the picture, a soft joint limit, and posts are near."""
+    """Make a tick in which a corner of the image, a soft joint limit, and posts are near."""
     driver = SimulatedDriver(load_cell(cell), images=False)
     task = driver.cell.task
     arm, camera = driver.world.arm_to_camera(task.camera), driver.cameras[task.camera]

@@ -157,7 +157,7 @@ def exact_measure(places: dict[str, FloatArray]) -> Callable[..., ImagePoints]:
 
 
 def tick(count: int) -> Callable[[], object]:
-    """Predict, see, select, open windows, update: one picture of each camera, 8 features in all."""
+    """Predict, see, select, open windows, update: one image of each camera, 8 features in all."""
     names = [f"camera{n}" for n in range(count)]
     poses = dict(zip(names, around(count), strict=True))
     places = {

@@ -1,4 +1,4 @@
-"""A known object: corners in windows, edges of a whole picture, a real sequence from end to end.
+"""A known object: corners in windows, edges of a whole image, a real sequence from end to end.
 
 The sequence is a cube of 84 mm on a table, of Debian's package visp-images-data.
 """
@@ -30,7 +30,7 @@ def cube() -> ObjectModel:
 
 
 def start() -> FloatArray:
-    """The pose in the first picture, as the package has it."""
+    """The pose in the first image, as the package has it."""
     values = np.loadtxt(PICTURES / "cube.0.pos")
     T: FloatArray = se3(so3_exp(values[3:].copy()), values[:3].copy())
     return T

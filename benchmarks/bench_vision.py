@@ -1,7 +1,7 @@
 """The SSD tracker: five points in 640 × 480 against OpenCV; and how often it is right.
 
-Real pictures are those of Debian's package visp-images-data. The protocol: up to 60 corners of the
-first picture (OpenCV's, not our own), the reference is Lucas-Kanade carried from picture to picture
+Real images are those of Debian's package visp-images-data. The protocol: up to 60 corners of the
+first image (OpenCV's, not our own), the reference is Lucas-Kanade carried from image to image
 and checked forward and backward at each; points that it loses, or that move more than 32 px along
 an axis, are left out. Then both trackers make one step over the gap, with no prediction. Right is
 what is reported as found and lies within 1.5 px of the reference; a wrong place and a point
@@ -53,7 +53,7 @@ def checked(
 
 
 def sequence(name: str) -> list[ImageArray]:
-    """The pictures of a sequence, in order; none if they are not installed."""
+    """The images of a sequence, in order; none if they are not installed."""
     import cv2
 
     paths = sorted((PICTURES / name).glob("*.p?m"))
@@ -61,7 +61,7 @@ def sequence(name: str) -> list[ImageArray]:
 
 
 class Case(NamedTuple):
-    """Points of one picture, and where they are some pictures later."""
+    """Points of one image, and where they are some images later."""
 
     before: ImageArray
     after: ImageArray
@@ -79,7 +79,7 @@ def corners(image: ImageArray, count: int) -> FloatArray:
 
 
 def cases(images: Sequence[ImageArray], start: int, gaps: Sequence[int]) -> Iterator[Case]:
-    """Cases that begin at one picture, for each gap that the sequence is long enough for.
+    """Cases that begin at one image, for each gap that the sequence is long enough for.
 
     Points that move further than the search reaches, 32 px along an axis, are left out.
     """
@@ -125,7 +125,7 @@ def right_row(name: str, starts: Sequence[int], gaps: Sequence[int]) -> dict[str
 
 
 def textured(rng: np.random.Generator) -> ImageArray:
-    """A picture of 640 × 480 with detail at every level."""
+    """An image of 640 × 480 with detail at every level."""
     import cv2
 
     layers = [cv2.GaussianBlur(rng.standard_normal((480, 640)), (0, 0), s) for s in (1.5, 4.0, 12)]
@@ -134,7 +134,7 @@ def textured(rng: np.random.Generator) -> ImageArray:
 
 
 def to_and_fro(tracker: SsdTracker, first: ImageArray, second: ImageArray) -> Callable[[], None]:
-    """Track in two pictures by turns, so that there always is motion."""
+    """Track in two images by turns, so that there always is motion."""
 
     def case() -> None:
         tracker.track(second)
@@ -144,7 +144,7 @@ def to_and_fro(tracker: SsdTracker, first: ImageArray, second: ImageArray) -> Ca
 
 
 def speed_rows() -> list[dict[str, Any]]:
-    """Five points, ±32 px, with fraction; two pictures a call on both sides."""
+    """Five points, ±32 px, with fraction; two images a call on both sides."""
     import cv2
 
     cv2.setNumThreads(1)

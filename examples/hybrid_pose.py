@@ -1,6 +1,6 @@
 """A fixed camera, then that one and another in the hand: how well the hand follows an object.
 
-Both cameras' pictures are fused into the object's pose, which the hand keeps its distance from.
+Both cameras' images are fused into the object's pose, which the hand keeps its distance from.
 """
 
 from vergence.assembly import run_cell

@@ -1,4 +1,4 @@
-"""Two pictures of an object nobody has a model of: plan a path between them and look at it."""
+"""Two images of an object nobody has a model of: plan a path between them and look at it."""
 
 from vergence.cell import load_cell
 from vergence.planning import OptimisedPlanner, PlanningProblem, Trajectory
@@ -18,7 +18,7 @@ def main() -> None:
     view = estimate_two_view(now.points_px, wanted.truth.points_px, camera)
     if not view:
         raise SystemExit(str(view))
-    distance_m = 0.615  # roughly, from the camera to the object: two pictures have no scale
+    distance_m = 0.615  # roughly, from the camera to the object: two images have no scale
     problem = PlanningProblem.from_two_view(view, distance_m, arm, camera, q)
     plan = OptimisedPlanner().plan(problem)
     if not plan:

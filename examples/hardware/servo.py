@@ -21,9 +21,9 @@ from vergence.vision import SsdTracker, pick_features
 
 
 def servo(driver: Driver, model: SimulatedDriver, duration_s: float, folder: Path) -> Outcome:
-    """Keep four points of the first picture where they are; leave a recording."""
+    """Keep four points of the first image where they are; leave a recording."""
     sample = driver.read()
-    while not sample.frames:  # the first picture may be late
+    while not sample.frames:  # the first image may be late
         driver.step({})
         sample = driver.read()
     image = sample.frames[0].image

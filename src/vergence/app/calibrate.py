@@ -60,7 +60,7 @@ class Calibration(NamedTuple):
 
     @property
     def bad(self) -> "tuple[BadImage, ...]":
-        """All pictures that were left out."""
+        """All images that were left out."""
         more = () if self.mounting is None else self.mounting.bad
         return self.data.blank + self.lens.bad + more
 

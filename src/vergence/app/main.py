@@ -127,7 +127,7 @@ def plan(
     settings: Settings = None,
     as_json: Json = False,
 ) -> None:
-    """Plan the way between two pictures and draw it; nothing moves."""
+    """Plan the way between two images and draw it; nothing moves."""
     from vergence.app.plan import Request
     from vergence.app.plan import plan as command
 

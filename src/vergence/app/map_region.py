@@ -35,7 +35,7 @@ class Region:
 
 
 def map_region(source: "CellSource", region: Region, how: Running, as_json: bool) -> int:
-    """Map a region; write picture, data and page into the run folder; return the exit code."""
+    """Map a region; write image, data and page into the run folder; return the exit code."""
     from vergence.experiments import scores
 
     cell = source.load()
@@ -113,7 +113,7 @@ def _write_page(
 def _picture(
     cell: "Cell", region: Region, results: "Sequence[TrialResult]"
 ) -> "tuple[Panels, str, str]":
-    """Return the picture, what it shows, and what a run is called."""
+    """Return the image, what it shows, and what a run is called."""
     from vergence.app.figures.endings import headings_figure, places_figure
 
     if region.over == "headings":

@@ -1,4 +1,4 @@
-"""What the marks in a camera's pictures mean, as a line of a page."""
+"""What the marks in a camera's images mean, as a line of a page."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _INK = {  # as `overlay` draws them
 
 
 def marks_legend(trace: CameraTrace) -> str:
-    """Return the marks that occur in a camera's pictures, with their meaning."""
+    """Return the marks that occur in a camera's images, with their meaning."""
     known = np.isfinite(trace.points_px[..., 0])
     occurs = {
         "tracked": trace.found,

@@ -35,7 +35,7 @@ def figure(panels: Panels | None, caption: str) -> str:
 
 
 def picture(data: bytes, kind: str, caption: str) -> str:
-    """Return a picture with its caption."""
+    """Return an image with its caption."""
     text = escape(caption)
     return (
         f'<figure><img src="{data_url(data, kind)}" alt="{text}">'

@@ -1,4 +1,4 @@
-"""Draws what was looked for, tracked, wanted and true into a camera's picture.
+"""Draws what was looked for, tracked, wanted and true into a camera's image.
 
 Pixel centres are at integers, here as everywhere; marks are placed to better than a
 quarter of a pixel, which is what OpenCV's lines allow.
@@ -31,7 +31,7 @@ _FINE = 1  # px, of a window's frame
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What there is to draw at one picture; unknown points are NaN."""
+    """What there is to draw at one image; unknown points are NaN."""
 
     tracked_px: FloatArray  # (M, 2)
     found: BoolArray  # (M,)
@@ -42,7 +42,7 @@ class Marks:
 
     @classmethod
     def at(cls, trace: CameraTrace, time: float) -> Self:
-        """Return the marks of the picture nearest to a time of exposure."""
+        """Return the marks of the image nearest to a time of exposure."""
         row = int(np.argmin(np.abs(trace.time - time)))
         return cls(
             trace.points_px[row],
@@ -55,12 +55,12 @@ class Marks:
 
 
 def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[np.uint8]:
-    """Return the picture in colour with the marks over it.
+    """Return the image in colour with the marks over it.
 
     Args:
         image: (height, width) grey.
         marks: where to draw.
-        width: of what is returned, the picture's own if None; marks keep their size.
+        width: of what is returned, the image's own if None; marks keep their size.
 
     Returns:
         (…, width, 3) blue, green, red.
@@ -92,7 +92,7 @@ def _colored(image: ImageArray, width: int) -> NDArray[np.uint8]:
 
 
 def _known(points_px: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the points that can be drawn, as places in the resized picture."""
+    """Return the points that can be drawn, as places in the resized image."""
     drawable = np.isfinite(points_px).all(axis=1) & (np.abs(points_px) < 1e4).all(axis=1)
     return np.asarray((points_px[drawable] + 0.5) * scale - 0.5)
 

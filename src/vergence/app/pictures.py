@@ -1,4 +1,4 @@
-"""Pictures of a run for its report: a short film and a few key frames, marks drawn in."""
+"""Images of a run for its report: a short film and a few key frames, marks drawn in."""
 
 import logging
 import os
@@ -32,14 +32,14 @@ _KEY_FRAME_WIDTH_PX = 640
 
 @dataclass(frozen=True, slots=True)
 class KeyFrame:
-    """One picture with its marks."""
+    """One image with its marks."""
 
     time: float  # s, of exposure
     jpeg: bytes
 
 
 def film(recording: Recording, camera: str) -> bytes | None:
-    """Return the camera's pictures as a WebM film in real time; None where that is impossible."""
+    """Return the camera's images as a WebM film in real time; None where that is impossible."""
     times = recording.image_times(camera)
     shown = range(0, len(times), max(1, -(-len(times) // _FILM_FRAMES)))
     if len(shown) < 2:
@@ -76,7 +76,7 @@ def encode(frames: Iterable[NDArray[np.uint8]], rate_hz: float) -> bytes | None:
 
 
 def key_frames(recording: Recording, camera: str) -> list[KeyFrame]:
-    """Return the pictures at the start, at the end, and evenly between."""
+    """Return the images at the start, at the end, and evenly between."""
     count = len(recording.image_times(camera))
     chosen = {round(number) for number in np.linspace(0, count - 1, _KEY_FRAMES)}
     trace = recording.cameras[camera]

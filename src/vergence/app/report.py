@@ -1,4 +1,4 @@
-"""The report of a run: one page with numbers, pictures and figures, made from its recording."""
+"""The report of a run: one page with numbers, images and figures, made from its recording."""
 
 from html import escape
 from importlib.metadata import version

@@ -99,7 +99,7 @@ def _constraint_row(trace: ArmTrace, name: str) -> Row:
 
 
 def _worst(distances: FloatArray) -> FloatArray:
-    """Return the largest distance in each picture that has one."""
+    """Return the largest distance in each image that has one."""
     known = np.isfinite(distances).any(axis=1)
     return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
 

@@ -1,4 +1,4 @@
-"""`vergence track`: the pose of a known object in footage, picture by picture."""
+"""`vergence track`: the pose of a known object in footage, image by image."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -51,7 +51,7 @@ class Tracked(NamedTuple):
     last: "Step"
     deviation_max_m: float  # largest standard deviation of the position while seen
     deviation_max_rad: float
-    median_ms: float  # a picture, drawing and files left out
+    median_ms: float  # an image, drawing and files left out
 
 
 def track(request: Request, out: Path | None, as_json: bool) -> int:
@@ -215,7 +215,7 @@ def _summary(steps: "list[Step]", took: list[float]) -> Tracked:
 
 
 def _outcome(steps: "list[Step]") -> Outcome:
-    """Say how it ended: whatever the last picture does not show is not held."""
+    """Say how it ended: whatever the last image does not show is not held."""
     from vergence.app.tracking.follower import Sighting
 
     last = steps[-1]

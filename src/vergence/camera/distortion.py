@@ -83,7 +83,7 @@ def distortion_slopes(points: FloatArray, k: FloatArray) -> FloatArray:
 def distortion_reach(k: FloatArray) -> float:
     """Return the radius, normalized, up to which a point farther out appears farther out.
 
-    Beyond it the model folds the picture over: what lies far outside the field of view would seem
+    Beyond it the model folds the image over: what lies far outside the field of view would seem
     to lie in it. Infinite where it never folds. Only the radial part counts.
     """
     # d(r radial)/dr = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³ with s = r².

@@ -1,4 +1,4 @@
-"""When pictures are taken, counted in ticks of the faster loop."""
+"""When images are taken, counted in ticks of the faster loop."""
 
 import numpy as np
 from numba import njit
@@ -8,13 +8,13 @@ from vergence.arrays import FloatArray
 
 @njit(cache=True)
 def picture_tick(picture: int, inner_rate_hz: float, rate_hz: float) -> int:
-    """Return the inner tick of a picture, ⌊k · inner/rate⌋, exact also where 26 Hz meets 500 Hz."""
+    """Return the inner tick of an image, ⌊k · inner/rate⌋, exact also where 26 Hz meets 500 Hz."""
     return int(picture * inner_rate_hz / rate_hz + 1e-9)
 
 
 @njit(cache=True)
 def picture_times(count: int, inner_rate_hz: float, rate_hz: float) -> FloatArray:
-    """Return when the first pictures are taken, (count,), s."""
+    """Return when the first images are taken, (count,), s."""
     times = np.empty(count)
     for k in range(count):
         times[k] = picture_tick(k, inner_rate_hz, rate_hz) / inner_rate_hz

@@ -170,7 +170,7 @@ class Camera:
         Its focal length is the same; it is this camera itself where there is no distortion.
 
         Raises:
-            InputError: if the distortion is not one-to-one over the picture.
+            InputError: if the distortion is not one-to-one over the image.
         """
         if not self.distorted:
             return self

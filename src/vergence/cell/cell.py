@@ -238,7 +238,7 @@ def _check_names(cell: Cell) -> None:
     for name, camera in cell.cameras.items():
         if camera.arm is not None:
             check(f"cameras.{name}.arm", camera.arm, cell.arms)
-        if camera.rate_hz > cell.inner_rate_hz:  # a picture a tick at most
+        if camera.rate_hz > cell.inner_rate_hz:  # an image a tick at most
             allowed = f"up to inner_rate_hz, {cell.inner_rate_hz:g}"
             raise InputError(str(cell.path), f"cameras.{name}.rate_hz", camera.rate_hz, allowed)
     for name in cell.perception.cameras or ():

@@ -9,7 +9,7 @@ from vergence.signals import Setpoint
 
 @runtime_checkable
 class InnerLaw(Law, Protocol):
-    """A law that makes a trajectory between pictures."""
+    """A law that makes a trajectory between images."""
 
     def follow(self, setpoint: Setpoint) -> FloatArray:
         """Return joint rates (n,) for the next inner period.

@@ -21,8 +21,8 @@ class Belief:
     velocity: FloatArray  # (6,) (v, ω) of the target's origin along world axes, m/s and rad/s
     covariance: FloatArray  # (12, 12)
     consistency: Consistency = field(default_factory=Consistency)
-    seen: float = -np.inf  # s, exposure of the last picture that was used
-    doubts: int = 0  # pictures in a row that contradicted the prediction and were not used
+    seen: float = -np.inf  # s, exposure of the last image that was used
+    doubts: int = 0  # images in a row that contradicted the prediction and were not used
     disagreeing: float = 0.0  # share of the last points that fell outside the gate, fading
 
     @property

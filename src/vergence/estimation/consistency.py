@@ -20,7 +20,7 @@ class Consistency:
     holds: bool = True  # whether the NIS is no larger than chance allows, one time in a thousand
 
     def add(self, square: float, freedom: int, fading: float) -> Self:
-        """Return the sums with the NIS of one more picture, of `freedom` numbers."""
+        """Return the sums with the NIS of one more image, of `freedom` numbers."""
         total = fading * self.square + square
         mean = fading * self.freedom + freedom
         spread = fading * fading * self.spread + freedom

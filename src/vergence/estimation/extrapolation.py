@@ -14,7 +14,7 @@ def extrapolate(
 ) -> TargetState:
     """Return a target's state at another time, at constant velocity.
 
-    For control: where the target is now, from a picture that is some frames old.
+    For control: where the target is now, from an image that is some frames old.
 
     Args:
         state: as perception reported it.

@@ -37,7 +37,7 @@ class HeldTarget:
         return self._perception.lost
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the pictures show and where the target is, or None without a picture."""
+        """Return what the images show and where the target is, or None without an image."""
         observation = self._perception.observe(frames)
         if observation is None or observation.target is None:
             return observation

@@ -1,4 +1,4 @@
-"""Late and out-of-order pictures: a short history that is replayed."""
+"""Late and out-of-order images: a short history that is replayed."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
@@ -25,40 +25,40 @@ class _Entry(NamedTuple, Generic[B]):
 
 @dataclass(frozen=True, slots=True)
 class FilterHistory(Generic[B]):
-    """The pictures of the last moments in order of exposure, with the belief after each; a value.
+    """The images of the last moments in order of exposure, with the belief after each; a value.
 
-    The pictures of one exposure correct the belief together. One that arrives late is put in its
+    The images of one exposure correct the belief together. One that arrives late is put in its
     place, beside those of its exposure that were there before it, and all is used again from there
-    on. So the belief depends on which pictures arrived, never on the order they arrived in.
+    on. So the belief depends on which images arrived, never on the order they arrived in.
     """
 
     filter: TargetFilter[B]
     base: B  # before the first entry
-    horizon: float = 0.5  # s, how long a picture may be under way
+    horizon: float = 0.5  # s, how long an image may be under way
     entries: tuple[_Entry[B], ...] = ()
     closed: float = -float("inf")  # s, the newest exposure pruned
 
     @property
     def belief(self) -> B:
-        """The belief after the newest picture."""
+        """The belief after the newest image."""
         return self._before(len(self.entries))
 
     def at(self, time: float) -> B:
-        """Return the belief predicted to a time from the pictures up to that time."""
+        """Return the belief predicted to a time from the images up to that time."""
         place = len(self.entries)
         if place and time < self.entries[-1].time:
             place = bisect_right(self.entries, time, key=lambda entry: entry.time)
         return self.filter.predict(self._before(place), time)
 
     def add(self, view: View) -> tuple["FilterHistory[B]", Update]:
-        """Return the history with one more picture, and what was made of that picture."""
+        """Return the history with one more image, and what was made of that image."""
         history, updates = self.add_all([view])
         return history, updates[0]
 
     def add_all(self, views: Sequence[View]) -> tuple["FilterHistory[B]", list[Update]]:
-        """Return the history with more pictures, of any times, and what was made of each."""
+        """Return the history with more images, of any times, and what was made of each."""
         made: list[Update | None] = [self._refused(view) for view in views]
-        new: dict[tuple[float, str], int] = {}  # time and camera: number of the picture
+        new: dict[tuple[float, str], int] = {}  # time and camera: number of the image
         for n, view in enumerate(views):
             if made[n] is None and new.setdefault((view.time, view.camera), n) != n:
                 made[n] = unused(self.belief, view.size, Verdict.REPEATED)
@@ -72,7 +72,7 @@ class FilterHistory(Generic[B]):
         return history, [update for update in made if update is not None]
 
     def _refused(self, view: View) -> Update | None:
-        """Return why a picture cannot be used, or None if it can."""
+        """Return why an image cannot be used, or None if it can."""
         if view.time <= self.closed or view.time < self.base.time:
             return unused(self.belief, view.size, Verdict.TOO_LATE)
         if not self.entries or view.time > self.entries[-1].time:
@@ -86,7 +86,7 @@ class FilterHistory(Generic[B]):
     def _replayed(
         self, views: Sequence[View]
     ) -> tuple["FilterHistory[B]", dict[tuple[float, str], Update]]:
-        """Return the history with pictures in their places, and all updates made for it."""
+        """Return the history with images in their places, and all updates made for it."""
         place = self._place(min(view.time for view in views))
         groups = {entry.time: (entry.views, entry.seen) for entry in self.entries[place:]}
         new: dict[float, list[View]] = {}

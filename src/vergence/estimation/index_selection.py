@@ -1,4 +1,4 @@
-"""Choosing features by how well they are spread in the pictures, as the literature does."""
+"""Choosing features by how well they are spread in the images, as the literature does."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ def spatial_index(places: FloatArray) -> float:
     """Return Q_s: the mean distance to the nearest other feature.
 
     Args:
-        places: of the chosen features of one picture, (q, 2), in units of its diagonal. A feature
-            that is alone in its picture counts as one diagonal away.
+        places: of the chosen features of one image, (q, 2), in units of its diagonal. A feature
+            that is alone in its image counts as one diagonal away.
     """
     count = len(places)
     if count < 2:
@@ -39,7 +39,7 @@ def angular_index(places: FloatArray) -> float:
     1 if the features stand at equal angles; may be negative.
 
     Args:
-        places: of the chosen features of one picture, (q, 2); 1 for one alone.
+        places: of the chosen features of one image, (q, 2); 1 for one alone.
     """
     count = len(places)
     if count < 2:
@@ -58,7 +58,7 @@ def spread_quality(places: FloatArray, cameras: IntArray, chosen: IntArray) -> f
     """Return Q = Σ_c (q_c / q) (Q_s + Q_a) over the cameras of the chosen features.
 
     Args:
-        places: of all candidates in units of their picture's diagonal, (N, 2).
+        places: of all candidates in units of their image's diagonal, (N, 2).
         cameras: of all candidates, (N,), in rising order.
         chosen: numbers of the chosen candidates, (q,).
     """
@@ -81,7 +81,7 @@ def exchange(
     """Swap the best pair of a chosen and another feature while that raises Q by the margin.
 
     Args:
-        places: of all candidates in units of their picture's diagonal, (N, 2).
+        places: of all candidates in units of their image's diagonal, (N, 2).
         cameras: of all candidates, (N,), in rising order.
         chosen: numbers to start from, (q,).
         margin: by how much a swap must raise Q.
@@ -117,7 +117,7 @@ class IndexSelection:
     Features chosen last time are kept while they are visible, free places are filled in turn from
     each camera, and pairs are exchanged while that raises the quality by `margin` (hysteresis).
     How the indexes of several cameras are joined is not in the text: here by the share of features
-    that each camera has, with distances in units of the picture's diagonal.
+    that each camera has, with distances in units of the image's diagonal.
     """
 
     margin: float = 0.02

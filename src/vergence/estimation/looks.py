@@ -1,4 +1,4 @@
-"""What the inner circle keeps of a picture while it works on it."""
+"""What the inner circle keeps of an image while it works on it."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ class Expected(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A picture with what is expected of it."""
+    """An image with what is expected of it."""
 
     frame: Frame
     number: int  # of its camera in the rig
@@ -30,9 +30,9 @@ class Picture(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What was measured in a picture."""
+    """What was measured in an image."""
 
-    number: int  # of the picture
+    number: int  # of the image
     features: IntArray  # (K,) chosen, one at least
     half_px: FloatArray  # (K, 2) half the sizes of their windows
     found: ImagePoints  # K points

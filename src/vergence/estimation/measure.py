@@ -14,7 +14,7 @@ from vergence.signals import Frame, ImagePoints, SearchWindows
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)
 CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
-# find(frame) -> all features of the target wherever they are in the picture, or None
+# find(frame) -> all features of the target wherever they are in the image, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
 UNSEEN = (  # a reason for each `Sight`
@@ -28,7 +28,7 @@ UNSEEN = (  # a reason for each `Sight`
 
 
 class Measure(Protocol):
-    """Finds features of the target inside windows of one picture."""
+    """Finds features of the target inside windows of one image."""
 
     def __call__(
         self,
@@ -41,7 +41,7 @@ class Measure(Protocol):
         """Return the K points asked for, in that order.
 
         Args:
-            frame: the picture.
+            frame: the image.
             features: which features of the target, (K,).
             points_px: where they are expected: the windows' centres, (K, 2).
             half_px: half the width and height of the windows, (K, 2).
@@ -53,10 +53,10 @@ class Measure(Protocol):
 def nothing_measured(
     camera: str, time: float, expected_px: FloatArray, sight: SightArray, widest_px: float
 ) -> ImagePoints:
-    """Return image points of all M features of a picture that was not looked at.
+    """Return image points of all M features of an image that was not looked at.
 
     Args:
-        camera: whose picture.
+        camera: whose image.
         time: of its exposure, s.
         expected_px: predicted places, (M, 2).
         sight: a `Sight` each, (M,).

@@ -63,7 +63,7 @@ def whitened_rows(
     measured: FloatArray,
     covariance: FloatArray,
 ) -> FloatArray:
-    """Return the whitened measurement of points in any number of pictures, (2M, 7).
+    """Return the whitened measurement of points in any number of images, (2M, 7).
 
     A point behind the camera gets an infinite residual, which no gate lets through.
 

@@ -42,14 +42,14 @@ JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
 class PosePerception(Generic[B]):
     """Follows one target with any number of cameras; a stage of the loop.
 
-    For every picture that arrives: the target's pose is predicted to its exposure, the features the
+    For every image that arrives: the target's pose is predicted to its exposure, the features the
     camera will see are worked out, the few worth measuring chosen over all cameras together, and
-    only small windows around them looked at; what is found there corrects the pose, the pictures of
+    only small windows around them looked at; what is found there corrects the pose, the images of
     one exposure together.
     [Lippiello2005] section IV, Fig. 3.
 
     A target that is lost is looked for around the place where it was seen last, with the widest
-    windows, and over whole pictures if `find` is given; while it is lost no pose is reported, and
+    windows, and over whole images if `find` is given; while it is lost no pose is reported, and
     no point counts as found.
     """
 
@@ -82,7 +82,7 @@ class PosePerception(Generic[B]):
             settings: budget and patience.
             blocked_at: gives, for the joints at an exposure, the function that tells what stands
                 between a camera and points of the target; the target itself must not count.
-            find: finds the target in a whole picture, when it is lost.
+            find: finds the target in a whole image, when it is lost.
         """
         self._rig, self._shape, self._camera_pose = rig, shape, camera_pose
         self._measure, self._blocked_at, self._find = measure, blocked_at, find
@@ -100,7 +100,7 @@ class PosePerception(Generic[B]):
 
     @property
     def belief(self) -> B:
-        """What is believed after the newest picture."""
+        """What is believed after the newest image."""
         return self._history.belief
 
     @property
@@ -109,12 +109,12 @@ class PosePerception(Generic[B]):
         return self._lost
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the pictures show and where the target is, or None without a picture.
+        """Return what the images show and where the target is, or None without an image.
 
-        Pictures of cameras that are not in the rig do not concern it.
+        Images of cameras that are not in the rig do not concern it.
 
         Raises:
-            InputError: if a picture has not the size that its camera's model is for.
+            InputError: if an image has not the size that its camera's model is for.
         """
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
@@ -205,7 +205,7 @@ class PosePerception(Generic[B]):
         return Look(n, features, half_px, found, view)
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
-        """Correct the pose by all pictures; return which features of each agree with it."""
+        """Correct the pose by all images; return which features of each agree with it."""
         if self._lost or not looks:
             return [look.view.features for look in looks]
         self._history, updates = self._history.add_all([look.view for look in looks])
@@ -286,7 +286,7 @@ class PosePerception(Generic[B]):
 
 
 def require_size(frame: Frame, rig: CameraRig) -> None:
-    """Raise InputError if a picture has not the size that its camera's model is for."""
+    """Raise InputError if an image has not the size that its camera's model is for."""
     if frame.image is None:
         return
     camera = rig.cameras[rig.numbers[frame.camera]]

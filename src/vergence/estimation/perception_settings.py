@@ -10,8 +10,8 @@ class PerceptionSettings:
     budget: int = 8  # features measured a tick, over all cameras
     budget_in_doubt: int = 32  # the same while the filter is inconsistent
     doubt_widens: float = 4.0  # windows by 1 + this · share of the last points that disagreed
-    margin_px: float = 8.0  # from the border of a picture
+    margin_px: float = 8.0  # from the border of an image
     least_cosine: float = 0.1  # between a face's normal and the line of sight
-    horizon: float = 0.5  # s, how late a picture may arrive
-    lost_after: float = 1.0  # s without a picture that was used
-    lost_doubts: int = 8  # contradicting pictures in a row
+    horizon: float = 0.5  # s, how late an image may arrive
+    lost_after: float = 1.0  # s without an image that was used
+    lost_doubts: int = 8  # contradicting images in a row

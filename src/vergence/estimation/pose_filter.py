@@ -24,7 +24,7 @@ from vergence.estimation.view import Seen
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
 CONSENSUS = 5  # points that must agree to overrule the prediction: any three agree on some pose
-GROWTH = 2.0  # of the covariance, for a picture too small to prove which pose it contradicts
+GROWTH = 2.0  # of the covariance, for an image too small to prove which pose it contradicts
 
 
 class Correction(NamedTuple):
@@ -116,7 +116,7 @@ class PoseFilter:
     [Lippiello2005] eq. (7) to (18), which is singular at pitch ±90°. The filter itself is a value;
     what it knows about a target is a `Belief`, handed in and returned.
 
-    Pictures of one exposure enter as one measurement, whose cost depends on its points alone. A
+    Images of one exposure enter as one measurement, whose cost depends on its points alone. A
     point beyond the gate is left out only while the prediction agrees with most of them. Where the
     gate would throw out the majority, not the points but the prediction is in doubt: then the
     covariance is enlarged until the median point has its expected distance, and the points are used
@@ -128,7 +128,7 @@ class PoseFilter:
     acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
     angular_acceleration_density: float = 0.25  # rad²/s³
     gate: float = 13.8  # χ² with 2 degrees of freedom: one good point in a thousand is lost
-    fading: float = 0.9  # weight of the past in the consistency test, for each picture
+    fading: float = 0.9  # weight of the past in the consistency test, for each image
 
     def __post_init__(self) -> None:
         for name in ("acceleration_density", "angular_acceleration_density", "gate"):
@@ -197,7 +197,7 @@ class PoseFilter:
         return scale * self.acceleration_density, scale * self.angular_acceleration_density
 
     def update(self, belief: Belief, seen: Seen) -> Update:
-        """Predict to an exposure and correct by its points, of one picture or of several."""
+        """Predict to an exposure and correct by its points, of one image or of several."""
         if seen.size == 0:
             return unused(self.predict(belief, seen.time), 0, Verdict.EMPTY)
         found = self._correct(belief, seen)
@@ -260,7 +260,7 @@ class PoseFilter:
         return Update(after, verdict, found.kept, found.squares)
 
     def _overruled(self, belief: Belief, seen: Seen, first: Correction) -> Update:
-        """Believe the pictures rather than the prediction, if their majority agrees on a pose."""
+        """Believe the images rather than the prediction, if their majority agrees on a pose."""
         median = float(np.median(first.squares))
         needed = max(CONSENSUS, (seen.size + 1) // 2)
         if seen.size >= needed and np.isfinite(median):

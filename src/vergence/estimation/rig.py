@@ -70,7 +70,7 @@ def lens_pixel(lens: FloatArray, x: float, y: float) -> tuple[float, float, bool
     """Return the pixel of normalized (x, y), and whether the distortion is one-to-one there.
 
     The model of `Camera`. Beyond the radius where the distorted radius stops growing a point far
-    outside the field of view would seem to lie in the picture; such a point is not one-to-one.
+    outside the field of view would seem to lie in the image; such a point is not one-to-one.
     """
     r2 = x * x + y * y
     growth = 1.0 + r2 * (3.0 * lens[K1] + r2 * (5.0 * lens[K2] + r2 * 7.0 * lens[K3]))
@@ -80,7 +80,7 @@ def lens_pixel(lens: FloatArray, x: float, y: float) -> tuple[float, float, bool
 
 @njit(cache=True)
 def in_picture(lens: FloatArray, u: float, v: float, margin: float) -> bool:
-    """Tell whether a pixel lies in the picture, at least a margin from its border, px."""
+    """Tell whether a pixel lies in the image, at least a margin from its border, px."""
     inside: bool = (
         margin - 0.5 <= u < lens[WIDTH] - 0.5 - margin
         and margin - 0.5 <= v < lens[HEIGHT] - 0.5 - margin

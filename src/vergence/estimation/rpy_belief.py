@@ -40,8 +40,8 @@ class RpyBelief:
     vector: FloatArray  # (12,) w: m, rad, m/s, rad/s
     vector_covariance: FloatArray  # (12, 12)
     consistency: Consistency = field(default_factory=Consistency)
-    seen: float = -np.inf  # s, exposure of the last picture that was used
-    doubts: int = 0  # pictures in a row of which no point could be used
+    seen: float = -np.inf  # s, exposure of the last image that was used
+    doubts: int = 0  # images in a row of which no point could be used
     disagreeing: float = 0.0  # share of the last points that could not be used, fading
 
     @property

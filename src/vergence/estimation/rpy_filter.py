@@ -79,7 +79,7 @@ class RpyPoseFilter:
     noise: FloatArray = field(default_factory=lambda: PAPER_NOISE)  # diagonal of Q, (12,), a frame
     frame_period: float = 1.0 / 26.0  # s, the frame that Q is meant for
     gate: float = np.inf  # on the Mahalanobis distance squared; the paper has none
-    fading: float = 0.9  # weight of the past in the consistency test, for each picture
+    fading: float = 0.9  # weight of the past in the consistency test, for each image
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", frozen(self.noise, (12,), "noise"))

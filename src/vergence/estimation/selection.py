@@ -12,7 +12,7 @@ from vergence.estimation.measurement import POSE, point_rows
 
 
 class Candidates(NamedTuple):
-    """What a selection may choose from: features in the pictures of this tick."""
+    """What a selection may choose from: features in the images of this tick."""
 
     visible: BoolArray  # (C, M)
     points_px: FloatArray  # (C, M, 2) predicted places
@@ -20,7 +20,7 @@ class Candidates(NamedTuple):
     T_world_target: FloatArray  # (C, 4, 4) predicted for each camera's exposure
     T_camera_world: FloatArray  # (C, 4, 4) at the exposures
     noise: FloatArray  # (C, 2) expected standard deviation, normalized coordinates
-    diagonal_px: FloatArray  # (C,) of the pictures
+    diagonal_px: FloatArray  # (C,) of the images
     pose_covariance: FloatArray  # (6, 6) of (δp, δθ), predicted
     held: BoolArray  # (C, M) chosen last time
 

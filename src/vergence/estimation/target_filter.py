@@ -1,4 +1,4 @@
-"""What every filter of a target's pose offers, and what it says about a picture."""
+"""What every filter of a target's pose offers, and what it says about an image."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -14,7 +14,7 @@ from vergence.signals import TargetState
 
 
 class Verdict(StrEnum):
-    """What became of a picture."""
+    """What became of an image."""
 
     USED = "used"
     RECOVERED = "used after enlarging the covariance"
@@ -49,12 +49,12 @@ class TargetBelief(Protocol):
 
     @property
     def seen(self) -> float:
-        """Exposure of the last picture that was used, s."""
+        """Exposure of the last image that was used, s."""
         ...
 
     @property
     def doubts(self) -> int:
-        """Pictures in a row that contradicted the prediction and were not used."""
+        """Images in a row that contradicted the prediction and were not used."""
         ...
 
     @property
@@ -71,7 +71,7 @@ B = TypeVar("B", bound=TargetBelief)
 
 
 class Update(NamedTuple):
-    """The belief after the pictures of one exposure, and what was made of them."""
+    """The belief after the images of one exposure, and what was made of them."""
 
     belief: Any  # of the filter's own kind
     verdict: Verdict
@@ -97,7 +97,7 @@ class TargetFilter(Protocol[B]):
         ...
 
     def update(self, belief: B, seen: Seen) -> Update:
-        """Predict to an exposure and correct by its points, of one picture or of several."""
+        """Predict to an exposure and correct by its points, of one image or of several."""
         ...
 
 
@@ -107,9 +107,9 @@ def unused(belief: TargetBelief, size: int, verdict: Verdict) -> Update:
 
 
 def of_each_picture(update: Update, views: Sequence[View]) -> list[Update]:
-    """Return what an update by several pictures made of each.
+    """Return what an update by several images made of each.
 
-    A picture without a point contributed nothing; one of whose points none was kept, while others
+    An image without a point contributed nothing; one of whose points none was kept, while others
     were, contradicts them.
     """
     if len(views) == 1:

@@ -1,4 +1,4 @@
-"""What one picture says, in the form the filters take it in."""
+"""What one image says, in the form the filters take it in."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from vergence.signals import ImagePoints
 
 
 class View(NamedTuple):
-    """The usable points of one picture, and where its camera stood at the exposure."""
+    """The usable points of one image, and where its camera stood at the exposure."""
 
     camera: str
     time: float  # s, of exposure
@@ -30,7 +30,7 @@ class View(NamedTuple):
 
     @property
     def pictures(self) -> int:
-        """How many pictures have points: this one or none."""
+        """How many images have points: this one or none."""
         return 1 if len(self.points) else 0
 
     @property
@@ -40,7 +40,7 @@ class View(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """The points of all pictures taken at one time, one after the other."""
+    """The points of all images taken at one time, one after the other."""
 
     time: float  # s
     pictures: int  # how many of them have points
@@ -59,7 +59,7 @@ Seen = View | Exposure  # what a filter takes in
 
 
 def together(views: Sequence[View]) -> Seen:
-    """Put the points of pictures one after the other, as if all were taken when the first was."""
+    """Put the points of images one after the other, as if all were taken when the first was."""
     filled = [view for view in views if view.size]
     if len(filled) < 2:
         return filled[0] if filled else views[0]

@@ -1,4 +1,4 @@
-"""Which features each camera will see, before its picture is looked at.
+"""Which features each camera will see, before its image is looked at.
 
 Predicted from the poses of target and cameras alone: field of view, faces turned away, the target
 in front of itself, and anything else in the way through a function that is handed in. This is what
@@ -28,7 +28,7 @@ class Sight(IntEnum):
 
     VISIBLE = 0
     BEHIND = 1  # behind the camera
-    OUTSIDE = 2  # outside the picture, or too near its border
+    OUTSIDE = 2  # outside the image, or too near its border
     TURNED_AWAY = 3  # none of the faces around it faces the camera
     HIDDEN = 4  # behind another part of the target
     BLOCKED = 5  # behind something else
@@ -117,7 +117,7 @@ def see(
         face_counts: how many faces there are around each, (M,).
         triangles: the target's surface, (F, 3, 3), m.
         touching: a surface this near a feature does not hide it, m.
-        margin_px: how far from the border of the picture a feature must be.
+        margin_px: how far from the border of the image a feature must be.
         least_cosine: of the angle between a face's normal and the line of sight.
     """
     cameras, features = len(T_camera_target), len(points)

@@ -46,7 +46,7 @@ class Draws:
         turn for those without limits or with a range beyond it; places of the target within a share
         of its distance from the camera, turned by up to that share of a right angle; motions in any
         level direction, at up to the fastest speed. Each draw is made until every feature is in the
-        picture at the start, and from where a goal's picture was taken. A trial depends on the seed
+        image at the start, and from where a goal's image was taken. A trial depends on the seed
         and its number only.
 
         Args:
@@ -130,7 +130,7 @@ def _moved(T: FloatArray, spread: float, away: float, rng: np.random.Generator) 
 
 
 def _in_picture(truth: FrameTruth, camera: Camera, cell: Cell) -> bool:
-    """Tell whether all features are in the picture; of an object some may be on its far side."""
+    """Tell whether all features are in the image; of an object some may be on its far side."""
     if cell.task.kind != "follow":
         return bool(truth.visible.all())
     inside = np.isfinite(truth.points_px).all() and camera.contains(truth.points_px).all()

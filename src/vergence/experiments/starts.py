@@ -14,7 +14,7 @@ def start_trials(
 ) -> list[Trial]:
     """Return the trials that hold laws against each other: each law from the same draws.
 
-    All aim at the picture, or the pose, that the cell as it is written aims at.
+    All aim at the image, or the pose, that the cell as it is written aims at.
 
     Args:
         cell: the cell.

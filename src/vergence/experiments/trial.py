@@ -12,9 +12,9 @@ class Ending(StrEnum):
     CONVERGED = "converged"  # to its end, and the features where they should be
     OFF_GOAL = "off goal"  # to its end, but the features elsewhere
     JOINT_LIMIT = "joint limit"
-    OUT_OF_VIEW = "out of view"  # the features left the picture
+    OUT_OF_VIEW = "out of view"  # the features left the image
     SINGULAR = "singular"
-    LOST = "lost"  # in the picture, but not found
+    LOST = "lost"  # in the image, but not found
     OTHER = "other"  # what the reason says
     REFUSED = "refused"  # could not be begun
 
@@ -42,7 +42,7 @@ class TrialResult:
     max_error_px: float | None
     path_m: float  # way of the task's camera
     target_m: float  # way of the target
-    left_view: bool  # whether any feature was out of the picture at any time
+    left_view: bool  # whether any feature was out of the image at any time
     start_m: tuple[float, ...]  # (3,) the camera's place at the start, in the world
     end_m: tuple[float, ...]  # (3,) and at the end
     start_px: tuple[float, ...]  # (2,) the features' middle at the start

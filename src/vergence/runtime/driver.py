@@ -34,7 +34,7 @@ class Driver(Protocol):
         ...
 
     def read(self) -> Sample:
-        """Return joints now and the pictures that arrived since the last call."""
+        """Return joints now and the images that arrived since the last call."""
         ...
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:

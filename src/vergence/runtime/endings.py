@@ -26,7 +26,7 @@ def completed(duration_s: float, time: float) -> Outcome:
 
 
 def image_late(waited_s: float, time: float) -> Outcome:
-    """Return the end of a run without pictures."""
+    """Return the end of a run without images."""
     return Outcome(OutcomeKind.IMAGE_LATE, f"no picture for {waited_s:.2f} s", time)
 
 

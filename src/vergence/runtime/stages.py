@@ -6,7 +6,7 @@ from vergence.signals import Frame, Observation, Reference
 
 
 class Perception(Protocol):
-    """Turns pictures into an observation."""
+    """Turns images into an observation."""
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
         """Return what the frames show, or None if none of them concerns it."""
@@ -20,6 +20,6 @@ class Planner(Protocol):
         """Return what the law should aim at.
 
         Args:
-            time: exposure of the picture that the law compares it with, s.
+            time: exposure of the image that the law compares it with, s.
         """
         ...

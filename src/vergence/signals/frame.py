@@ -1,4 +1,4 @@
-"""A picture as a driver delivers it."""
+"""An image as a driver delivers it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,27 +10,27 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray, frozen
 
 @dataclass(frozen=True, slots=True)
 class FrameTruth:
-    """What only a simulated camera knows about its picture; for evaluation and exact perception."""
+    """What only a simulated camera knows about its image; for evaluation and exact perception."""
 
     T_world_target: FloatArray  # (4, 4) of what it looks at: the target, or a tool
     T_world_camera: FloatArray  # (4, 4)
     points_px: FloatArray  # (M, 2) its features, truly projected
     depth_m: FloatArray  # (M,) their depth along the optical axis
-    visible: BoolArray  # (M,) in the picture and in front of the camera
+    visible: BoolArray  # (M,) in the image and in front of the camera
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture: when it was exposed, and where the arms stood at that instant."""
+    """One image: when it was exposed, and where the arms stood at that instant."""
 
     camera: str
     time: float  # s, of exposure
-    image: ImageArray | None  # (height, width) grey; None from a driver that makes no pictures
+    image: ImageArray | None  # (height, width) grey; None from a driver that makes no images
     joints: Mapping[str, FloatArray]  # arm name to joint positions at exposure, rad or m
     truth: FrameTruth | None = None
 
     def __post_init__(self) -> None:
-        # Read-only like every value, whoever took the picture: kernels are compiled for such once.
+        # Read-only like every value, whoever took the image: kernels are compiled for such once.
         if self.image is not None:
             image = np.ascontiguousarray(self.image).view()
             image.flags.writeable = False

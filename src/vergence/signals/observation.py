@@ -9,7 +9,7 @@ from vergence.arrays import BoolArray, FloatArray
 
 
 class SearchWindows(NamedTuple):
-    """Where points were looked for in one picture: rectangles around their predicted places."""
+    """Where points were looked for in one image: rectangles around their predicted places."""
 
     center_px: FloatArray  # (M, 2) predicted; a row of NaN where nobody looked
     half_px: FloatArray  # (M, 2) half the width and height
@@ -17,7 +17,7 @@ class SearchWindows(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ImagePoints:
-    """The points measured in one picture of one camera."""
+    """The points measured in one image of one camera."""
 
     camera: str
     time: float  # s, of exposure
@@ -52,6 +52,6 @@ class TargetState:
 class Observation:
     """All that one outer tick has seen."""
 
-    time: float  # s, of the newest picture in it
-    views: tuple[ImagePoints, ...]  # one a picture that arrived
+    time: float  # s, of the newest image in it
+    views: tuple[ImagePoints, ...]  # one an image that arrived
     target: TargetState | None = None

@@ -172,7 +172,7 @@ def intrinsics(table: CameraTable) -> Camera:
 
 
 def _rendered(cell: Cell, name: str) -> Camera:
-    """Return the camera that MuJoCo draws for one of a cell; its pictures are distorted after."""
+    """Return the camera that MuJoCo draws for one of a cell; its images are distorted after."""
     try:
         return intrinsics(cell.cameras[name]).undistorted()
     except InputError as error:

@@ -179,7 +179,7 @@ def _mountings(model: Any, data: Any, body: str) -> Iterator[FloatArray]:
 
 
 def _before(T_world_camera: FloatArray, distance: float) -> FloatArray:
-    """Return the pose of a board that faces a camera, its x along the picture's, (4, 4)."""
+    """Return the pose of a board that faces a camera, its x along the image's, (4, 4)."""
     T_camera_board = np.diag([1.0, -1.0, -1.0, 1.0])
     T_camera_board[2, 3] = distance
     board: FloatArray = se3_compose(T_world_camera, T_camera_board)

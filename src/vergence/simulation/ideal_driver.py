@@ -31,7 +31,7 @@ class IdealCell:
     rate_hz: float = 30.0  # of the camera
     inner_rate_hz: float = 120.0  # at which set-points come
     latency_frames: int = 0
-    dropped: float = 0.0  # share of the pictures that never arrive
+    dropped: float = 0.0  # share of the images that never arrive
     seed: int = 0  # of what is dropped
     sees: Sees | None = None  # what nothing hides; everything if None
 
@@ -72,7 +72,7 @@ class IdealDriver:
         return self._tick / self.inner_rate_hz
 
     def read(self) -> Sample:
-        """Return joints now and the pictures that have arrived since the last call."""
+        """Return joints now and the images that have arrived since the last call."""
         frames = []
         while self._queue and self._queue[0][0] <= self._tick:
             frames.append(self._queue.popleft()[1])

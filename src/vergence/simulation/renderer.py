@@ -1,4 +1,4 @@
-"""Offscreen pictures of the world, as its cameras would take them."""
+"""Offscreen images of the world, as its cameras would take them."""
 
 import importlib
 import os
@@ -13,7 +13,7 @@ from vergence.camera import Camera
 from vergence.errors import RenderingError
 
 _CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo settles on it, when imported
-_NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the picture
+_NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the image
 
 
 def choose_renderer(needed: bool = True) -> None:
@@ -41,11 +41,11 @@ def choose_renderer(needed: bool = True) -> None:
 
 
 class CameraRenderer:
-    """Takes grey pictures with one camera of a world, with distortion and sensor noise.
+    """Takes grey images with one camera of a world, with distortion and sensor noise.
 
-    Shadows and multisampling stay off: a picture then costs a few milliseconds on a CPU. MuJoCo
-    draws without distortion, a picture wide enough for all that the camera sees; each pixel of
-    the camera's own picture is then looked up in that one.
+    Shadows and multisampling stay off: an image then costs a few milliseconds on a CPU. MuJoCo
+    draws without distortion, an image wide enough for all that the camera sees; each pixel of
+    the camera's own image is then looked up in that one.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class CameraRenderer:
         self._noise = rng.normal(0, noise_grey, shape).astype(np.int16) if noise_grey else None
 
     def take(self, data: Any, blind: bool = False) -> ImageArray:
-        """Return the picture (height, width) of the world as it stands, black if blind."""
+        """Return the image (height, width) of the world as it stands, black if blind."""
         import cv2
 
         grey = np.zeros(self._shape, dtype=np.uint8) if blind else self._draw(data)
         if self._noise is not None:
-            # A fresh window of one pool: drawing normal deviates would cost more than the picture.
+            # A fresh window of one pool: drawing normal deviates would cost more than the image.
             row, column = self._rng.integers(0, _NOISE_POOL, 2)
             window = self._noise[row : row + grey.shape[0], column : column + grey.shape[1]]
             grey = cv2.add(grey, window, dtype=cv2.CV_8U)
@@ -94,7 +94,7 @@ class CameraRenderer:
 
 
 def _lookup(camera: Camera, drawn: Camera) -> tuple[Any, Any]:
-    """Return where each pixel of a camera lies in the picture drawn, as OpenCV's remap has it."""
+    """Return where each pixel of a camera lies in the image drawn, as OpenCV's remap has it."""
     import cv2
 
     v, u = np.mgrid[: camera.height, : camera.width]

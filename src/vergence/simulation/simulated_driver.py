@@ -117,7 +117,7 @@ class SimulatedDriver:
     def frame_at(self, camera: str, arm: str, position: FloatArray) -> Frame:
         """Return what a camera would see if an arm's joints stood at a position, (n,).
 
-        It stands for a picture taken beforehand, by driving there.
+        It stands for an image taken beforehand, by driving there.
         """
         now = self.world.joint_position(arm)
         self.world.place_arm(arm, position)
@@ -136,7 +136,7 @@ class SimulatedDriver:
         return points
 
     def read(self) -> Sample:
-        """Return joints now and the pictures that have arrived since the last call."""
+        """Return joints now and the images that have arrived since the last call."""
         arrived = []
         waiting: deque[tuple[int, Frame]] = deque()
         for arrival, frame in self._queue:

@@ -110,7 +110,7 @@ def _limits(
 
 
 def _line(arm: Arm, speed: float, heading: float) -> IdealCell:
-    """Return the first paper's object on its line, a feature in the middle of the picture."""
+    """Return the first paper's object on its line, a feature in the middle of the image."""
     start = np.deg2rad(PUMA_START_DEG)
     T_start = arm.forward_kinematics(start) @ facing(1.0)
     direction = np.array([np.cos(heading), np.sin(heading), 0.0])

@@ -57,7 +57,7 @@ LAWS = (*((name, how) for name in OBJECTIVES for how in (PLAIN, CONSTRAINED)), (
 
 
 class _StrictView:
-    """Sees all points, or none as soon as one has left the picture."""
+    """Sees all points, or none as soon as one has left the image."""
 
     def __init__(self) -> None:
         self._exact = ExactPoints(CAMERA)
@@ -138,7 +138,7 @@ def _planned(scene: Scene) -> Ending:
 
 
 def plan_from_homography(scene: Scene) -> Path | None:
-    """Plan from the pictures at start and goal, d* and which way the points' plane faces there."""
+    """Plan from the images at start and goal, d* and which way the points' plane faces there."""
     goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
     normal = np.cross(goal[1] - goal[0], goal[2] - goal[0])
     normal *= np.sign(normal[2]) / np.linalg.norm(normal)

@@ -14,7 +14,7 @@ from vergence.robot import Arm
 
 PERIOD = 0.04  # s
 ARRIVED_PX = 1.0  # from where each point should be
-STEADY = 10  # pictures in a row that close
+STEADY = 10  # images in a row that close
 
 # Joint rates (n,) from the time (s), joint positions (n,) and measured points (N, 2) px.
 Steer = Callable[[float, FloatArray, FloatArray], FloatArray]
@@ -33,7 +33,7 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How it went; a row a picture."""
+    """How it went; a row an image."""
 
     ending: Ending
     reason: str  # a sentence; empty if it arrived

@@ -62,7 +62,7 @@ class _TimedFilter:
 
 
 class _TimedPerception:
-    """Perception with copies of one camera, which all look at the same picture.
+    """Perception with copies of one camera, which all look at the same image.
 
     Args:
         cell: with a camera `fixed`.
@@ -89,7 +89,7 @@ class _TimedPerception:
         )
 
     def tick(self, k: int) -> Cost:
-        """Look at the k-th picture with every camera."""
+        """Look at the k-th image with every camera."""
         frames = [replace(self._picture, camera=name, time=k / 26.0) for name in self._names]
         began = perf_counter()
         self._perception.observe(frames)

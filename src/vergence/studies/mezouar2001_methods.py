@@ -64,13 +64,13 @@ PLANS = 6  # at most, one after the other
 ROOM = 0.003  # to a joint limit, of half the range; with less the arm stops and plans again
 CAMERA_SPEED = 0.25  # m/s
 PICTURES = 25  # averaged at either end before planning
-LOOKS = 3  # at most, where one picture's marks do not agree with the other's
+LOOKS = 3  # at most, where one image's marks do not agree with the other's
 REFERENCE = np.array([0, 1, 2])  # the marks of the middle plane span the reference plane
 
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What a planning method is told, beside the pictures."""
+    """What a planning method is told, beside the images."""
 
     camera: Camera
     distance_scale: float = 1.0  # believed over true d*
@@ -154,7 +154,7 @@ def too_close(arm: Arm, q_start: FloatArray) -> Callable[[FloatArray], bool]:
 def plan_between_pictures(
     scene: Scene, method: Method, belief: Belief, random: np.random.Generator
 ) -> Path | str:
-    """Plan from the pictures at start and goal and the believed d*; or say why there is no path."""
+    """Plan from the images at start and goal and the believed d*; or say why there is no path."""
     view = _two_views(scene, belief, random)
     if not isinstance(view, TwoView):
         return str(view)

@@ -1,4 +1,4 @@
-"""Section 6 of [Mezouar2001] on the gantry cell: plan from two pictures, then track the plan."""
+"""Section 6 of [Mezouar2001] on the gantry cell: plan from two images, then track the plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -40,7 +40,7 @@ def space(width: float, height: float) -> "tuple[Figure, Any]":
 
 
 def picture(axes: "Axes", camera: Camera, points_px: FloatArray, image: ImageArray | None) -> None:
-    """Draw what the camera saw, its marks (N, 2) numbered; on white if there is no picture."""
+    """Draw what the camera saw, its marks (N, 2) numbered; on white if there is no image."""
     _image_frame(axes, camera)
     if image is not None:
         axes.imshow(image, cmap="gray", vmin=0, vmax=255)
@@ -118,7 +118,7 @@ def camera_paths(
 
 
 def _image_frame(axes: "Axes", camera: Camera, points_px: FloatArray | None = None) -> None:
-    """Show the picture as the camera has it, v downwards, and as much around it as is needed."""
+    """Show the image as the camera has it, v downwards, and as much around it as is needed."""
     from matplotlib.patches import Rectangle
 
     low, high = np.array([-0.5, -0.5]), np.array([camera.width - 0.5, camera.height - 0.5])

@@ -36,7 +36,7 @@ ROOT_WEIGHTS = _root_weights()  # (n,)
 
 
 class AlignmentTemplate(NamedTuple):
-    """A patch of a picture and all that an alignment to it needs."""
+    """A patch of an image and all that an alignment to it needs."""
 
     jacobian: Patch  # (8, n) by x, y, a11, …, a22, gain, bias; n = 24 × 24; weighted
     inverse: FloatArray  # (2, 8, 8) inverse of JᵀJ + prior; and with a rigid affine matrix

@@ -21,7 +21,7 @@ class Estimate(NamedTuple):
     unit: str
     value: float
     deviation: float  # from the normal equations
-    jackknife: float  # from leaving out each picture in turn
+    jackknife: float  # from leaving out each image in turn
     truth: float  # NaN where it is not known
 
     @property

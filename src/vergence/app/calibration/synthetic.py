@@ -20,12 +20,12 @@ from vergence.vision.board_file import BOARD, write_board
 
 _COLUMNS, _ROWS = 9, 6  # inner corners of the board that is made
 _MARKER, _DICTIONARY = 0.7, "aruco_4x4_50"  # its markers: their side in squares, and their kind
-_SHARE = 0.6  # of the picture's width that the board takes up
+_SHARE = 0.6  # of the image's width that the board takes up
 _FINER = 3  # times as many pixels are rendered, then averaged, as a sensor does
 _TILT_DEG, _ROLL_DEG = 42.0, 70.0  # largest, of the board towards the camera
 _NEARER = (0.75, 1.25)  # how far the board is, times its usual distance
-_SEEN = 0.7  # share of the corners that must lie in the picture
-_TRIES = 60  # for each picture
+_SEEN = 0.7  # share of the corners that must lie in the image
+_TRIES = 60  # for each image
 _TEXTURE_PX = 96  # a square
 _MODEL = """<mujoco model="board">
   <asset>
@@ -137,7 +137,7 @@ class Studio:
         return Sighting(name, self.board.points[inside], pixels + noise)
 
     def film(self, renderer: Any, noise_grey: float) -> ImageArray:
-        """Return the picture that the camera takes now."""
+        """Return the image that the camera takes now."""
         import cv2
 
         size = (self.camera.width, self.camera.height)
@@ -146,7 +146,7 @@ class Studio:
         return np.asarray(np.clip(np.round(noisy), 0, 255), dtype=np.uint8)
 
     def renderer(self) -> Any:
-        """Return what draws pictures of the camera, finer than it takes them."""
+        """Return what draws images of the camera, finer than it takes them."""
         from vergence.simulation.renderer import CameraRenderer, choose_renderer
         from vergence.simulation.world import World
 
@@ -206,7 +206,7 @@ class Studio:
         return T
 
     def _sees(self) -> bool:
-        """Whether enough of the board's corners are in the picture, from its front, unhidden."""
+        """Whether enough of the board's corners are in the image, from its front, unhidden."""
         T = self._T_camera_board()
         points = transform_points(T, self.board.points)
         middle = transform_points(T, self.board.center[None])[0]
@@ -234,7 +234,7 @@ class Studio:
 def make_data(
     studio: Studio, pictures: int, folder: Path | None, noise_px: float
 ) -> tuple[Dataset, Truth]:
-    """Make pictures, board and poses in a folder, or only project, without one.
+    """Make images, board and poses in a folder, or only project, without one.
 
     Args:
         studio: the cell with a board.
@@ -243,7 +243,7 @@ def make_data(
         noise_px: standard deviation of these.
 
     Returns:
-        projected corners, or an empty set where pictures were written; and the truth.
+        projected corners, or an empty set where images were written; and the truth.
     """
     import cv2
 

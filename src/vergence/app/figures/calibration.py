@@ -1,4 +1,4 @@
-"""Figures of a calibration: residuals over the picture, and picture by picture."""
+"""Figures of a calibration: residuals over the image, and image by image."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,8 @@ from vergence.camera.calibration import Sighting
 from vergence.camera.calibration.reprojection import rms
 from vergence.drawing import COLORS, legend
 
-_ARROW_SHARE = 0.06  # of the picture's width: the longest arrow
-_MOST_NAMES = 40  # pictures whose names are written
+_ARROW_SHARE = 0.06  # of the image's width: the longest arrow
+_MOST_NAMES = 40  # images whose names are written
 
 
 def residual_field_figure(
@@ -45,10 +45,10 @@ def residual_field_figure(
 def residual_bars_figure(
     sightings: Sequence[Sighting], residuals: Sequence[FloatArray], left_out_px: FloatArray
 ) -> Panels:
-    """Draw two bars for each picture: its residual in the fit, and left out of it.
+    """Draw two bars for each image: its residual in the fit, and left out of it.
 
     Args:
-        sightings: of the pictures.
+        sightings: of the images.
         residuals: (2n,) of each, px.
         left_out_px: root mean square of each, (N,), px.
     """

@@ -47,12 +47,12 @@ def scores_figure(scores: Sequence[Score]) -> Panels:
 def starts_figure(
     results: Sequence[TrialResult], desired_px: tuple[float, float], size_px: tuple[int, int]
 ) -> Panels:
-    """Draw for each law where its runs began and where they led, in space and in the picture.
+    """Draw for each law where its runs began and where they led, in space and in the image.
 
     Args:
         results: of a comparison.
         desired_px: the middle of the features where they should be.
-        size_px: width and height of the picture.
+        size_px: width and height of the image.
     """
     laws = _laws(results)
     drawn, grid = _grid(len(laws), 2, width=7.6, height=2.9)

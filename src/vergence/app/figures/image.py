@@ -35,7 +35,7 @@ def error_figure(trace: CameraTrace) -> Panels | None:
 
 
 def paths_figure(camera: Camera, trace: CameraTrace) -> Panels | None:
-    """Draw the way of each feature through the picture, inside the picture's frame."""
+    """Draw the way of each feature through the image, inside the image's frame."""
     if not trace.found.any():
         return None
     out = panels(1, "u (px)", height=4.6)
@@ -67,7 +67,7 @@ def _distances(axes: "Axes", time: FloatArray, values: FloatArray) -> None:
 
 
 def picture_frame(axes: "Axes", camera: Camera) -> None:
-    """Show the picture as the camera has it: v downwards, pixel centres at integers."""
+    """Show the image as the camera has it: v downwards, pixel centres at integers."""
     from matplotlib.patches import Rectangle
 
     width, height = camera.width, camera.height

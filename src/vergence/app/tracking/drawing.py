@@ -1,4 +1,4 @@
-"""Draws a followed object into its picture."""
+"""Draws a followed object into its image."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ _COLORS = {Sighting.SEEN: FOUND, Sighting.PREDICTED: DESIRED, Sighting.LOST: LOS
 def draw_step(
     image: ImageArray, step: Step, model: ObjectModel, camera: Camera
 ) -> NDArray[np.uint8]:
-    """Return the picture in colour with the object's visible edges and axes over it.
+    """Return the image in colour with the object's visible edges and axes over it.
 
     Args:
         image: (height, width) grey.

@@ -18,16 +18,16 @@ _USED = (Verdict.USED, Verdict.RECOVERED)
 
 
 class Sighting(StrEnum):
-    """What became of the object in a picture."""
+    """What became of the object in an image."""
 
     SEEN = "seen"
-    PREDICTED = "predicted"  # not found in this picture: the pose is what motion makes expect
+    PREDICTED = "predicted"  # not found in this image: the pose is what motion makes expect
     LOST = "lost"
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The object after one picture."""
+    """The object after one image."""
 
     time: float  # s, of exposure
     sighting: Sighting
@@ -42,14 +42,14 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class FollowRule:
-    """When a picture counts, and when the object is lost."""
+    """When an image counts, and when the object is lost."""
 
-    jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the picture, per frame
-    least_share: float = 0.57  # of the edges usually found, to believe a picture
+    jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the image, per frame
+    least_share: float = 0.57  # of the edges usually found, to believe an image
     least_of_all: float = 0.5  # of all the edges that should be seen
-    surprising_share: float = 0.75  # of both, if the picture contradicts the prediction
-    least_lines: int = 3  # edges found, to believe a picture
-    patience: int = 12  # pictures in a row without the object, after which it is lost
+    surprising_share: float = 0.75  # of both, if the image contradicts the prediction
+    least_lines: int = 3  # edges found, to believe an image
+    patience: int = 12  # images in a row without the object, after which it is lost
     turn_max_rad: float = (
         0.25  # standard deviation of the rotation beyond which the pose is unknown
     )
@@ -62,10 +62,10 @@ class ObjectFollower:
     Args:
         tracker: finds the object's edges.
         camera: the camera's model.
-        T_camera_target: pose in the first picture, (4, 4); may be rough, some 10 px.
-        time: of the first picture, s.
-        period: between pictures, s.
-        rule: when a picture counts.
+        T_camera_target: pose in the first image, (4, 4); may be rough, some 10 px.
+        time: of the first image, s.
+        period: between images, s.
+        rule: when an image counts.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class ObjectFollower:
         self._missed = 0
 
     def follow(self, image: ImageArray, time: float) -> Step:
-        """Look at the next picture.
+        """Look at the next image.
 
         Raises:
             InputError: if the image is not of the camera's size.
@@ -143,9 +143,9 @@ class ObjectFollower:
         return seen, self._doubt(belief, seen)
 
     def _doubt(self, belief: Belief, seen: EdgeMeasurement) -> str:
-        """Say why a picture is not to be believed; empty if it is.
+        """Say why an image is not to be believed; empty if it is.
 
-        The more a picture surprises, the more of the object it has to show.
+        The more an image surprises, the more of the object it has to show.
         """
         rule = self._rule
         if not seen.expected:

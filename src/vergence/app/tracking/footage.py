@@ -59,7 +59,7 @@ def open_footage(path: str | Path, rate_hz: float | None = None) -> Footage:
 
     Args:
         path: the folder or file.
-        rate_hz: images a second; by default a video's own time stamps, or 25 for a folder.
+        rate_hz: images per second; by default a video's own time stamps, or 25 for a folder.
 
     Raises:
         InputError: if it is not there, holds no images, or the rate is no rate.

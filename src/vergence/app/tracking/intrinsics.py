@@ -15,11 +15,11 @@ def camera_of_options(
     Args:
         values: fx, fy, cx, cy, px.
         distortion: k1,k2,p1,p2,k3, or fewer of them.
-        width: of the pictures.
-        height: of the pictures.
+        width: of the images.
+        height: of the images.
 
     Raises:
-        InputError: if --fx is missing, or a value does not suit the picture.
+        InputError: if --fx is missing, or a value does not suit the image.
     """
     source = "vergence track"
     if values["fx"] is None:

@@ -51,7 +51,7 @@ class PoseFiles:
         self._jsonl.close()
 
     def add(self, name: str, step: Step) -> None:
-        """Write the pose at one picture."""
+        """Write the pose at one image."""
         pose = pose_record(step)
         deviations = np.sqrt(np.diag(step.covariance)[:6])
         numbers: Sequence[float] = [
@@ -66,7 +66,7 @@ class PoseFiles:
 
 
 def pose_record(step: Step) -> dict[str, Any]:
-    """Return what is known after a picture, for JSON."""
+    """Return what is known after an image, for JSON."""
     T = np.ascontiguousarray(step.T_camera_target)
     return {
         "time_s": step.time,

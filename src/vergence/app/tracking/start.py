@@ -1,4 +1,4 @@
-"""Where the object is in the first picture."""
+"""Where the object is in the first image."""
 
 from pathlib import Path
 

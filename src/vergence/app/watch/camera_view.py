@@ -1,4 +1,4 @@
-"""A camera's picture with what is to be drawn over it, ready for the page."""
+"""A camera's image with what is to be drawn over it, ready for the page."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ _DECIMALS = 3  # of a pixel: nobody sees more
 
 @dataclass(frozen=True)
 class CameraView:
-    """One picture, what was measured in it, what was wanted, and what is true."""
+    """One image, what was measured in it, what was wanted, and what is true."""
 
     camera: str
     time: float  # s, of exposure
@@ -27,11 +27,11 @@ class CameraView:
     T_world_camera: FloatArray | None = None  # (4, 4) at exposure, where the truth is known
     T_world_target: FloatArray | None = None  # (4, 4) likewise
     outline_px: FloatArray | None = None  # (K, 2) around the target, where it is known
-    kept: bytes = b""  # the picture as JPEG, in place of the image
+    kept: bytes = b""  # the image as JPEG, in place of the image
 
     @cached_property
     def jpeg(self) -> bytes:
-        """The picture as JPEG; empty without one."""
+        """The image as JPEG; empty without one."""
         if self.image is None:
             return self.kept
         import cv2
@@ -41,7 +41,7 @@ class CameraView:
 
     @cached_property
     def header(self) -> dict[str, Any]:
-        """What the page draws over the picture; places in pixels, centres at integers."""
+        """What the page draws over the image; places in pixels, centres at integers."""
         header: dict[str, Any] = {"camera": self.camera, "time": self.time, "bytes": len(self.jpeg)}
         for name in ("desired", "true", "outline"):
             places = getattr(self, f"{name}_px")

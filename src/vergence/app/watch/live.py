@@ -46,7 +46,7 @@ class Live:
         editor: has the cell.
         images: look through rendered images; if not, at exact projections.
         out: folder of the recording; runs after a reset get a number behind it.
-        image_every: record every n-th picture.
+        image_every: record every n-th image.
 
     Attributes:
         view_state: what there is to show.

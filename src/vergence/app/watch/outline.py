@@ -1,4 +1,4 @@
-"""Where a target appears in a picture, so that the mouse can take it."""
+"""Where a target appears in an image, so that the mouse can take it."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def target_corners(world: World) -> FloatArray:
 
 
 def outline(corners: FloatArray, T_camera_target: FloatArray, camera: Camera) -> FloatArray | None:
-    """Return the hull (K, 2) of a target's corners in a picture, px.
+    """Return the hull (K, 2) of a target's corners in an image, px.
 
     None where a part of it is beside or behind the camera.
     """

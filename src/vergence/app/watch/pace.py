@@ -32,7 +32,7 @@ class Pace:
         self.paused, self._steps, self._anchor = False, 0, None
 
     def step(self) -> None:
-        """Let time pass to the next picture, then pause."""
+        """Let time pass to the next image, then pause."""
         self.paused = True
         self._steps += 1
 

@@ -32,14 +32,14 @@ _AT_ONCE_S = 1e-9
 
 
 class Playback:
-    """Holds a recording with its pictures, still as JPEG.
+    """Holds a recording with its images, still as JPEG.
 
     Args:
         recording: of the run.
         world: the cell it was recorded in, if it is known.
 
     Attributes:
-        cameras: those that took pictures.
+        cameras: those that took images.
         plots: the panels that the recording fills.
     """
 
@@ -64,12 +64,12 @@ class Playback:
         return sorted(found, key=lambda entry: entry[0])
 
     def times(self) -> FloatArray:
-        """Return when pictures came, in order, s."""
+        """Return when images came, in order, s."""
         traces = (self._recording.cameras[name].received for name in self.cameras)
         return np.unique(np.concatenate([np.zeros(1), *traces]))
 
     def views(self, time: float) -> list[CameraView]:
-        """Return the pictures that had come by a time, the same objects while they are the same."""
+        """Return the images that had come by a time, the same objects while they are the same."""
         for name in self.cameras:
             shown = self._views.get(name)
             fresh = self._camera_view(name, time)

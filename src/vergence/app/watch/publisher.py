@@ -103,7 +103,7 @@ class Publisher:
     def _desired(
         self, frame: Frame, reference: Reference | None, view: ImagePoints | None
     ) -> FloatArray | None:
-        """Return where the points of a picture should be, if the reference speaks of them.
+        """Return where the points of an image should be, if the reference speaks of them.
 
         Of a wanted pose, where it would show the points that were looked for.
         """

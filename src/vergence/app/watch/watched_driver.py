@@ -24,7 +24,7 @@ class WatchedDriver(SimulatedDriver):
         self._due = 0.0  # s, when the next turn is due if no image arrives
 
     def read(self) -> Sample:
-        """Return joints and pictures, after the watcher had its say."""
+        """Return joints and images, after the watcher had its say."""
         sample = super().read()
         if self.between is not None and (sample.frames or sample.time >= self._due):
             self._due = sample.time + 1.0 / self.cell.outer_rate_hz

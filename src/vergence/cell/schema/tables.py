@@ -71,7 +71,7 @@ class CameraTable(Placement):
 
     arm: Text | None = None  # the arm that carries it; fixed in the world if absent
     body: Text | None = None  # which body of that arm; its last if absent
-    resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the picture
+    resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the image
     focal_mm: _Lens | None = None  # of the lens, with pixel_um
     pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
     focal_px: tuple[_Focal, _Focal] | None = None  # instead of focal_mm and pixel_um
@@ -80,14 +80,14 @@ class CameraTable(Placement):
         default=(), max_length=5
     )  # k1, k2, p1, p2, k3 of OpenCV
     calibration: Path | None = None  # a camera file, also ROS's, for the six keys above
-    rate_hz: Rate = 30.0  # pictures a second
+    rate_hz: Rate = 30.0  # images per second
     latency_frames: Annotated[int, Field(ge=0, le=1000)] = (
-        0  # from exposure until the picture arrives
+        0  # from exposure until the image arrives
     )
     noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
     blind_s: Annotated[
         tuple[tuple[Time, Time], ...], Field(max_length=1000)
-    ] = ()  # from when to when its pictures are black
+    ] = ()  # from when to when its images are black
     calibration_error_m: Distance = 0.0  # of its placement, in simulation
     calibration_error_deg: _Angle = 0.0  # and of its angles
 
@@ -155,8 +155,8 @@ class TrackTable(Table):
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
     tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
-    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Duration = 0.2  # with pictures, but none of the features found
+    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+    target_timeout_s: Duration = 0.2  # with images, but none of the features found
 
 
 class FollowTable(Table):
@@ -166,12 +166,12 @@ class FollowTable(Table):
     arm: Text  # which moves
     camera: Text  # carried by the arm, or fixed where the arm carries the target
     desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
-    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Duration = 2.0  # with pictures, but the target lost
+    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+    target_timeout_s: Duration = 2.0  # with images, but the target lost
 
 
 class ReachTable(Table):
-    """Bring the camera to where the target looks as in a picture taken before, along a plan."""
+    """Bring the camera to where the target looks as in an image taken before, along a plan."""
 
     kind: Literal["reach"]
     arm: Text  # which moves
@@ -183,8 +183,8 @@ class ReachTable(Table):
     margin_px: Pixels = 10.0  # kept from the border of the image
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
     camera_speed_m_s: Speed = 0.25  # on the way
-    image_timeout_s: Duration = 0.5  # without a picture for so long, the run ends
-    target_timeout_s: Duration = 0.5  # with pictures, but the target lost
+    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+    target_timeout_s: Duration = 0.5  # with images, but the target lost
 
 
 def _task_kind(value: Any) -> str | None:

@@ -221,7 +221,7 @@ def optimal_tracking_tick(
         joints: of `pack_setup`.
         q: joint positions, (n,).
         features: as for `image_model`, (M, 5), or (M, 7) with the target's own motion in the
-            picture as well, normalized, 1/s, which is then fed forward.
+            image as well, normalized, 1/s, which is then fed forward.
         result: takes the fields of a `TrackingTick` one after the other, (n + 10,).
     """
     n, gains, focal_px = len(q), unpack_gains(weights), weights[7:9]

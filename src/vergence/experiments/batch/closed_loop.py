@@ -30,17 +30,17 @@ class LoopInputs(NamedTuple):
     features: FloatArray  # (M, 3) in the target's frame, m
     wanted: FloatArray  # (M, 3) x and y in normalized coordinates, and the believed depth, m
     camera: FloatArray  # (6,) width, height, fx, fy, cx, cy
-    T_world_target: FloatArray  # (K, 4, 4) at the time of each picture
-    arrived: BoolArray  # (K,) whether a picture ever arrives
+    T_world_target: FloatArray  # (K, 4, 4) at the time of each image
+    arrived: BoolArray  # (K,) whether an image ever arrives
     noise_px: FloatArray  # (K, M, 2) on the features found in it
-    rates_hz: FloatArray  # (2,) of set-points and of pictures
-    latency: IntArray  # (1,) from exposure to arrival, pictures
+    rates_hz: FloatArray  # (2,) of set-points and of images
+    latency: IntArray  # (1,) from exposure to arrival, images
     ends_s: FloatArray  # (4,) duration, and of `Timeouts` image_s, target_s, decay_s
     singular_below: FloatArray  # (1,) smallest singular value of J at which the run ends
 
 
 class LoopRecord(NamedTuple):
-    """What is kept of a run, rows a picture; with one axis more in front, of many runs."""
+    """What is kept of a run, rows an image; with one axis more in front, of many runs."""
 
     position: FloatArray  # (K, n) of the joints
     camera_m: FloatArray  # (K, 3) place of the camera in the world
@@ -77,7 +77,7 @@ def look(
     camera: FloatArray,
     found: FloatArray,
 ) -> int:
-    """Fill rows of found (M, 5) for `image_model` from a picture; return how many."""
+    """Fill rows of found (M, 5) for `image_model` from an image; return how many."""
     count = 0
     for j in range(len(points_px)):
         u, v = points_px[j, 0], points_px[j, 1]
@@ -112,7 +112,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
     It is `vergence.runtime.Loop` on an `IdealDriver`, decision by decision, by the same kernels.
 
     Returns:
-        One of the codes above, the inner tick, how many pictures had been looked at had all
+        One of the codes above, the inner tick, how many images had been looked at had all
         arrived, and what ended it: the singular value, or for how many seconds nothing was seen.
     """
     q, velocity = run.start.copy(), np.zeros(len(run.start))

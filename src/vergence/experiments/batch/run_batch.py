@@ -29,7 +29,7 @@ class BatchTrace:
 
     outcome: Outcome
     position: FloatArray  # (K, n) joints at each outer tick
-    times: FloatArray  # (F,) s, of the pictures that the law was shown
+    times: FloatArray  # (F,) s, of the images that the law was shown
     points_px: FloatArray  # (F, M, 2) true places of the features in them; NaN behind the camera
     camera_m: FloatArray  # (F, 3) place of the camera in the world
     target_m: FloatArray  # (F, 3) and of the target
@@ -77,7 +77,7 @@ def _alike(runs: list[IdealRun], threads: int | None) -> Iterator[BatchTrace]:
 
 
 def _pictures(run: IdealRun) -> int:
-    """Return how many pictures a run takes at most."""
+    """Return how many images a run takes at most."""
     return int(np.ceil(run.duration_s * run.cell.rate_hz)) + 2
 
 
@@ -126,7 +126,7 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
 
 
 def _times(run: IdealRun, pictures: int) -> FloatArray:
-    """Return when pictures are taken, (pictures,), s."""
+    """Return when images are taken, (images,), s."""
     times: FloatArray = picture_times(pictures, run.cell.inner_rate_hz, run.cell.rate_hz)
     return times
 

@@ -9,7 +9,7 @@ from vergence.signals import JointState
 
 
 class JointHistory:
-    """Remembers an arm's joints, to say where they were when a picture was exposed.
+    """Remembers an arm's joints, to say where they were when an image was exposed.
 
     Args:
         length: how many states to keep; the oldest go first.

@@ -17,17 +17,17 @@ _LOG = logging.getLogger(__name__)
 
 
 class VideoCamera:
-    """Takes pictures in a thread of its own, as fast as they come, and stamps each on arrival.
+    """Takes images in a thread of its own, as fast as they come, and stamps each on arrival.
 
-    When the camera is unplugged or the file ends, no more pictures come, and the loop ends the run
-    as it does whenever pictures stay away: image late.
+    When the camera is unplugged or the file ends, no more images come, and the loop ends the run
+    as it does whenever images stay away: image late.
 
     Args:
         name: the camera's name.
         source: number of a device, or a file or address.
-        clock: the run's time now, s; pictures are stamped with it.
+        clock: the run's time now, s; images are stamped with it.
         latency_s: from exposure to arrival; measure it, for a moving arm feels every millisecond.
-        keep: how many pictures wait to be fetched; the oldest go first.
+        keep: how many images wait to be fetched; the oldest go first.
 
     Raises:
         InputError: if OpenCV cannot open the source.
@@ -56,11 +56,11 @@ class VideoCamera:
 
     @property
     def ended(self) -> bool:
-        """Whether no more pictures will come."""
+        """Whether no more images will come."""
         return not self._thread.is_alive()
 
     def frames(self, joints_at: Callable[[float], Mapping[str, FloatArray]]) -> tuple[Frame, ...]:
-        """Return the pictures that arrived since the last call, oldest first.
+        """Return the images that arrived since the last call, oldest first.
 
         Args:
             joints_at: gives the arms' joint positions at an exposure, such as a `JointHistory`.

@@ -53,7 +53,7 @@ def stamp(time: float) -> Timestamp:
 
 
 def image(camera: str, time: float, jpeg: bytes) -> CompressedImage:
-    """Return a picture at its time of exposure."""
+    """Return an image at its time of exposure."""
     return CompressedImage(timestamp=stamp(time), frame_id=camera, data=jpeg, format="jpeg")
 
 
@@ -78,7 +78,7 @@ def annotations(
     desired_px: FloatArray | None,
     true_px: FloatArray | None,
 ) -> ImageAnnotations:
-    """Return windows, true, desired and tracked points to be drawn over the picture."""
+    """Return windows, true, desired and tracked points to be drawn over the image."""
     layers = []
     if points is not None and points.windows is not None:
         layers.append(_frames(time, points.windows))

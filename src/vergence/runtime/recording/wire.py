@@ -1,4 +1,4 @@
-"""Just enough of protobuf's wire format to read our own pictures and events back.
+"""Just enough of protobuf's wire format to read our own images and events back.
 
 The viewers' message types are protobuf; three fields of two of them are all we need again, so
 this stands in for a protobuf library.

@@ -1,4 +1,4 @@
-"""A known rigid object: its geometry, its corners in windows, its edges from picture to picture."""
+"""A known rigid object: its geometry, its corners in windows, its edges from image to image."""
 
 from vergence.vision.known_object.corner_extractor import (
     CornerExtractor,

@@ -1,4 +1,4 @@
-"""Corners of a known object in windows of a picture."""
+"""Corners of a known object in windows of an image."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -33,7 +33,7 @@ _LEAST_COSINE = 0.05  # flatter faces make no edge to be told from its neighbour
 
 
 class CornerMeasurements(NamedTuple):
-    """What was found in the windows of one picture."""
+    """What was found in the windows of one image."""
 
     points_px: FloatArray  # (M, 2); the predicted place where nothing was found
     covariance_px: FloatArray  # (M, 2, 2) px²
@@ -135,7 +135,7 @@ def measure_corners(
 def _lines(
     T: FloatArray, lens: FloatArray, edges: FloatArray, edge_normals: FloatArray
 ) -> FloatArray:
-    """Return both ends in the picture of each edge that faces the camera, (E, 4); else NaN."""
+    """Return both ends in the image of each edge that faces the camera, (E, 4); else NaN."""
     lines = np.full((len(edges), 4), np.nan)
     for e in range(len(edges)):
         x0, y0, z0 = in_camera(T, edges[e, 0])
@@ -185,7 +185,7 @@ def _arm(
     v: float,
     direction: FloatArray,
 ) -> float:
-    """Fill the direction in the picture of an edge from X on; return its length, 0 if hidden.
+    """Fill the direction in the image of an edge from X on; return its length, 0 if hidden.
 
     An edge that runs behind the camera is cut.
     """

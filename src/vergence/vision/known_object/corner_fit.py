@@ -44,7 +44,7 @@ def fit_corner(
         image: grey, (height, width).
         u: predicted column.
         v: predicted row.
-        directions: unit vectors of the K expected edges in the picture, away from the corner,
+        directions: unit vectors of the K expected edges in the image, away from the corner,
             (K, 2); overwritten by those found.
         lengths: their expected lengths, px, (K,).
         half_px: half the width and height of the window, (2,).

@@ -33,7 +33,7 @@ def edge_points(
     """Return points (M, 3), places (M, 2), covariances (M, 2, 2): two an edge, one a short one.
 
     Args:
-        fit: the pose fitted to the picture; only what the picture says is handed on, not the pose.
+        fit: the pose fitted to the image; only what the image says is handed on, not the pose.
         lens: packed camera, (11,).
         samples: on the edges, those of one edge beside each other.
         steps: across each of them.

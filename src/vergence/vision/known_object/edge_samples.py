@@ -1,4 +1,4 @@
-"""Places along the sharp edges of an object, and the steps in the picture beside each of them."""
+"""Places along the sharp edges of an object, and the steps in the image beside each of them."""
 
 from typing import NamedTuple
 
@@ -20,30 +20,30 @@ from vergence.vision.known_object.projection import (
 TEMPLATE = 4  # samples on each side of an edge that are remembered
 BLUR = 9  # samples by which a profile is longer than the search, to follow blurred edges
 LEAST_COSINE = 0.08  # flatter faces make no edge to be told from its neighbour
-BORDER_PX = 3.0  # nearer to the border of the picture nothing is expected
-_ALONG = 1e-3  # of an edge's length, for its direction in the picture
+BORDER_PX = 3.0  # nearer to the border of the image nothing is expected
+_ALONG = 1e-3  # of an edge's length, for its direction in the image
 _USUAL_HEIGHT = 15.0  # grey values: a step of this height has half the weight of the highest
 
 
 class EdgeSamples(NamedTuple):
-    """Places on edges that should be seen in a picture."""
+    """Places on edges that should be seen in an image."""
 
     edge: IntArray  # (N,) which edge
     place: IntArray  # (N,) which of its places
     points: FloatArray  # (N, 3) object's frame, m
     points_px: FloatArray  # (N, 2)
-    normals: FloatArray  # (N, 2) unit normal of the edge in the picture
+    normals: FloatArray  # (N, 2) unit normal of the edge in the image
 
 
 class Steps(NamedTuple):
-    """Steps in the picture across each sample."""
+    """Steps in the image across each sample."""
 
     offsets: FloatArray  # (N, K) along the normal, px
     weights: FloatArray  # (N, K) 0 … 1; 0 where there is none
     widths: FloatArray  # (N, K) of the slope at half its height, px
     likeness: FloatArray  # (N, K) correlation with what is remembered, -1 … 1; NaN if nothing is
     looks: FloatArray  # (N, K, 2 TEMPLATE + 1) grey profile around each, mean 0, norm 1
-    readable: BoolArray  # (N,) the profile lies within the picture
+    readable: BoolArray  # (N,) the profile lies within the image
 
 
 @njit(cache=True)
@@ -207,7 +207,7 @@ def look_at(profile: FloatArray, offset: float, look: FloatArray) -> None:
 
 @njit(cache=True)
 def vote_shift(samples: EdgeSamples, steps: Steps, reach: int) -> tuple[float, float]:
-    """Return the shift of the whole picture of the object, px, that most steps support.
+    """Return the shift of the whole image of the object, px, that most steps support.
 
     Every whole-pixel shift within the reach is tried: shifting by d moves an edge by n · d, and the
     best step within two pixels of it supports it. Small shifts win where support is equal.

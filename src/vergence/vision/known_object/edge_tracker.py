@@ -1,4 +1,4 @@
-"""Follows the edges of a known object from picture to picture."""
+"""Follows the edges of a known object from image to image."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -29,7 +29,7 @@ _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
 _LEARNED_PX = 1.0
 _UNKNOWN_RATE = 0.5  # at which a place counts that was not looked at yet
-_RATE_GAIN = 0.1  # of one picture: ten are remembered
+_RATE_GAIN = 0.1  # of one image: ten are remembered
 _REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
 
 
@@ -42,12 +42,12 @@ class EdgeMemory(NamedTuple):
 
 
 class EdgeMeasurement(NamedTuple):
-    """What a picture says about the edges, in the form of points that a filter takes."""
+    """What an image says about the edges, in the form of points that a filter takes."""
 
     points: FloatArray  # (M, 3) object's frame, m
     points_px: FloatArray  # (M, 2)
     covariance_px: FloatArray  # (M, 2, 2) small across the edge, large along it, px²
-    T_camera_target: FloatArray  # (4, 4) the pose that fits this picture
+    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
     expected: int  # places on edges that should be seen
     found: int  # of them, where an edge was found that looks as remembered
     usual: float  # the same as a share, each place weighing as often as it was found of late
@@ -68,7 +68,7 @@ class EdgeTracker:
     """Measures an object by all of its sharp edges that are seen.
 
     Steps of the grey value are searched across the predicted edges; a vote over shifts of the whole
-    picture and a robust fit of the pose decide which of them are the edges. What each place along
+    image and a robust fit of the pose decide which of them are the edges. What each place along
     the edges looked like before tells the object from its background. The edges, not the pose, are
     the measurement.
     """
@@ -95,7 +95,7 @@ class EdgeTracker:
         return places
 
     def blank(self) -> EdgeMemory:
-        """Return the memory before the first picture."""
+        """Return the memory before the first image."""
         shape = (len(self.model.edges), int(self.places.max()))
         return EdgeMemory(
             np.zeros((*shape, 2 * TEMPLATE + 1)),
@@ -156,7 +156,7 @@ class EdgeTracker:
         )
 
     def remember(self, memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
-        """Return the memory after a picture that was believed.
+        """Return the memory after an image that was believed.
 
         Places whose step is right where the fitted pose wants it are learned anew, little by
         little, whatever they look like: backgrounds change, and faces turn.

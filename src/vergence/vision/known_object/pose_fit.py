@@ -1,4 +1,4 @@
-"""The pose under which the edges of an object run along steps of the picture.
+"""The pose under which the edges of an object run along steps of the image.
 
 Iterated, robustly weighted least squares on the distances across the edges. Which of its steps a
 sample belongs to is decided anew in each iteration, with a tolerance that shrinks.
@@ -144,7 +144,7 @@ def _moved(T: FloatArray, step: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def shifted(T: FloatArray, lens: FloatArray, dx: float, dy: float) -> FloatArray:
-    """Return the pose moved so that the object's picture shifts by (dx, dy) px."""
+    """Return the pose moved so that the object's image shifts by (dx, dy) px."""
     step = np.zeros(6)
     step[0] = dx * T[2, 3] / lens[0]
     step[1] = dy * T[2, 3] / lens[1]

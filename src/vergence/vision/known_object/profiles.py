@@ -13,7 +13,7 @@ SAME_PX = 0.75  # steps nearer than this are one
 
 @njit(cache=True)
 def grey_at(image: ImageArray, u: float, v: float) -> float:
-    """Return the grey value between four pixels; NaN outside the picture."""
+    """Return the grey value between four pixels; NaN outside the image."""
     height, width = image.shape
     if not (u >= 0.0 and v >= 0.0 and u <= width - 1.0 and v <= height - 1.0):
         return np.nan
@@ -32,7 +32,7 @@ def read_profile(
     """Read grey values along the normal (nu, nv) through a pixel, each a mean along the edge.
 
     The middle of the profile is the pixel; samples are a pixel apart. Returns False if any of it
-    is outside the picture.
+    is outside the image.
     """
     reach = len(profile) // 2
     for k in range(len(profile)):

@@ -1,4 +1,4 @@
-"""How a known object appears in one picture: pixels, their dependence on the pose, what is hidden.
+"""How a known object appears in one image: pixels, their dependence on the pose, what is hidden.
 
 A pose error is (δp, δθ) along camera axes: t + δp, exp(δθ) R, as the filters have it.
 """
@@ -68,7 +68,7 @@ def pixel_rows(
 def face_table(T: FloatArray, surface: FloatArray) -> FloatArray:
     """Return what is needed to tell what triangles hide, (F, 13), in normalized coordinates.
 
-    Bounds (x, x, y, y), the plane 1/z = a x + b y + c (depth is linear in the picture only so), and
+    Bounds (x, x, y, y), the plane 1/z = a x + b y + c (depth is linear in the image only so), and
     the three corners. Triangles seen edge-on, or not wholly before the camera, hide nothing.
 
     Args:

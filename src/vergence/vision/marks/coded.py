@@ -23,7 +23,7 @@ DICTIONARIES = {
 
 
 class CodedMarks(NamedTuple):
-    """The markers of a picture."""
+    """The markers of an image."""
 
     ids: IntArray  # (M,)
     corners_px: FloatArray  # (M, 4, 2) clockwise from the marker's own top left
@@ -66,7 +66,7 @@ class MarkerDetector:
     def detect(
         self, image: ImageArray, window: tuple[int, int, int, int] | None = None
     ) -> CodedMarks:
-        """Find the markers of a picture, or of a window of it.
+        """Find the markers of an image, or of a window of it.
 
         Args:
             image: grey, (height, width).

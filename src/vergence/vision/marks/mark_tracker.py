@@ -1,4 +1,4 @@
-"""Round marks followed from picture to picture."""
+"""Round marks followed from image to image."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class MarkTracker:
     """A point tracker for marks: each is looked for where its last motion leads.
 
     Args:
-        image: the first picture, (height, width) grey.
+        image: the first image, (height, width) grey.
         points_px: roughly where the marks are in it, (M, 2); a click will do.
     """
 
@@ -28,11 +28,11 @@ class MarkTracker:
         self._before = self._points.copy()
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
-        """Measure the marks in a new picture.
+        """Measure the marks in a new image.
 
         Args:
             image: grey, (height, width).
-            predicted_px: where to look, (M, 2); None to go on as between the last two pictures.
+            predicted_px: where to look, (M, 2); None to go on as between the last two images.
         """
         expected = 2 * self._points - self._before if predicted_px is None else predicted_px
         nothing = np.full(len(expected), np.nan)

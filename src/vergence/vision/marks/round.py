@@ -1,8 +1,8 @@
 """Round marks, dark on light or light on dark: the centroid to a fraction of a pixel.
 
-The centroid of a circle's picture is not the picture of its centre, unless the circle faces the
+The centroid of a circle's image is not the image of its centre, unless the circle faces the
 camera: `circle_centre_bias` tells the difference, which grows with the square of the circle's size
-in the picture (some hundredths of a pixel for one of 10 px, a pixel for one of 100 px).
+in the image (some hundredths of a pixel for one of 10 px, a pixel for one of 100 px).
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ LEAST_VARIANCE = 0.03**2  # px²
 
 
 class RoundMarks(NamedTuple):
-    """What was found in the windows of one picture."""
+    """What was found in the windows of one image."""
 
     points_px: FloatArray  # (M, 2) centroids; the predicted place where nothing was found
     covariance_px: FloatArray  # (M, 2, 2) px²
@@ -244,7 +244,7 @@ def _level(
 def circle_centre_bias(
     camera: Camera, centre: FloatArray, normal: FloatArray, radius: float
 ) -> FloatArray:
-    """Return by how much the centroid of a circle's picture is off its centre's picture, (2,), px.
+    """Return by how much the centroid of a circle's image is off its centre's image, (2,), px.
 
     Subtract it from a measured centroid to have the centre. Pinhole geometry; the distortion is
     taken to be even over the circle.
@@ -258,7 +258,7 @@ def circle_centre_bias(
     n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
     a = np.cross(n, [1.0, 0.0, 0.0] if abs(n[0]) < 0.9 else [0.0, 1.0, 0.0])
     a /= np.linalg.norm(a)
-    # Plane coordinates (x, y, 1) of the circle to the picture: p = H (x, y, 1).
+    # Plane coordinates (x, y, 1) of the circle to the image: p = H (x, y, 1).
     H = np.column_stack((radius * a, radius * np.cross(n, a), np.asarray(centre)))
     G = np.linalg.inv(H)
     C = G.T @ np.diag([1.0, 1.0, -1.0]) @ G  # the ellipse: pᵀ C p = 0
