@@ -127,7 +127,7 @@ def idlest_core() -> int:
 
 @contextmanager
 def on_one_core(wanted: bool) -> Iterator[None]:
-    """Keeps this thread on one idle core meanwhile, if wanted; peer programs follow it there.
+    """Keeps this thread on one idle core meanwhile, if desired; peer programs follow it there.
 
     Cores differ in speed on a busy machine, so a ratio is fair only on one.
     """

@@ -1,4 +1,4 @@
-"""Draws what was looked for, tracked, wanted and true into a camera's image.
+"""Draws what was looked for, tracked, desired and true into a camera's image.
 
 Pixel centres are at integers, here as everywhere; marks are placed to better than a
 quarter of a pixel, which is what OpenCV's lines allow.

@@ -30,7 +30,7 @@ def guarded_step(
     limits: FloatArray,
     dt: float,
 ) -> GuardedStep:
-    """Follow wanted rates as far as limits and braking distance allow.
+    """Follow desired rates as far as limits and braking distance allow.
 
     A set-point moving at v towards a limit, braked by a dt every step from the next one on, travels
     at most v²/(2a) + v dt/2 + a dt²/8. So v ≤ √((a dt/2)² + 2 a (room - a dt²/8)) - a dt/2 can
@@ -95,7 +95,7 @@ def guarded_steps(
     count: int,
     stuck: BoolArray,
 ) -> None:
-    """Take many guarded steps with the same wanted rates, in place.
+    """Take many guarded steps with the same desired rates, in place.
 
     A joint so far from its limits that it could stop anywhere on the way ramps to its rate and
     keeps it, which is a sum in closed form; only one that might have to brake is stepped.

@@ -6,7 +6,7 @@ from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class Law(Protocol):
-    """Turns what is seen and what is wanted into joint rates."""
+    """Turns what is seen and what is desired into joint rates."""
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState

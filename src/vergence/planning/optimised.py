@@ -226,7 +226,7 @@ def _image_margin_px(problem: PlanningProblem, T_world_camera: FloatArray) -> fl
 
 
 def _margin_kept(problem: PlanningProblem) -> float:
-    """Return the margin to the image border: the wanted one, or less where the ends have less."""
+    """Return the margin to the image border: the desired one, or less where the ends have less."""
     return max(0.0, min(problem.margin_px, *(0.8 * m - 0.1 for m in _end_margins_px(problem))))
 
 

@@ -16,12 +16,12 @@ from vergence.vision.two_view import TwoView
 
 @dataclass(frozen=True, slots=True)
 class PlanningProblem:
-    """Bring a camera from where it is to where it should see the points as wanted."""
+    """Bring a camera from where it is to where it should see the points as desired."""
 
     arm: Arm  # up to the camera
     camera: Camera
     q_start: FloatArray  # (n,)
-    T_world_goal: FloatArray  # (4, 4) wanted pose of the camera
+    T_world_goal: FloatArray  # (4, 4) desired pose of the camera
     points_world: FloatArray  # (N, 3) what must stay in view, m
     margin_px: float = 10.0  # distance to keep from the border of the image
     margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range

@@ -68,7 +68,7 @@ def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4
 
     Args:
         arm: any.
-        T: wanted pose of the tip in the world, (4, 4).
+        T: desired pose of the tip in the world, (4, 4).
         near: joint positions from which distances count, (n,), measured in travel time.
         most: how many to return.
     """

@@ -93,7 +93,7 @@ class Follower:
         return self._hold(time, measured, self._reason(joint, measured, robot))
 
     def step(self, wanted: FloatArray) -> Setpoint:
-        """Return the next set-point, at wanted rates (n,) or on the way to the measured joints."""
+        """Return the next set-point, at desired rates (n,) or on the way to the measured joints."""
         if self.holding is not None:
             return self.guard.approach(self._anchor)
         return self.guard.step(wanted if self._scale == 1.0 else self._scale * wanted)

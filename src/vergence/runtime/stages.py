@@ -14,7 +14,7 @@ class Perception(Protocol):
 
 
 class Planner(Protocol):
-    """Knows what is wanted when."""
+    """Knows what is desired when."""
 
     def reference(self, time: float) -> Reference:
         """Return what the law should aim at.

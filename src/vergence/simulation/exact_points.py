@@ -1,4 +1,4 @@
-"""Perception without images: true projections, with noise if wanted."""
+"""Perception without images: true projections, with noise if desired."""
 
 import numpy as np
 

@@ -35,7 +35,7 @@ class World(CellModel):
         return frozen(self.data.qvel[self._qvel[arm]])
 
     def command(self, arm: str, position: FloatArray, velocity: FloatArray) -> None:
-        """Set an arm's servos: their lag k_v/k_p times the wanted rate is fed forward."""
+        """Set an arm's servos: their lag k_v/k_p times the desired rate is fed forward."""
         self.data.ctrl[self._actuators[arm]] = position + self._lag[arm] * velocity
 
     def step(self) -> None:

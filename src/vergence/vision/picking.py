@@ -131,7 +131,7 @@ def pick_features(
 
     Args:
         image: grey, (height, width).
-        count: how many points are wanted.
+        count: how many points are desired.
         mask: where they may lie, (height, width); None for everywhere.
         apart_px: smallest distance between two of them.
 

@@ -1,4 +1,4 @@
-"""A figure of what kept an arm from doing what was wanted."""
+"""A figure of what kept an arm from doing what was desired."""
 
 import numpy as np
 

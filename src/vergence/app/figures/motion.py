@@ -71,7 +71,7 @@ def estimate_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels 
 
 
 def pose_error_figure(trace: CameraTrace) -> Panels | None:
-    """Draw how far the target truly is from its wanted pose in a camera."""
+    """Draw how far the target truly is from its desired pose in a camera."""
     known = np.isfinite(trace.T_camera_target_desired[:, 0, 0])
     known &= np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
@@ -90,7 +90,7 @@ def pose_error_figure(trace: CameraTrace) -> Panels | None:
 
 
 def _nearest(times: FloatArray, wanted: FloatArray) -> IntArray:
-    """Return the row of the time nearest to each wanted one."""
+    """Return the row of the time nearest to each desired one."""
     return np.asarray(np.abs(times[None, :] - wanted[:, None]).argmin(axis=1))
 
 

@@ -16,7 +16,7 @@ _DECIMALS = 3  # of a pixel: nobody sees more
 
 @dataclass(frozen=True)
 class CameraView:
-    """One image, what was measured in it, what was wanted, and what is true."""
+    """One image, what was measured in it, what was desired, and what is true."""
 
     camera: str
     time: float  # s, of exposure

@@ -11,7 +11,7 @@ class Pace:
 
     Attributes:
         paused: whether time stands still.
-        speed: wanted simulated seconds a second; the machine may be slower.
+        speed: desired simulated seconds a second; the machine may be slower.
         measured: simulated seconds a second, lately.
     """
 

@@ -142,7 +142,7 @@ class ToolTable(Placement):
 
 
 class TrackTable(Table):
-    """Keep features where they are wanted in one camera's image."""
+    """Keep features where they are desired in one camera's image."""
 
     kind: Literal["track"] = "track"
     arm: Text  # which moves, or carries the target
@@ -160,7 +160,7 @@ class TrackTable(Table):
 
 
 class FollowTable(Table):
-    """Keep a camera in the hand, or what the hand holds before a fixed one, at a wanted pose."""
+    """Keep a camera in the hand, or what the hand holds before a fixed one, at a desired pose."""
 
     kind: Literal["follow"]
     arm: Text  # which moves

@@ -54,7 +54,7 @@ def triangle_area(points: FloatArray, a: int, b: int, c: int) -> float:
 
 @njit(cache=True)
 def widest_triples(m_star: FloatArray, m: FloatArray, wanted: int) -> IntArray:
-    """Return the triples of points, (wanted, 3), that span the largest triangles.
+    """Return the triples of points, (desired, 3), that span the largest triangles.
 
     What counts is the smaller of a triangle's areas in the two views. The triples are drawn from
     at most sixteen points, spread over the list, and come best first.
