@@ -55,7 +55,7 @@ def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:
     assert camera["points found"] == f"{100 * trace.found.mean():.1f}"
     ratio = arm.manipulability.min() / arm.manipulability[0]
     assert measures["least manipulability"].value == f"{ratio:.2f}"
-    assert measures["least penalty"].value == f"{arm.penalty.min():.2f}"
+    assert measures["limit clearance P"].value == f"{arm.penalty.min():.2f}"
     fastest = np.abs(arm.velocity).max()
     assert measures["fastest joint"].value == f"{100 * fastest:.0f}"
     assert "joint3" in measures["fastest joint"].note

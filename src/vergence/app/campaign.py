@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Running:
     """How a campaign is run."""
 
-    folder: Path  # where results go, and are gone on with from
+    folder: Path  # where results go, and are resumed from
     tolerance_px: float
     workers: int | None  # processes of this machine; None for one a core
     scheduler: str | None  # address of a Dask scheduler
@@ -31,7 +31,10 @@ class Running:
         """Say how arms moved."""
         if self.physics:
             return "arms moved in simulated physics"
-        return "a lone arm with one camera moved exactly as it was told, others in physics"
+        return (
+            "single-arm, single-camera cells follow commands perfectly; all others run in MuJoCo "
+            "physics"
+        )
 
 
 def prepare(

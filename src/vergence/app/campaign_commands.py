@@ -53,7 +53,7 @@ def register(app: typer.Typer) -> None:
             str,
             typer.Option(help="What is drawn, with commas between: starts, targets, motions."),
         ] = "starts",
-        seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
+        seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
         spread: Annotated[
             float,
             typer.Option(

@@ -142,7 +142,7 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
     ] = False,
-    seed: Annotated[int, typer.Option(help="Seed of what is drawn by chance.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -161,7 +161,7 @@ def track(
     start: Annotated[
         str,
         typer.Option(
-            help="The object's pose in the camera, in the first picture: "
+            help="The object's pose in the camera, in the first image: "
             "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file."
         ),
     ],
@@ -173,12 +173,12 @@ def track(
     cx: Annotated[float | None, typer.Option("--cx", help="The middle if absent.")] = None,
     cy: Annotated[float | None, typer.Option("--cy", help="The middle if absent.")] = None,
     distortion: Annotated[str | None, typer.Option(help="k1,k2,p1,p2,k3; zero if absent.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Pictures a second.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Images per second.")] = None,
     scale: Annotated[float, typer.Option(help="Metres in a unit of the model file.")] = 1.0,
     contrast: Annotated[float, typer.Option(help="Least step of an edge, grey levels.")] = 5.0,
-    jolt: Annotated[float, typer.Option(help="Unforeseen motion, pixels a picture.")] = 3.0,
+    jolt: Annotated[float, typer.Option(help="Unforeseen motion, pixels per image.")] = 3.0,
     share: Annotated[
-        float, typer.Option(help="Least share of the edges to be found, for a picture to count.")
+        float, typer.Option(help="Least share of the edges to be found, for an image to count.")
     ] = 0.5,
     overlay: Annotated[
         bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")

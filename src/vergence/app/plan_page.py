@@ -59,7 +59,7 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
     drawn = {
         "image": (
             plan_image_figure(path),
-            f"The points' ways through the picture, {width} × {height} px; ○ start, ■ goal.",
+            f"Feature trajectories in the image, {width} × {height} px; ○ start, ■ goal.",
         ),
         "joints": (
             plan_joints_figure(trajectory),

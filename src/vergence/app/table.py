@@ -67,7 +67,10 @@ def _measure_rows(trace: ArmTrace) -> Iterator[Row]:
         yield Row("least manipulability", f"{ratio:.2f}", "", "w′ as a share of the start's")
     penalty = trace.penalty[np.isfinite(trace.penalty)]
     if len(penalty):
-        yield Row("least penalty", f"{penalty.min():.2f}", "", "P: 1 far from limits, 0 at one")
+        yield Row(
+            "limit clearance P", f"{penalty.min():.2f}", "",
+            "1 = far from every joint limit, 0 = at one",
+        )  # fmt: skip
 
 
 def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:

@@ -174,7 +174,7 @@ def _far_apart(context: LawContext, camera: str, image: ImageArray, count: int) 
 
 
 def _on_target(context: LawContext, camera: str, points_px: FloatArray) -> BoolArray:
-    """Tell whose windows lie on the target alone: what is behind it moves otherwise."""
+    """Return the mask of the points whose windows lie wholly on the target."""
     corners = points_px[:, None] + _WINDOW_PX / 2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     depth = context.model.anchor(camera, corners.reshape(-1, 2))[:, 2].reshape(-1, 4)
     on: BoolArray = np.isfinite(depth.sum(axis=1))  # NaN where the target is not met

@@ -1,4 +1,4 @@
-"""What the inner circle keeps of an image while it works on it."""
+"""What the tracking loop keeps of an image while it processes it."""
 
 from typing import NamedTuple
 

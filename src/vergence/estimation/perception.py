@@ -1,4 +1,4 @@
-"""The inner circle of perception: predict, see, choose, open windows, measure, update."""
+"""Predict-select-measure-update tracking loop."""
 
 from collections.abc import Callable, Sequence
 from typing import Generic

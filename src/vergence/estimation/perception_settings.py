@@ -1,11 +1,11 @@
-"""How the inner circle looks."""
+"""Settings of the tracking loop."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionSettings:
-    """How the inner circle looks."""
+    """Settings of the tracking loop."""
 
     budget: int = 8  # features measured a tick, over all cameras
     budget_in_doubt: int = 32  # the same while the filter is inconsistent

@@ -1,4 +1,4 @@
-"""Many runs of a cell: begun, cut off, gone on with."""
+"""Resumable batches of runs of a cell."""
 
 import hashlib
 import json

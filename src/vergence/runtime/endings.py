@@ -36,7 +36,7 @@ def target_lost(reasons: Iterable[str], time: float) -> Outcome:
 
 
 def why_lost(reasons: Iterable[str]) -> str:
-    """Say why there is no feature, each reason once: of those that differ in numbers, one."""
+    """Return the distinct loss reasons; those that differ only in numbers are merged."""
     kinds = {re.sub(r"-?\d[\d.]*", "", reason): reason for reason in reasons if reason}
     return "no feature found: " + "; ".join(sorted(kinds.values()))
 

@@ -28,7 +28,7 @@ class Cost(NamedTuple):
 
     extraction: float  # measuring in windows
     update: float  # of the filter
-    total: float  # of the whole inner circle
+    total: float  # of the whole tracking loop
 
 
 @dataclass(slots=True)
