@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vergence import registry
-from vergence.assembly import run_cell
+from vergence.assembly import open_driver, run_cell
 from vergence.cell import load_cell
 from vergence.control import ServoSettings
 from vergence.errors import InputError
@@ -120,3 +120,37 @@ def test_settings_are_written_as_they_are_read() -> None:
         for defaults in (False, True):
             again = ServoSettings.from_table(law.table(defaults=defaults), Place("", "law", None))
             assert again == law
+
+
+ROBOT = (Path(__file__).parents[1] / "examples" / "my_robot.py").read_text()
+
+
+def test_a_cell_runs_with_a_driver_of_ones_own(folder: Path, capsys, monkeypatch) -> None:
+    from vergence.app.run import run
+
+    (folder / "my_robot.py").write_text(ROBOT)
+    monkeypatch.chdir(folder)
+    settings = ["law={ kind = 'image_based' }", "duration_s=0.3"]
+    ended = run("cell.toml", folder / "out", None, True, 2, settings, False, "my_robot:MyRobot:x")
+    assert ended == 0
+    assert "completed at 0.30 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ("nowhere:Robot", "cannot be imported"),
+        ("ur", "module:Class"),
+        ("mine:Centre", "declared as objective"),
+        ("broken_robot:MyRobot", "which raised OSError: no robot answers"),
+    ],
+)
+def test_a_driver_that_cannot_be_opened_is_told_in_a_sentence(
+    folder: Path, named: str, said: str
+) -> None:
+    broken = ROBOT.replace("self._controller = ", "raise OSError('no robot answers')  # ")
+    (folder / "broken_robot.py").write_text(broken)
+    with pytest.raises(InputError) as caught:
+        open_driver(load_cell(folder), named)
+    assert said in str(caught.value)
+    assert caught.value.source == "--driver"

@@ -48,6 +48,7 @@ _ROOMS = {
         "TargetState",
     ),
     "vision": ("Board",),
+    "simulation": ("SimulatedDriver",),
     "studies": ("StudyResult", "reproduce"),
 }
 _PLACES = {name: room for room, names in _ROOMS.items() for name in names}

@@ -60,6 +60,7 @@ from vergence.signals import Reference as Reference
 from vergence.signals import Sample as Sample
 from vergence.signals import Setpoint as Setpoint
 from vergence.signals import TargetState as TargetState
+from vergence.simulation import SimulatedDriver as SimulatedDriver
 from vergence.studies import StudyResult as StudyResult
 from vergence.studies import reproduce as reproduce
 from vergence.vision import Board as Board

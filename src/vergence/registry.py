@@ -28,6 +28,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "posture": f"{_CONTROL}.objectives:Posture",
     },
     "limit": {},
+    "driver": {},
     "motion": {
         "stationary": f"{_MOTIONS}:Stationary",
         "line": f"{_MOTIONS}:Line",
@@ -52,6 +53,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "objective": ("quadratic",),
     "limit": ("rows",),
     "motion": ("poses",),
+    "driver": ("read", "step", "close"),
 }
 
 

@@ -75,12 +75,20 @@ def run(
     images: Images = True,
     image_every: ImageEvery = 2,
     settings: Settings = None,
+    driver: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME[:ADDRESS]",
+            help="Run on a robot: an installed driver, or module:Class of your own.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run a work cell: progress, a summary, and a folder with recording and report."""
     from vergence.app.run import run as command
 
-    raise typer.Exit(command(cell, out, seed, images, image_every, settings or (), as_json))
+    code = command(cell, out, seed, images, image_every, settings or (), as_json, driver)
+    raise typer.Exit(code)
 
 
 @app.command(epilog="Example: vergence report runs/puma560-20250131-120000")

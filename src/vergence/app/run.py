@@ -22,6 +22,7 @@ def run(
     image_every: int,
     settings: Sequence[str],
     as_json: bool,
+    driver: str | None = None,
 ) -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
     from vergence.cell import load_cell
@@ -34,7 +35,7 @@ def run(
     from vergence.runtime import Recorder
 
     recorder = Recorder(out or new_folder(loaded.name), image_every)
-    result = _recorded(loaded, recorder, images)
+    result = _recorded(loaded, recorder, images, driver)
     with working("writing the report"):
         report = write_report(recorder.folder)
     if as_json:
@@ -53,20 +54,26 @@ def overrides(settings: Sequence[str]) -> dict[str, str]:
     pairs = {}
     for setting in settings:
         key, equals, value = (part.strip() for part in setting.partition("="))
-        if not (key and equals and value):
+        if not (key and equals):
             raise InputError("--set", "", setting, "key=value, such as duration_s=5")
         pairs[key] = value
     return pairs
 
 
-def _recorded(cell: "Cell", recorder: "Recorder", images: bool) -> "Run":
-    """Run a cell; whatever happens, the recording is closed."""
+def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | None = None) -> "Run":
+    """Run a cell, in simulation or with a driver; whatever happens, the recording is closed."""
     from vergence.app.progress import RunProgress
-    from vergence.assembly import run_cell
+    from vergence.assembly import open_driver, run_cell, run_driver
 
     try:
         with RunProgress(cell.duration_s) as progress:
-            return run_cell(cell, (recorder, progress), images)
+            if driver is None:
+                return run_cell(cell, (recorder, progress), images)
+            opened = open_driver(cell, driver)
+            try:
+                return run_driver(cell, opened, (recorder, progress), images)
+            finally:
+                opened.close()
     except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
         _tell_interrupted(recorder)
         raise SystemExit(FAILURE) from None
@@ -105,7 +112,7 @@ def _tell(result: "Run", folder: Path, report: Path) -> None:
     off_mm = 1e3 * summary.get("final_hand_error_m", 0.0)
     off_deg = summary.get("final_hand_error_deg", 0.0)
     words = [
-        (f"off the wanted pose {off_mm:.2f} mm, {off_deg:.2f}°", "final_hand_error_m"),
+        (f"off the desired pose {off_mm:.2f} mm, {off_deg:.2f}°", "final_hand_error_m"),
         (f"final error {summary.get('final_error_px', 0.0):.2f} px", "final_error_px"),
         (f"largest {summary.get('max_error_px', 0.0):.2f} px", "max_error_px"),
         (f"drift {summary.get('max_drift_px', 0.0):.2f} px", "max_drift_px"),

@@ -3,6 +3,7 @@
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.open_driver import open_driver
 from vergence.assembly.parts import Parts
 from vergence.assembly.plan import plan
 from vergence.assembly.run import changed_cell, run
@@ -14,6 +15,7 @@ __all__ = [
     "assemble_parts",
     "build_law",
     "changed_cell",
+    "open_driver",
     "plan",
     "run",
     "run_cell",

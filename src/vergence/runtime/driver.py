@@ -44,3 +44,7 @@ class Driver(Protocol):
     def close(self) -> None:
         """Let go of the cell."""
         ...
+
+
+# A class that inherits from it may be named by `--driver`, see `vergence.registry`.
+Driver.__part_roles__ = ("driver",)  # type: ignore[attr-defined]

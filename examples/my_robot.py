@@ -1,0 +1,33 @@
+"""One's own robot behind the driver protocol: vergence run CELL --driver my_robot:MyRobot
+
+Here a simulated cell stands for the controller and the cameras; put calls of your own in its place.
+"""
+
+import vergence as vg
+
+
+class MyRobot(vg.Driver):
+    """Set-points go to the arm's controller at `inner_rate_hz`; joints and images come back."""
+
+    arms, cameras, inner_rate_hz = {}, {}, 500.0  # by name: arms with limits, calibrated lenses
+
+    def __init__(self, cell: vg.Cell, address: str) -> None:
+        self._controller = vg.SimulatedDriver(cell)  # connect to `address`
+        self.arms, self.cameras = self._controller.arms, self._controller.cameras
+
+    def read(self) -> vg.Sample:
+        """Return joints now, and the images that arrived since the last call."""
+        return self._controller.read()
+
+    def step(self, setpoints: dict[str, vg.Setpoint]) -> None:
+        """Hand set-points on, and return at the next inner tick."""
+        self._controller.step(setpoints)
+
+    def close(self) -> None:
+        """Let go of the robot."""
+        self._controller.close()
+
+
+if __name__ == "__main__":
+    robot = MyRobot(vg.load_cell("puma560"), "192.0.2.1")
+    print(robot.read().joints["puma"].position)
