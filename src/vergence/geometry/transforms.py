@@ -34,6 +34,7 @@ _VECTOR, _TWIST, _ROTATION, _POSE = (3,), (6,), (3, 3), (4, 4)
 
 matrix_to_quaternion = _checked(kernels.matrix_to_quaternion, _ROTATION)
 matrix_to_rpy = _checked(kernels.matrix_to_rpy, _ROTATION)
+nearest_rotation = _checked(kernels.nearest_rotation, (3, 3))
 quaternion_to_matrix = _checked(kernels.quaternion_to_matrix, (4,))
 rpy_rates_to_omega = _checked(kernels.rpy_rates_to_omega, _VECTOR)
 rpy_to_matrix = _checked(kernels.rpy_to_matrix, _VECTOR)

@@ -31,10 +31,30 @@ def find_chessboard(image: ImageArray, columns: int, rows: int) -> Corners | Non
     for flags in (accurate, accurate | normalized, normalized):
         found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
         if found:
-            return Corners(slice(None), _refined(image, corners, size))
+            return _in_order(image, _refined(image, corners, size), size)
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | normalized | cv2.CALIB_CB_FAST_CHECK
     found, corners = cv2.findChessboardCorners(image, size, flags=flags)
-    return Corners(slice(None), _refined(image, corners, size)) if found else None
+    return _in_order(image, _refined(image, corners, size), size) if found else None
+
+
+def _in_order(image: ImageArray, pixels: FloatArray, size: tuple[int, int]) -> Corners:
+    """Return the corners from the one beside a white square on, where the colours tell which.
+
+    They do where one number of corners is even and the other odd; finders differ in where they
+    begin.
+    """
+    columns, rows = size
+    if (columns + rows) % 2 == 0:
+        return Corners(slice(None), pixels)
+    grid = pixels.reshape(rows, columns, 2)
+    centres = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
+    x, y = np.rint(centres).astype(np.int64).reshape(-1, 2).T
+    height, width = image.shape
+    grey = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(np.float64)
+    row, column = np.mgrid[: rows - 1, : columns - 1]
+    white = (row + column).ravel() % 2 == 0
+    begins_white = grey[white].mean() > grey[~white].mean()
+    return Corners(slice(None), pixels if begins_white else pixels[::-1])
 
 
 def chessboard_size(image: ImageArray) -> tuple[int, int] | None:
