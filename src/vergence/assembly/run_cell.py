@@ -7,9 +7,13 @@ from vergence.assembly.parts import Parts
 from vergence.cell import Cell
 from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.runtime.driver import Driver
+from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
+
+# Simulated servos may lag more than a robot's: cells show it, and are not ended by it.
+_SIMULATED = FollowingBound(offset=1.0)
 
 
 def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> Run:
@@ -64,7 +68,7 @@ def run_driver(
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        loop = _loop(cell, parts, everyone)
+        loop = _loop(cell, parts, everyone, isinstance(driver, SimulatedDriver))
         if attend is not None:
             attend(loop, parts)
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
@@ -74,7 +78,7 @@ def run_driver(
     return run
 
 
-def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
+def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener], simulated: bool) -> Loop:
     return Loop(
         parts.driver,
         cell.task.arm,
@@ -83,5 +87,6 @@ def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
         listeners=listeners,
+        following=_SIMULATED if simulated else None,
         timeouts=Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s),
     )

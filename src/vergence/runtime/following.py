@@ -16,7 +16,7 @@ class FollowingBound(NamedTuple):
     """How far an arm may be from its set-points: so far from all those of the last `lag_s`."""
 
     lag_s: float = 0.1  # by which a servo lags behind its set-points
-    offset: float = 0.05  # rad or m, for overshoot and what gravity does
+    offset: float = 0.03  # rad or m, for overshoot and what gravity does
 
 
 @njit(cache=True, error_model="numpy")
