@@ -136,9 +136,9 @@ class Servo:
             return None
         return self._kernel.setup(len(self._believed(self._first)))
 
-    def believed_depth(self, count: int) -> FloatArray:
-        """Return the believed depth of the first camera's features, (count,), m."""
-        depth = self._believed(self._first)
+    def believed_depth(self, count: int, camera: str | None = None) -> FloatArray:
+        """Return the believed depth of a camera's features, (count,), m; by default the first's."""
+        depth = self._believed(self._first if camera is None else camera)
         return np.full(count, depth[0]) if len(depth) == 1 else depth
 
     @property
@@ -281,8 +281,7 @@ class Servo:
             return reference.depth_m
         if count == 0:
             return np.empty(0)
-        depth = self._believed(name)
-        return np.full(count, depth[0]) if len(depth) == 1 else depth
+        return self.believed_depth(count, name)
 
     def _pose(self, name: str, q: FloatArray) -> dict[str, Any]:
         """Return the arm's part of a camera's state."""
