@@ -1,12 +1,12 @@
 """Messages over a socket, each behind its length. Nothing here waits longer than it is told to."""
 
-import json
 import select
 import socket
 import struct
 from collections.abc import Sequence
-from time import monotonic
-from typing import Any
+from time import monotonic, sleep
+
+from vergence.errors import DriverSilent
 
 _LENGTH = struct.Struct("!I")
 _CHUNK = 1 << 16
@@ -85,25 +85,13 @@ class Link:
         return bool(readable or writable)
 
 
-def encode(words: dict[str, Any]) -> bytes:
-    """Return a message of JSON."""
-    return json.dumps(words, allow_nan=False).encode()
-
-
-def decode(message: bytes) -> dict[str, Any]:
-    """Return what a message of JSON says."""
-    try:
-        words = json.loads(message)
-    except (ValueError, RecursionError):
-        raise LinkBrokenError("sends what is no message") from None
-    if not isinstance(words, dict):
-        raise LinkBrokenError("sends what is no message")
-    return words
-
-
-def vector(values: Any, length: int) -> list[float]:
-    """Return so many numbers that came over a link."""
-    numbers = isinstance(values, list) and len(values) == length
-    if not numbers or not all(type(v) in (int, float) and -1e9 < v < 1e9 for v in values):
-        raise LinkBrokenError(f"sends something else than {length} numbers")
-    return [float(value) for value in values]
+def connect(address: tuple[str, int], longest: int, within_s: float = 30.0) -> Link:
+    """Return the link to a robot that may still be starting."""
+    until = monotonic() + within_s
+    while True:
+        try:
+            return Link(socket.create_connection(address, within_s), longest)
+        except OSError as error:
+            if monotonic() > until:
+                raise DriverSilent(f"nobody listens at {address[0]}:{address[1]}") from error
+            sleep(0.1)

@@ -5,9 +5,9 @@ says where its joints are, takes the set-point that comes back, and hands it to 
 a watchdog. When nothing usable comes back any more, the watchdog brakes the arm. The servo waits
 for a client no longer than its period lasts, whatever the client does.
 
-Messages are JSON, but for images (`link.py`). Client, first: its name. Robot: period, time, joints
-and rates of every arm, and the images that follow, each a message of its own; or why it refuses.
-Client: the period it answers, and a position and rate for every joint.
+Messages (`messages.py`) are JSON, but for images. Client, first: its name. Robot: period, time,
+joints and rates of every arm, and the images that follow, each a message of its own; or why it
+refuses. Client: the period it answers, and a position and rate for every joint.
 """
 
 import socket
@@ -15,17 +15,15 @@ import sys
 from collections.abc import Mapping
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any
 
-import numpy as np
 from clients import Clients
-from link import Link, LinkBrokenError, decode, encode, vector
+from link import Link, LinkBrokenError
+from messages import encode, read_answer, said_by_robot
 
 from vergence.cell import load_cell
 from vergence.robot import Arm
 from vergence.runtime import Driver
 from vergence.runtime.hardware import Metronome, Watchdog
-from vergence.signals import Sample, Setpoint
 from vergence.simulation import SimulatedDriver
 
 
@@ -42,7 +40,7 @@ def serve(robot: Driver, clients: Clients, timeout_s: float = 0.5) -> str:
     metronome, period, answered, gone = Metronome(robot.inner_rate_hz), 0, 0, ""
     while not gone or not all(dog.at_rest for dog in dogs.values()):
         if not gone and (period - answered) * dt <= timeout_s:  # else it is busy: do not pile up
-            outbox.put(messages(period, sample))
+            outbox.put(said_by_robot(period, sample))
         try:
             if not gone:
                 answered = max(answered, listen(link, period, metronome, robot.arms, dogs))
@@ -57,19 +55,6 @@ def serve(robot: Driver, clients: Clients, timeout_s: float = 0.5) -> str:
     outbox.put([])
     clients.dismiss()
     return f"{gone}; the arm is at rest"
-
-
-def messages(period: int, sample: Sample) -> list[bytes]:
-    """Return what there is to say: joints, and images."""
-    joints = {n: [s.position.tolist(), s.velocity.tolist()] for n, s in sample.joints.items()}
-    images = [(f.camera, f.time, f.image) for f in sample.frames if f.image is not None]
-    words: dict[str, Any] = {
-        "period": period,
-        "time": sample.time,
-        "joints": joints,
-        "images": [(camera, time) for camera, time, _ in images],
-    }
-    return [encode(words), *(image.tobytes() for _, _, image in images)]
 
 
 def send_all(link: Link, outbox: "SimpleQueue[list[bytes]]", timeout_s: float) -> None:
@@ -100,27 +85,6 @@ def listen(
         for name, setpoint in setpoints.items():
             dogs[name].hear(setpoint, age_s=metronome.period_s * (period - answered))
     return answered
-
-
-def read_answer(
-    message: bytes, period: int, arms: Mapping[str, Arm]
-) -> tuple[int, dict[str, Setpoint]]:
-    """Return the period that a message answers, and its set-points."""
-    words = decode(message)
-    answered, told = words.get("period"), words.get("setpoints")
-    if type(answered) is not int or not 0 <= answered <= period:
-        raise LinkBrokenError("answers a period that has not been")
-    if not isinstance(told, dict) or not told.keys() <= arms.keys():
-        raise LinkBrokenError("sends set-points for arms that are not here")
-    return answered, {name: read_setpoint(told[name], arms[name]) for name in told}
-
-
-def read_setpoint(values: Any, arm: Arm) -> Setpoint:
-    """Return the set-point that a client sent for an arm."""
-    if not isinstance(values, list) or len(values) != 2:
-        raise LinkBrokenError("sends something else than positions and rates")
-    position, velocity = (np.array(vector(part, arm.joint_count)) for part in values)
-    return Setpoint(position, velocity)
 
 
 if __name__ == "__main__":

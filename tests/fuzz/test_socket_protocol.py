@@ -12,9 +12,9 @@ from driver import SocketDriver
 from hypothesis import given
 from hypothesis import strategies as st
 from link import Link, LinkBrokenError
+from messages import read_answer
 from untrusted import mutants
 
-from robot import read_answer
 from vergence.camera import Camera
 from vergence.errors import DriverSilent
 
