@@ -29,6 +29,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     },
     "limit": {},
     "driver": {},
+    "matcher": {"sift": "vergence.vision.matching:Sift"},
     "motion": {
         "stationary": f"{_MOTIONS}:Stationary",
         "line": f"{_MOTIONS}:Line",
@@ -54,6 +55,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "limit": ("rows",),
     "motion": ("poses",),
     "driver": ("read", "step", "close"),
+    "matcher": ("describe", "match"),
 }
 
 

@@ -2,14 +2,11 @@
 
 from vergence.vision.two_view.estimate import estimate_two_view
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
-from vergence.vision.two_view.matching import Matches, match_features
 from vergence.vision.two_view.result import TwoView
 
 __all__ = [
-    "Matches",
     "TwoView",
     "TwoViewFailure",
     "TwoViewProblem",
     "estimate_two_view",
-    "match_features",
 ]

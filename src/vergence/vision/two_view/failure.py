@@ -14,6 +14,7 @@ class TwoViewProblem(StrEnum):
     COLLINEAR = "collinear points"
     NO_TRANSLATION = "no translation between the views"
     WRONG_MATCHES = "no common motion"
+    NOT_RECOGNISED = "not recognised"
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,6 +67,8 @@ class Report(NamedTuple):
         depth = rays @ R[2] + inverse_rho_star * t[2]
         if inverse_rho_star.min() <= 0.0 or depth.min() <= 0.0:
             return None
+        if -n @ R.T @ t >= 1.0:  # the current camera would see the plane from behind
+            return None
         state = fit.state._replace(R=R, t=t, n=n)
         blocks = bundle.normal_blocks(PLANE, state, fit.residuals, fit.views.weight)
         covariance = upsilon_covariance(PLANE, state, blocks, np.zeros(0, dtype=np.int64))

@@ -1,0 +1,127 @@
+"""Lowe's features: recognised however the camera was turned, and over a change of scale."""
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.errors import ShapeError
+from vergence.parts import knob, part
+from vergence.vision.image import grey_image
+from vergence.vision.matching.matcher import Matches
+
+_ROWS_PX = 480  # an image with more is searched at a smaller size
+_NOTHING = np.zeros((0, 2))
+
+
+class ImageFeatures(NamedTuple):
+    """The features of one image."""
+
+    points_px: FloatArray  # (N, 2)
+    descriptors: np.ndarray  # (N, D) float32
+    reason: str = ""  # why there are none
+
+
+@part("matcher", "sift")
+class Sift:
+    """Matches points by what surrounds them: Lowe's descriptors [Lowe2004].
+
+    They stay as they are under a turn about the optical axis and a change of scale, and nearly so
+    up to some 45° of tilt. A match has to be the best in both directions and clearly better than
+    the second best, so repeated texture gives few.
+    """
+
+    count: Annotated[int, Field(ge=8, le=2000)] = 100  # matches at most, the surest first
+    features: Annotated[int, Field(ge=8, le=20000)] = 1000  # of each image at most
+    size: float = knob(0.5, above=0.1, upto=1.0)  # of the image that is searched; 1 finds more
+    distinct: float = knob(0.8, above=0.1, upto=1.0)  # best distance over the second best, at most
+
+    @property
+    def finer(self) -> "Sift | None":
+        """The same on the image as it is, four times as slow."""
+        if self.size == 1.0:
+            return None
+        return Sift(count=self.count, features=2 * self.features, size=1.0, distinct=self.distinct)
+
+    def describe(self, image: ImageArray, mask: BoolArray | None = None) -> ImageFeatures:
+        """Return the features of an image.
+
+        Args:
+            image: grey, (height, width).
+            mask: where they may be, (height, width); None for everywhere.
+
+        Raises:
+            ShapeError: if the mask has not the size of the image.
+        """
+        import cv2
+
+        grey, reason = grey_image(image)
+        if grey is None:
+            return ImageFeatures(_NOTHING, np.zeros((0, 128), np.float32), reason)
+        if mask is not None and np.shape(mask) != grey.shape:
+            raise ShapeError("mask", np.shape(mask), grey.shape)
+        size = self.size * min(1.0, _ROWS_PX / min(grey.shape))
+        if size < 1.0:
+            grey = np.asarray(
+                cv2.resize(grey, None, fx=size, fy=size, interpolation=cv2.INTER_AREA)
+            )
+        shown = None
+        if mask is not None:
+            rows, columns = grey.shape
+            whole = (np.asarray(mask) != 0).astype(np.uint8)
+            shown = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_NEAREST)
+        detector = cv2.SIFT.create(nfeatures=self.features, enable_precise_upscale=True)
+        points, descriptors = detector.detectAndCompute(grey, shown)
+        if descriptors is None or len(points) < 2:
+            reason = "no texture that could be recognised"
+            return ImageFeatures(_NOTHING, np.zeros((0, 128), np.float32), reason)
+        scale = np.array(image.shape[::-1]) / np.array(grey.shape[::-1])
+        centres = np.array([point.pt for point in points], dtype=np.float64)
+        return ImageFeatures((centres + 0.5) * scale - 0.5, descriptors)
+
+    def match(self, current: ImageFeatures, desired: ImageFeatures) -> Matches:
+        """Match two images by their features."""
+        for name, features in (("current", current), ("desired", desired)):
+            if features.reason:
+                return Matches(_NOTHING, _NOTHING, f"the {name} image: {features.reason}")
+        a, b = current.descriptors, desired.descriptors
+        squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * (a @ b.T)
+        rows = np.arange(len(a))
+        best = squares.argmin(axis=1)
+        first = np.maximum(squares[rows, best], 0.0)
+        squares[rows, best] = np.inf
+        second = np.maximum(squares.min(axis=1), 1e-9)
+        squares[rows, best] = first
+        mutual = squares.argmin(axis=0)[best] == rows
+        ratio = np.sqrt(first / second)
+        good = np.flatnonzero(mutual & (ratio < self.distinct))
+        chosen = good[np.argsort(ratio[good], kind="stable")][: self.count]
+        if not len(chosen):
+            reason = "no feature of one image is recognised in the other"
+            return Matches(_NOTHING, _NOTHING, reason)
+        return Matches(current.points_px[chosen], desired.points_px[best[chosen]], "")
+
+
+def match_features(
+    image: ImageArray,
+    image_star: ImageArray,
+    count: int = 100,
+    *,
+    mask: BoolArray | None = None,
+    mask_star: BoolArray | None = None,
+) -> Matches:
+    """Match two images of the same thing by `Sift`, at their full size.
+
+    Args:
+        image: the current image, grey, (height, width).
+        image_star: the desired image, likewise.
+        count: how many matches at most.
+        mask: where the object may be in the current image, (height, width); anywhere if None.
+        mask_star: where it is in the desired image, likewise.
+
+    Raises:
+        ShapeError: if a mask has not the size of its image.
+    """
+    sift = Sift(count=count, features=2000, size=1.0)
+    return sift.match(sift.describe(image, mask), sift.describe(image_star, mask_star))
