@@ -5,7 +5,9 @@ from collections.abc import Callable, Sequence
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.parts import Parts
 from vergence.cell import Cell
+from vergence.cell.schema import FollowTable, ReachTable, Task
 from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder, Timeouts
+from vergence.runtime.arrival import Goal
 from vergence.runtime.driver import Driver
 from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
@@ -89,4 +91,11 @@ def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener], simulated: bo
         listeners=listeners,
         following=_SIMULATED if simulated else None,
         timeouts=Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s),
+        goal=_goal(cell.task),
     )
+
+
+def _goal(task: Task) -> Goal | None:
+    if isinstance(task, FollowTable):
+        return None
+    return Goal(task.tolerance_px, ends=isinstance(task, ReachTable))

@@ -101,7 +101,7 @@ def trial_result(
 def _ending(
     outcome: Outcome, errors: FloatArray, outside: BoolArray, tolerance_px: float
 ) -> Ending:
-    if outcome.kind is OutcomeKind.COMPLETED:
+    if outcome.succeeded or outcome.kind is OutcomeKind.NOT_REACHED:
         on_goal = len(errors) > 0 and errors[-1] <= tolerance_px
         return Ending.CONVERGED if on_goal else Ending.OFF_GOAL
     if outcome.kind is OutcomeKind.TARGET_LOST:

@@ -1,9 +1,10 @@
 """Rotations and rigid motions: exponentials, logarithms, their Jacobians, changes of frame.
 
-Every function is a numba kernel: it may be called from Python and from other kernels, takes
-float64 arrays and validates nothing.
+Every function but `flat_normal` is a numba kernel: it may be called from Python and from other
+kernels, takes float64 arrays and validates nothing.
 """
 
+from vergence.geometry.flat import flat_normal
 from vergence.geometry.quaternion import matrix_to_quaternion, quaternion_to_matrix
 from vergence.geometry.rpy import matrix_to_rpy, rpy_rates_to_omega, rpy_to_matrix
 from vergence.geometry.se3 import (
@@ -26,6 +27,7 @@ from vergence.geometry.so3 import (
 )
 
 __all__ = [
+    "flat_normal",
     "matrix_to_quaternion",
     "matrix_to_rpy",
     "nearest_rotation",

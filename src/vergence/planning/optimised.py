@@ -235,6 +235,9 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
     if outside.any():
         joint = problem.arm.names[int(outside.argmax())]
         return PlanFailure(Obstacle.START, f"{joint} starts at or beyond its limit")
+    if problem.sees_the_back:
+        reason = "the goal sees the object from behind; it is flat, and no path leads there in view"
+        return PlanFailure(Obstacle.VISIBILITY, reason, proved=True)
     start, goal = _end_margins_px(problem)
     if start <= 0.0:
         return PlanFailure(Obstacle.START, "points are out of view at the start")

@@ -60,6 +60,12 @@ class Path:
         inside = camera.contains(self.points_px.reshape(-1, 2), margin_px).reshape(-1, count)
         return np.asarray((inside & (self.depth_m > 0)).all(axis=1))
 
+    def in_front(self) -> BoolArray:
+        """Tell at which waypoints the camera is in front of every face of the object, (K,)."""
+        faces, eyes = self.problem.faces, self.T_world_camera[:, :3, 3]
+        outward = [(eyes - face[:3]) @ face[3:6] > 0.0 for face in faces]
+        return np.asarray(np.all([np.ones(len(eyes), dtype=np.bool_), *outward], axis=0))
+
     @property
     def joints_normalized(self) -> FloatArray:
         """Joint positions with their limits at -1 and 1, (K, n)."""

@@ -82,6 +82,8 @@ class PotentialFieldPlanner:
             )
         if not path.in_view().all():
             return PlanFailure(Obstacle.VISIBILITY, "points leave the image on the way")
+        if not path.in_front().all():
+            return PlanFailure(Obstacle.VISIBILITY, "the object is seen from behind on the way")
         return None
 
 

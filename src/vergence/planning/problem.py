@@ -8,8 +8,8 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.errors import InputError
-from vergence.geometry import se3_inverse, transform_points
-from vergence.planning.visibility import View, clearance_at, make_view
+from vergence.geometry import flat_normal, se3_inverse, transform_points
+from vergence.planning.visibility import NO_FACES, View, clearance_at, make_view
 from vergence.robot import Arm
 from vergence.vision.two_view import TwoView
 
@@ -25,6 +25,7 @@ class PlanningProblem:
     points_world: FloatArray  # (N, 3) what must stay in view, m
     margin_px: float = 10.0  # distance to keep from the border of the image
     margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
+    margin_face_deg: float = 1.0  # least angle between a line of sight and a face of the object
 
     def __post_init__(self) -> None:
         q = frozen(self.q_start, (self.arm.joint_count,), "q_start")
@@ -36,7 +37,7 @@ class PlanningProblem:
             raise InputError(
                 "PlanningProblem", "points_world", f"{len(points)} points", "one or more, finite"
             )
-        for name in ("margin_px", "margin_joint"):
+        for name in ("margin_px", "margin_joint", "margin_face_deg"):
             if not getattr(self, name) >= 0:
                 raise InputError("PlanningProblem", name, getattr(self, name), "zero or more")
 
@@ -89,10 +90,41 @@ class PlanningProblem:
         depths = transform_points(T_camera_world, self.points_world)[:, 2]
         return 0.2 * float(min(depths.min(), self.points_goal[:, 2].min()))
 
+    @property
+    def faces(self) -> FloatArray:
+        """The face of a flat object that start and goal see, (1, 7), as `View` has it.
+
+        Less of the margin is kept where one of them has less. Points that are not flat have no
+        face here, (0, 7); nor has an object whose one side the start sees, and the goal the other.
+        """
+        normal = flat_normal(self.points_world)
+        if normal is None:
+            return NO_FACES
+        sines = self._face_sines(normal)
+        if sines.min() < 0.0:
+            normal, sines = -normal, -sines
+        if sines.min() <= 0.0:
+            return NO_FACES
+        least = min(float(np.sin(np.radians(self.margin_face_deg))), 0.5 * float(sines.min()))
+        return np.concatenate((self.points_world.mean(axis=0), normal, [least]))[None]
+
+    @property
+    def sees_the_back(self) -> bool:
+        """Whether start and goal see a flat object from opposite sides."""
+        normal = flat_normal(self.points_world)
+        return normal is not None and float(np.prod(self._face_sines(normal))) < 0.0
+
+    def _face_sines(self, normal: FloatArray) -> FloatArray:
+        """Return the sines at which start and goal see the plane of flat points, (2,)."""
+        eyes = (self.arm.forward_kinematics(self.q_start)[:3, 3], self.T_world_goal[:3, 3])
+        middle = self.points_world.mean(axis=0)
+        return np.array([normal @ (eye - middle) / np.linalg.norm(eye - middle) for eye in eyes])
+
     def view(self, margin_px: float | None = None) -> View:
         """Return what the camera must see, with the problem's margin or another."""
         margin = self.margin_px if margin_px is None else margin_px
-        return make_view(self.camera, self.points_world, margin, max(self.depth_min, 1e-6))
+        depth = max(self.depth_min, 1e-6)
+        return make_view(self.camera, self.points_world, margin, depth, self.faces)
 
     def joint_range(self, q_goal: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the joint limits less the margin; less of it where start or goal have less."""
@@ -105,5 +137,5 @@ class PlanningProblem:
         return np.maximum(low, q_min), np.minimum(high, q_max)
 
     def clearance(self, q: FloatArray, margin_px: float | None = None) -> float:
-        """Return the sine of the least angle between a point and a side of the view at q (n,)."""
+        """Return the sine of the least angle to a side of the view or to a face at q (n,)."""
         return float(clearance_at(self.arm.chain, np.asarray(q), self.view(margin_px)))

@@ -41,7 +41,10 @@ def proves_no_path(problem: PlanningProblem, cells_max: int = 128, margin_px: fl
         return False
     low, high = arm.q_min[3:].copy(), arm.q_max[3:].copy()
     view = problem.view(margin_px)
-    view = view._replace(offsets=np.zeros(5))  # in front of the camera is all that is asked
+    # In front of the camera, and before the faces, is all that is asked.
+    faces = view.faces.copy()
+    faces[:, 6] = 0.0
+    view = view._replace(offsets=np.zeros(5), faces=faces)
     R_goal = problem.T_world_goal[:3, :3].copy()
     q_min, q_max = arm.q_min.copy(), arm.q_max.copy()
     cells, seen = 16, np.ones((16,) * len(low), dtype=np.bool_)
@@ -161,12 +164,14 @@ def cell_sees(
 
         side·X ≥ -Σ half_i |side·J_i| - τ²/2 · lever ‖side‖.
 
-    These sides and the box of the sliding joints are half-spaces g·x ≥ h of the sliding joints'
-    positions x; whether they meet is decided by `halfspaces_meet`.
+    A face is seen where o·(p(x) - c) ≥ 0; turning moves the camera by Σ δ_i J_i, and by at most
+    τ²/2 · lever more. These sides, the faces and the box of the sliding joints are half-spaces
+    g·x ≥ h of the sliding joints' positions x; whether they meet is decided by `halfspaces_meet`.
     """
     state = chain_state(chain, q)
     J = world_jacobian(chain, state, len(q))
-    G, h, side = np.zeros((11, 3)), np.empty(11), np.empty(3)
+    count = 11 + len(view.faces)
+    G, h, side = np.zeros((count, 3)), np.empty(count), np.empty(3)
     turn = half.sum()
     corner = _turned_corner(view, turn)
     if np.isinf(corner[0]):  # the cell is too wide to say anything
@@ -201,6 +206,14 @@ def cell_sees(
     for i in range(3):
         G[5 + 2 * i, i], G[6 + 2 * i, i] = 1.0, -1.0
         h[5 + 2 * i], h[6 + 2 * i] = q_min[i], -q_max[i]
+    for f in range(len(view.faces)):
+        row, outward = 11 + f, view.faces[f, 3:6]
+        h[row] = np.sum(outward * (view.faces[f, :3] - state.p)) - second * _lever(chain)
+        for j in range(len(half)):
+            h[row] -= half[j] * abs(np.sum(outward * J[:3, 3 + j]))
+        for i in range(3):
+            G[row, i] = np.sum(outward * state.axis[i])
+            h[row] += G[row, i] * q[i]
     return halfspaces_meet(G, h)
 
 

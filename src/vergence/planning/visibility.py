@@ -1,4 +1,8 @@
-"""What keeps points in a camera's view, as kernels: five half-spaces, their depth, their slopes."""
+"""What keeps points in a camera's view, as kernels: half-spaces and their slopes.
+
+Five half-spaces of the camera hold the points that it sees; one of each face of the object, in the
+world, holds the cameras that see its front.
+"""
 
 from typing import NamedTuple
 
@@ -16,14 +20,27 @@ class View(NamedTuple):
     A point X of the camera frame is seen where h_k = (a_k·X - b_k)/‖X‖ > 0 for every k. For the
     four sides, through the focal point, h is the sine of the angle to the side; it stays smooth
     where the pixel coordinates blow up and change sign. The fifth keeps a least depth.
+
+    A face with the point c and the outward normal o is seen from p where o·(p - c)/‖p - c‖, the
+    sine of the angle at which it is seen, is larger than a least sine.
     """
 
     normals: FloatArray  # (5, 3) a_k, unit
     offsets: FloatArray  # (5,) b_k, m
     points_world: FloatArray  # (N, 3) m
+    faces: FloatArray  # (F, 7) c in m, o, and the least sine
 
 
-def make_view(camera: Camera, points_world: FloatArray, margin_px: float, depth_min: float) -> View:
+NO_FACES = np.empty((0, 7))
+
+
+def make_view(
+    camera: Camera,
+    points_world: FloatArray,
+    margin_px: float,
+    depth_min: float,
+    faces: FloatArray = NO_FACES,
+) -> View:
     """Return the view of a camera that keeps a margin in pixels and a least depth in metres."""
     x_min, x_max, y_min, y_max = camera.rectangle(margin_px)
     sides = np.array([[1, 0, -x_min], [-1, 0, x_max], [0, 1, -y_min], [0, -1, y_max], [0, 0, 1.0]])
@@ -31,6 +48,7 @@ def make_view(camera: Camera, points_world: FloatArray, margin_px: float, depth_
         sides / np.linalg.norm(sides, axis=1, keepdims=True),
         np.array([0.0, 0.0, 0.0, 0.0, depth_min]),
         np.array(points_world, dtype=np.float64),
+        np.array(faces, dtype=np.float64),
     )
 
 
@@ -53,10 +71,26 @@ def view_clearances(R: FloatArray, p: FloatArray, view: View) -> FloatArray:
 
 
 @njit(cache=True)
+def face_clearances(p: FloatArray, faces: FloatArray) -> FloatArray:
+    """Return the sine at which each face is seen from p (3,), less its least one, (F,)."""
+    h = np.empty(len(faces))
+    for f in range(len(faces)):
+        along, norm = 0.0, 1e-24
+        for i in range(3):
+            d = p[i] - faces[f, i]
+            along += faces[f, 3 + i] * d
+            norm += d * d
+        h[f] = along / np.sqrt(norm) - faces[f, 6]
+    return h
+
+
+@njit(cache=True)
 def clearance_at(chain: Chain, q: FloatArray, view: View) -> float:
-    """Return the smallest h over all points and sides at joint positions q."""
+    """Return the smallest h over all points, sides and faces at joint positions q."""
     state = chain_state(chain, q)
     least: float = view_clearances(state.R, state.p, view).min()
+    if len(view.faces):
+        least = min(least, face_clearances(state.p, view.faces).min())
     return least
 
 
@@ -77,10 +111,12 @@ def add_visibility_penalty(
     """
     state = chain_state(chain, q)
     h = view_clearances(state.R, state.p, view)
-    if h.min() >= margin:
+    seen = face_clearances(state.p, view.faces)
+    if h.min() >= margin and (len(seen) == 0 or seen.min() >= margin):
         return 0.0
     J = world_jacobian(chain, state, len(q))
-    n, cost = len(q), 0.0
+    n = len(q)
+    cost = _add_face_penalty(state.p, J, view.faces, seen, margin, weight, gradient, hessian)
     slope, c, d = np.empty(n), np.empty(3), np.empty(3)
     for j in range(len(h)):
         for i in range(3):
@@ -106,4 +142,39 @@ def add_visibility_penalty(
                 gradient[i] -= weight * short * slope[i]
                 for r in range(n):
                     hessian[i, r] += weight * slope[i] * slope[r]
+    return cost
+
+
+@njit(cache=True)
+def _add_face_penalty(
+    p: FloatArray,
+    J: FloatArray,
+    faces: FloatArray,
+    h: FloatArray,
+    margin: float,
+    weight: float,
+    gradient: FloatArray,
+    hessian: FloatArray,
+) -> float:
+    """Return the penalty of the faces, likewise: with d = p - c, ∂h/∂p = (o - (o·d̂) d̂)/‖d‖."""
+    n, cost = len(gradient), 0.0
+    slope, d = np.empty(n), np.empty(3)
+    for f in range(len(faces)):
+        short = margin - h[f]
+        if short <= 0.0:
+            continue
+        for i in range(3):
+            d[i] = p[i] - faces[f, i]
+        norm = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2) + 1e-12
+        sine = h[f] + faces[f, 6]
+        slope[:] = 0.0
+        for i in range(3):
+            c = (faces[f, 3 + i] - sine * d[i] / norm) / norm
+            for r in range(n):
+                slope[r] += c * J[i, r]
+        cost += 0.5 * weight * short * short
+        for i in range(n):
+            gradient[i] -= weight * short * slope[i]
+            for r in range(n):
+                hessian[i, r] += weight * slope[i] * slope[r]
     return cost

@@ -25,6 +25,19 @@ def completed(duration_s: float, time: float) -> Outcome:
     return Outcome(OutcomeKind.COMPLETED, reason, time)
 
 
+def reached(error_px: float, time: float) -> Outcome:
+    """Return the end of a run that is at its goal."""
+    return Outcome(OutcomeKind.REACHED, f"{error_px:.2g} px from the goal", time)
+
+
+def not_reached(error_px: float, why: str, time: float) -> Outcome:
+    """Return the end of a run away from its goal."""
+    where = (
+        "the features are not found" if error_px != error_px else f"{error_px:.3g} px from the goal"
+    )
+    return Outcome(OutcomeKind.NOT_REACHED, f"{where}: {why}", time)
+
+
 def image_late(waited_s: float, time: float) -> Outcome:
     """Return the end of a run without images."""
     return Outcome(OutcomeKind.IMAGE_LATE, f"no picture for {waited_s:.2f} s", time)

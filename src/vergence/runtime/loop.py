@@ -10,6 +10,7 @@ from vergence.arrays import FloatArray
 from vergence.control import InnerLaw, Law
 from vergence.errors import DriverSilent
 from vergence.runtime import endings
+from vergence.runtime.arrival import Arrival, Goal
 from vergence.runtime.border import Border
 from vergence.runtime.driver import Driver
 from vergence.runtime.endings import Fault
@@ -48,6 +49,7 @@ class Loop:
         listeners: hear of every turn and event.
         timeouts: how long to hold before the run ends.
         following: how far the arm may be from its set-points.
+        goal: when the task counts as reached, and whether it ends there.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Loop:
         listeners: Sequence[Listener] = (),
         timeouts: Timeouts | None = None,
         following: FollowingBound | None = None,
+        goal: Goal | None = None,
     ) -> None:
         self._driver, self._arm = driver, arm
         self._perception, self._planner, self._law = perception, planner, law
@@ -72,6 +75,8 @@ class Loop:
         self._border = Border(driver, lambda: not self._moving, age_s)
         self._listeners = Listeners(listeners)
         self._losses = LossReports(self._listeners)
+        self._arrival = Arrival(goal or Goal(), driver.arms[arm].rate_max)
+        self._stalled = False  # as it was told last
         self._interrupt = Interrupt()
         self._part = "driver"  # the one at work, to be named if it raises
         self._inner_law = law if isinstance(law, InnerLaw) else None
@@ -207,6 +212,8 @@ class Loop:
             return Outcome(*fault, time)
         self._command = command
         self._record(sample, observation, reference)
+        self._arrival.observe(observation, reference, command, sample.joints[self._arm].position)
+        self._tell_of_stall(time)
         return None if command.fault is None else Outcome(*command.fault, time)
 
     def _step(self, sample: Sample) -> Outcome | None:
@@ -260,6 +267,13 @@ class Loop:
             reason = holding.reason if holding else f"{self._arm} follows again"
             self._listeners.event(time, kind or "following", reason)
 
+    def _tell_of_stall(self, time: float) -> None:
+        stalled = self._arrival.stalled
+        if stalled != self._stalled:
+            self._stalled = stalled
+            text = f"held by {self._arrival.holder()}" if stalled else "the arm moves again"
+            self._listeners.event(time, "stalled" if stalled else "moving", text)
+
     def _record(
         self, sample: Sample, observation: Observation | None, reference: Reference
     ) -> None:
@@ -282,7 +296,7 @@ class Loop:
         holding = self._followers[self._arm].holding
         if holding is not None:
             return Outcome(*holding, time)
-        return endings.completed(duration_s, time)
+        return self._arrival.outcome(duration_s, time)
 
     def _stopped(self) -> Outcome:
         return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)

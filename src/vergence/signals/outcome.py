@@ -7,7 +7,9 @@ from enum import StrEnum
 class OutcomeKind(StrEnum):
     """The names of the ways a run can end."""
 
-    COMPLETED = "completed"
+    COMPLETED = "completed"  # a task without an end, whose time is over
+    REACHED = "reached"  # a task with an end, at its goal
+    NOT_REACHED = "not reached"  # at rest away from the goal, or out of time
     TARGET_LOST = "target lost"
     JOINT_LIMIT = "joint limit"
     SINGULARITY = "singularity"
@@ -36,7 +38,7 @@ class Outcome:
     @property
     def succeeded(self) -> bool:
         """Whether the task was done to its end."""
-        return self.kind is OutcomeKind.COMPLETED
+        return self.kind in (OutcomeKind.COMPLETED, OutcomeKind.REACHED)
 
     def __str__(self) -> str:
         """Kind, time and reason on one line."""

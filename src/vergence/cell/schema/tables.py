@@ -155,6 +155,7 @@ class TrackTable(Table):
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
     tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
+    tolerance_px: Pixels = 1.0  # mean error above which an arm at rest has not reached its goal
     image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
     target_timeout_s: Duration = 0.2  # with images, but none of the features found
 
@@ -183,6 +184,7 @@ class ReachTable(Table):
     margin_px: Pixels = 10.0  # kept from the border of the image
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
     camera_speed_m_s: Speed = 0.25  # on the way
+    tolerance_px: Pixels = 1.0  # mean error of the farthest feature up to which it is reached
     image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
     target_timeout_s: Duration = 0.5  # with images, but the target lost
 

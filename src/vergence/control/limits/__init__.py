@@ -3,9 +3,12 @@
 from vergence.control.limits._rows import (
     KIND_NAMES,
     RELAXED,
+    SINGULARITY,
+    VIEW,
     ConstraintSettings,
     pack_features,
 )
+from vergence.control.limits.facing import facing_row
 from vergence.control.limits.limits import Limit, Limits
 from vergence.control.limits.occlusion import AXES, COLUMNS, HALF, MIDDLE, NO_SOLIDS, RADIUS
 from vergence.control.limits.target_view import TargetView
@@ -22,6 +25,9 @@ __all__ = [
     "NO_SOLIDS",
     "RADIUS",
     "RELAXED",
+    "SINGULARITY",
     "TargetView",
+    "VIEW",
+    "facing_row",
     "pack_features",
 ]

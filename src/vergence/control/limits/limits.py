@@ -46,8 +46,13 @@ class Limits:
     joint_margin: float | None = knob(
         None, least=0, below=0.5
     )  # of a range: 0.03, or half a plan's
+    facing_deg: float = knob(
+        1.0, "degrees", least=0, below=90
+    )  # least angle at which a flat target is seen; a part of "view"
     clearance_m: float = knob(0.02, "m", least=0, upto=10)  # between sight lines and obstacles
-    manipulability_share: float = knob(0.2, least=0, below=1)  # of √det(J Jᵀ) at the start
+    manipulability_share: float = knob(
+        0.2, least=0, below=1
+    )  # of √det(J Jᵀ) at the start; yields where it alone holds the arm at rest
     approach_rate_hz: float = knob(2.0, "1/s", above=0, upto=1e3)  # of the room left to a border
     depth_range: tuple[_Share, _Factor] | None = knob(None)  # bounds on true over believed depth
     own: tuple[Limit, ...] = slot("limit", (), many=True)  # a user's own, relaxed before all others

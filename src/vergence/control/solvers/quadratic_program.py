@@ -6,11 +6,15 @@ from vergence.arrays import FloatArray, IntArray
 from vergence.control.limits import (
     KIND_NAMES,
     NO_SOLIDS,
+    SINGULARITY,
+    VIEW,
     ConstraintSettings,
     Limits,
+    facing_row,
 )
 from vergence.control.solvers._constrained_rates import (
     Avoidance,
+    ConstrainedRates,
     Scene,
     Task,
     constrained_rates,
@@ -22,6 +26,9 @@ from vergence.robot import manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.03
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
+_REST = 1e-3  # share of the rate limits up to which an arm is at rest
+_STALL_S = 0.5  # at rest, before the limit on manipulability yields
+_YIELD_RATE = 2.0  # 1/s, at which it does
 
 
 @part("solver", "quadratic_program")
@@ -69,7 +76,8 @@ class BoundProgram:
         self._obstacles = setting.obstacles if sees else None
         T = setting.mounting.T_tip_camera
         self._T_tip_camera = np.eye(4) if T is None else np.array(T)
-        self._no_rows = np.empty((0, arm.joint_count)), np.empty(0), np.empty(0, dtype=np.int64)
+        self._least_sine = float(np.sin(np.radians(self._limits.facing_deg)))
+        self._rested_s = 0.0  # at rest, with the limit on manipulability pushing
         self._started = self._starts_at(setting.start)
 
     def solve(self, problem: Problem) -> Solution:
@@ -78,7 +86,7 @@ class BoundProgram:
             self._started = self._starts_at(problem.q)
         obstacles = NO_SOLIDS if self._obstacles is None else self._obstacles()
         scene = Scene(
-            problem.features, obstacles, problem.A, self._T_tip_camera, *self._own_rows(problem)
+            problem.features, obstacles, problem.A, self._T_tip_camera, *self._further_rows(problem)
         )
         answer = constrained_rates(
             self._setting.arm.chain,
@@ -92,7 +100,23 @@ class BoundProgram:
             self.settings,
             self._avoidance,
         )  # fmt: skip
+        self._yield_at_rest(answer)
         return Solution(*answer)
+
+    def _yield_at_rest(self, answer: ConstrainedRates) -> None:
+        """Lower the manipulability to keep while it alone holds the arm at rest.
+
+        Joint rates are limited near a singularity as anywhere, so a run is not to end there.
+        """
+        period = self._setting.period_s
+        rests = (np.abs(answer.rates) <= _REST * self._setting.arm.rate_max).all()
+        relaxed = np.flatnonzero(self.settings.priority[: len(KIND_NAMES)])  # not the hard limits
+        alone = (answer.active[relaxed] > 0.0).sum() == 1
+        held = answer.solved and alone and answer.active[SINGULARITY] > 0.0
+        self._rested_s = self._rested_s + period if rests and held else 0.0
+        if self._rested_s > _STALL_S:
+            least = self.settings.manipulability_min * np.exp(-_YIELD_RATE * period)
+            self.settings = self.settings._replace(manipulability_min=float(least))
 
     def _starts_at(self, q: FloatArray | None) -> bool:
         """Take the manipulability to keep from a configuration, if it is known."""
@@ -104,15 +128,24 @@ class BoundProgram:
         self.settings = self.settings._replace(manipulability_min=least)
         return True
 
-    def _own_rows(self, problem: Problem) -> tuple[FloatArray, FloatArray, IntArray]:
-        if not self._limits.own:
-            return self._no_rows
-        arm, period = self._setting.arm, self._setting.period_s
-        found = [limit.rows(arm, problem.q, problem.velocity, period) for limit in self._limits.own]
-        C = np.ascontiguousarray(np.vstack([rows for rows, _ in found]), dtype=np.float64)
-        d = np.concatenate([np.asarray(right, dtype=np.float64) for _, right in found])
-        kind = np.repeat(len(KIND_NAMES) + np.arange(len(found)), [len(r) for _, r in found])
+    def _further_rows(self, problem: Problem) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the rows C (r, n), d (r,) and kinds (r,) of a flat target and a user's limits."""
+        arm, period, limits = self._setting.arm, self._setting.period_s, self._limits
+        rows = [(*self._facing(problem), VIEW)]
+        for k, limit in enumerate(limits.own, start=len(KIND_NAMES)):
+            rows.append((*limit.rows(arm, problem.q, problem.velocity, period), k))
+        C = np.ascontiguousarray(np.vstack([row[0] for row in rows]), dtype=np.float64)
+        d = np.concatenate([np.asarray(row[1], dtype=np.float64) for row in rows])
+        kind = np.repeat([row[2] for row in rows], [len(row[1]) for row in rows])
         return C, d, kind
+
+    def _facing(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
+        features = problem.features if "view" in self._limits.order else problem.features[:0]
+        J = self._setting.arm.jacobian(problem.q)
+        J_camera = problem.A @ J if len(problem.A) else J
+        rate = self._limits.approach_rate_hz
+        row: tuple[FloatArray, FloatArray] = facing_row(features, J_camera, self._least_sine, rate)
+        return row
 
 
 def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:

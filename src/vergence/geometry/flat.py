@@ -1,0 +1,21 @@
+"""Flat sets of points: the plane they lie in, and the side that a camera sees."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+
+_FLAT = 0.01  # of the smaller extent: points as close as this to a plane are flat
+
+
+def flat_normal(points: FloatArray) -> FloatArray | None:
+    """Return the unit normal (3,) of the plane that points (N, 3) lie in.
+
+    Returns:
+        None if they do not: they are not flat, lie on a line, or are fewer than three.
+    """
+    if len(points) < 3:
+        return None
+    _, extent, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if extent[1] <= 1e-6 * extent[0] or extent[2] > _FLAT * extent[1]:
+        return None
+    return np.array(axes[2])

@@ -1,0 +1,130 @@
+"""Whether a run gets to its goal, or comes to rest before it, and what holds it there."""
+
+from collections import Counter, deque
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.runtime import endings
+from vergence.signals import ImagePoints, JointCommand, Observation, Outcome, Reference
+
+_WINDOW_S = 1.0  # over which errors are averaged and rest is judged
+_REST = 1e-3  # share of the rate limits up to which an arm is at rest
+_DESIRED_MOVED_PX = 0.1  # in a window, up to which the desired features are at rest
+
+
+class Goal(NamedTuple):
+    """When a task counts as reached.
+
+    Attributes:
+        tolerance_px: distance of the farthest feature from its goal, averaged over a second.
+        ends: whether the task ends at its goal; else it goes on until its time is over.
+    """
+
+    tolerance_px: float = 1.0
+    ends: bool = False
+
+
+class _Row(NamedTuple):
+    """One image."""
+
+    time: float  # s
+    error_px: FloatArray  # (M, 2) measured less desired; NaN where not found
+    desired_px: FloatArray  # (M, 2)
+    q: FloatArray  # (n,)
+    active: tuple[str, ...]
+
+
+class Arrival:
+    """Watches the error and the joints of a run.
+
+    A run is stalled where arm and desired features have been at rest for a second, and the mean
+    error is above the tolerance. A target that moves keeps the arm moving: no stall.
+
+    Args:
+        goal: of the task.
+        rate_max: of the joints, (n,).
+    """
+
+    def __init__(self, goal: Goal, rate_max: FloatArray) -> None:
+        self._goal, self._rate_max = goal, rate_max
+        self._rows: deque[_Row] = deque()
+
+    def observe(
+        self, observation: Observation, reference: Reference, command: JointCommand, q: FloatArray
+    ) -> None:
+        """Take in what an image showed and what the law made of it, at joint positions q (n,)."""
+        if reference.points_px is None or not observation.views:
+            return
+        view: ImagePoints = observation.views[-1]
+        if view.points_px.shape != reference.points_px.shape:
+            return
+        error = np.where(view.found[:, None], view.points_px - reference.points_px, np.nan)
+        self._rows.append(_Row(view.time, error, reference.points_px, q.copy(), command.active))
+        while self._rows[0].time < view.time - _WINDOW_S:
+            self._rows.popleft()
+
+    @property
+    def error_px(self) -> float:
+        """Mean distance of the farthest feature from its goal; NaN before any is known."""
+        if not self._rows:
+            return float("nan")
+        errors = np.array([row.error_px for row in self._rows])
+        known = np.isfinite(errors).all(axis=2)
+        counts = known.sum(axis=0)
+        total = np.where(known[:, :, None], errors, 0.0).sum(axis=0)
+        if not counts.any():
+            return float("nan")
+        return float(np.linalg.norm(total[counts > 0] / counts[counts > 0, None], axis=1).max())
+
+    @property
+    def reached(self) -> bool:
+        """Whether the mean error is within the tolerance."""
+        return self.error_px <= self._goal.tolerance_px
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the arm is at rest away from its goal."""
+        return self._rests() and self.error_px > self._goal.tolerance_px
+
+    def holder(self) -> str:
+        """Say what holds a run that is stalled."""
+        counts = Counter(name for row in self._rows for name in row.active)
+        held = [name for name, count in counts.items() if 2 * count > len(self._rows)]
+        if _mirrored(self._rows[-1]):
+            held.append("a goal that shows the mirror image of the features seen")
+        return " and ".join(held) or "a local minimum of the law; no limit is active"
+
+    def outcome(self, duration_s: float, time: float) -> Outcome:
+        """Return how a run ends whose time is over."""
+        if self.stalled:
+            return endings.not_reached(self.error_px, f"held by {self.holder()}", time)
+        if not self._goal.ends:
+            return endings.completed(duration_s, time)
+        if self.reached:
+            return endings.reached(self.error_px, time)
+        return endings.not_reached(self.error_px, "its time is over", time)
+
+    def _rests(self) -> bool:
+        if not self._rows or self._rows[-1].time - self._rows[0].time < 0.9 * _WINDOW_S:
+            return False
+        first, last = self._rows[0], self._rows[-1]
+        positions = np.array([row.q for row in self._rows])
+        moved = np.ptp(positions, axis=0) / (self._rate_max * _WINDOW_S)
+        desired = np.abs(last.desired_px - first.desired_px).max(initial=0.0)
+        return bool(moved.max() < _REST and desired < _DESIRED_MOVED_PX)
+
+
+def _mirrored(row: _Row) -> bool:
+    """Tell whether the best affine map from the features seen to those desired mirrors them."""
+    seen = np.isfinite(row.error_px).all(axis=1)
+    if seen.sum() < 3:
+        return False
+    desired = row.desired_px[seen]
+    now = desired + row.error_px[seen]
+    now, desired = now - now.mean(axis=0), desired - desired.mean(axis=0)
+    scatter = now.T @ now
+    if np.linalg.det(scatter) < 1e-6 * np.trace(scatter) ** 2:
+        return False
+    return bool(np.linalg.det(np.linalg.solve(scatter, now.T @ desired)) < 0.0)
