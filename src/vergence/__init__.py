@@ -31,7 +31,7 @@ _ROOMS = {
     "estimation": ("CornerView", "fit_pose"),
     "experiments": ("Comparison", "compare"),
     "features": ("Feature", "Points"),
-    "parts": ("Positive", "feature", "knob", "limit", "objective"),
+    "parts": ("Positive", "feature", "knob", "limit", "objective", "part"),
     "robot": ("Arm",),
     "runtime": ("Driver", "Listener", "Loop", "Recorder", "Recording", "Run", "RunRecorder"),
     "signals": (

@@ -41,6 +41,7 @@ from vergence.parts import feature as feature
 from vergence.parts import knob as knob
 from vergence.parts import limit as limit
 from vergence.parts import objective as objective
+from vergence.parts import part as part
 from vergence.robot import Arm as Arm
 from vergence.runtime import Driver as Driver
 from vergence.runtime import Listener as Listener

@@ -1,11 +1,12 @@
 """From a table of a cell file to the part that it describes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vergence.errors import InputError
-from vergence.parts import Slot, field_names, is_part, slots_of
+from vergence.errors import InputError, VergenceError
+from vergence.parts import Slot, field_names, is_part, kind_of, slots_of
 from vergence.registry import find, kinds
 
 
@@ -21,14 +22,15 @@ class Place(NamedTuple):
         return self._replace(key=f"{self.key}.{key}" if self.key else key)
 
 
-def load_part(role: str, given: Any, place: Place) -> Any:
+def load_part(role: str, given: Any, place: Place, usual: str = "") -> Any:
     """Return the part that a table describes; a bare name stands for a table of that kind.
 
     Args:
         role: what it is for.
         given: a table with its kind, a name, or a part; the kind may be left out
-            where the role has just one.
+            where the role has just one, or a usual one.
         place: where it stands.
+        usual: the kind of a table that names none.
 
     Raises:
         InputError: that names file and key, what was given and what is allowed.
@@ -38,14 +40,32 @@ def load_part(role: str, given: Any, place: Place) -> Any:
     table = {"kind": given} if isinstance(given, str) else given
     if not isinstance(table, Mapping):
         raise InputError(place.source, place.key, given, "a table with a kind, or a kind's name")
-    if "kind" not in table and len(only := kinds(role)) == 1:
-        table = {**table, "kind": only[0]}
+    if "kind" not in table and (usual or len(kinds(role)) == 1):
+        table = {"kind": usual or kinds(role)[0], **table}
     if "kind" not in table:
         raise InputError(
             place.source, f"{place.key}.kind", "nothing", "a value; this key is required"
         )
     rest = {key: value for key, value in table.items() if key != "kind"}
     return make_part(part_class(role, table["kind"], place), rest, place)
+
+
+@contextmanager
+def asking(part: Any, source: str, key: str) -> Iterator[None]:
+    """Turn whatever a part raises while it is asked for something into an `InputError`.
+
+    Args:
+        part: that is asked before anything moves.
+        source: the file that names it.
+        key: where in it.
+    """
+    try:
+        yield
+    except VergenceError:
+        raise
+    except Exception as error:
+        given = f"{kind_of(part)}, which raised {type(error).__name__}: {error}"
+        raise InputError(source, key, given, "a part that works in this cell") from error
 
 
 def part_class(role: str, kind: Any, place: Place) -> Any:

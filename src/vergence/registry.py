@@ -18,6 +18,7 @@ ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.cent
 
 _CONTROL = "vergence.control"
 _MOTIONS = "vergence.simulation.motions"
+_PLANNING, _ESTIMATION, _VISION = "vergence.planning", "vergence.estimation", "vergence.vision"
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "feature": {"points": "vergence.features:Points"},
     "objective": {
@@ -29,7 +30,13 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     },
     "limit": {},
     "driver": {},
-    "matcher": {"sift": "vergence.vision.matching:Sift"},
+    "matcher": {"sift": f"{_VISION}.matching:Sift"},
+    "planner": {
+        "optimised": f"{_PLANNING}:OptimisedPlanner",
+        "potential_field": f"{_PLANNING}:PotentialFieldPlanner",
+    },
+    "filter": {"pose": f"{_ESTIMATION}:PoseFilter", "rpy": f"{_ESTIMATION}:RpyPoseFilter"},
+    "tracker": {"ssd": f"{_VISION}:SsdTracking", "round_marks": f"{_VISION}.marks:MarkTracking"},
     "motion": {
         "stationary": f"{_MOTIONS}:Stationary",
         "line": f"{_MOTIONS}:Line",
@@ -54,6 +61,9 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "objective": ("quadratic",),
     "limit": ("rows",),
     "motion": ("poses",),
+    "planner": ("plan",),
+    "filter": ("start", "predict", "update"),
+    "tracker": ("start",),
     "driver": ("read", "step", "close"),
     "matcher": ("describe", "match"),
 }
@@ -72,7 +82,7 @@ def find(
     Args:
         role: what it is for.
         kind: its name, or ``module:Class`` for one of a user's own: in a file beside the cell or
-            in an installed package.
+            in the current folder, or in an installed package.
         folder: where the cell lies.
         source: the file that names it, for messages.
         key: where in that file.
@@ -90,7 +100,7 @@ def find(
         return InputError(source, key, f"{kind}, {why}", f"a class declared as {role}")
 
     try:
-        module = _own_module(name, folder) or importlib.import_module(name)
+        module = _own_module(name, folder, Path.cwd()) or importlib.import_module(name)
     except ImportError as error:
         raise refuse(f"which cannot be imported ({error})") from None
     except Exception as error:
@@ -122,15 +132,15 @@ def _installed(role: str) -> dict[str, str]:
     }
 
 
-def _own_module(name: str, folder: Path | None) -> Any:
-    """Return the module in a file beside the cell, None if there is none.
+def _own_module(name: str, *folders: Path | None) -> Any:
+    """Return the module in a file of the first folder that has one, None if none has.
 
     It is kept under a name of its own, so that two cells may each have their ``mine.py``.
     """
-    if folder is None:
-        return None
-    file = folder.joinpath(*name.split(".")).with_suffix(".py")
-    if not file.is_file():
+    relative = Path(*name.split(".")).with_suffix(".py")
+    files = (folder / relative for folder in folders if folder is not None)
+    file = next(filter(Path.is_file, files), None)
+    if file is None:
         return None
     text = file.read_bytes()
     label = f"vergence_beside_{sha256(str(file.resolve()).encode() + text).hexdigest()[:16]}_{name}"

@@ -142,4 +142,4 @@ def test_covariance_given_along_world_axes_comes_back():
 
 def test_bad_settings_are_refused():
     with pytest.raises(InputError, match="frame_period"):
-        RpyPoseFilter(frame_period=0.0)
+        RpyPoseFilter(frame_period_s=0.0)

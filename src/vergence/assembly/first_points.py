@@ -4,6 +4,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.own_parts import started_tracker
 from vergence.assembly.started_driver import StartedDriver
 from vergence.cell.schema import TrackTable
 from vergence.errors import InputError
@@ -38,8 +39,6 @@ def first_points(
         raise InputError(str(context.cell.path), key, given, "a camera that sees at the start")
     if not images:
         return _exact_points(context, key, camera, frame)
-    from vergence.vision import SsdTracker
-
     assert frame.image is not None
     points_px = _given_points(context, camera)
     if points_px is None and _are_known(context, camera):
@@ -48,7 +47,9 @@ def first_points(
         points_px = _pick(context, camera, frame.image)
     if not _are_known(context, camera) and isinstance(driver.driver, SimulatedDriver):
         driver.driver.anchor(camera, points_px)  # so that reports know where they truly are
-    return points_px, TrackedPoints(camera, SsdTracker(frame.image, points_px))
+    assert isinstance(context.cell.task, TrackTable)
+    tracker = started_tracker(context, context.cell.task.tracker, frame.image, points_px)
+    return points_px, TrackedPoints(camera, tracker, len(points_px))
 
 
 def _exact_points(

@@ -20,15 +20,14 @@ from vergence.estimation import (
     Joints,
     Measure,
     PerceptionSettings,
-    PoseFilter,
     PosePerception,
-    RpyPoseFilter,
     TargetFilter,
     TargetShape,
     blocked_from_hand,
     seen_from_hand,
 )
 from vergence.geometry import se3_compose, se3_inverse
+from vergence.loading import asking
 from vergence.robot import forward_kinematics
 from vergence.signals import Frame, Observation
 from vergence.simulation import ExactCorners
@@ -89,8 +88,9 @@ def follow_pose(
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
     shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
-    target_filter = _filter(cell)
-    start = target_filter.start(begin, surroundings.start, covariance=_start_covariance(cell))
+    target_filter: TargetFilter[Any] = table.filter
+    with asking(target_filter, str(cell.path), "perception.filter"):
+        start = target_filter.start(begin, surroundings.start, covariance=_start_covariance(cell))
     perception = PosePerception(
         rig,
         shape,
@@ -118,18 +118,6 @@ def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
     return measure
-
-
-def _filter(cell: Cell) -> TargetFilter[Any]:
-    table = cell.perception
-    if table.filter == "rpy":
-        period = 1.0 / max(cell.cameras[name].rate_hz for name in cell.watched)
-        # The paper has no gate, and one wrong corner then throws its filter off the target.
-        return RpyPoseFilter(frame_period=period, gate=PoseFilter().gate)
-    return PoseFilter(
-        acceleration_density=table.acceleration_density,
-        angular_acceleration_density=table.angular_acceleration_density,
-    )
 
 
 class Surroundings(NamedTuple):

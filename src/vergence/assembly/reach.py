@@ -8,6 +8,7 @@ import numpy as np
 from vergence.arrays import FloatArray, IntArray
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.own_parts import planned_path, started_tracker
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.camera.image_file import read_image_file
@@ -17,16 +18,13 @@ from vergence.errors import InputError
 from vergence.estimation import TrackedPoints
 from vergence.geometry import transform_points
 from vergence.planning.failure import Obstacle, PlanFailure
-from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
-from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.trajectory import Trajectory
 from vergence.runtime.stages import Perception
 from vergence.signals import Frame, ImagePoints, Outcome, OutcomeKind
 from vergence.simulation import ExactPoints, SimulatedDriver
 from vergence.vision.image import grey_image
-from vergence.vision.marks import MarkTracker
 from vergence.vision.two_view import TwoView, TwoViewFailure, estimate_two_view
 
 SETTLE_S = 2.0  # at the goal
@@ -80,9 +78,7 @@ def plan_reach(
         margin_px=task.margin_px,
         margin_joint=task.margin_joint,
     )
-    if task.planner == "optimised":
-        return OptimisedPlanner().plan(problem)
-    return PotentialFieldPlanner().plan(problem)
+    return planned_path(context, task.planner, problem)
 
 
 def measure_twice(
@@ -111,16 +107,18 @@ def measure_twice(
             return _unseen(task.camera, int(unseen[0]), where, "out of sight")
     assert now.image is not None
     assert then.image is not None
-    tracker = MarkTracker(now.image, expected[_START])
+    tracker = started_tracker(context, task.tracker, now.image, expected[_START])
     seen = tracker.track(now.image)
-    desired = MarkTracker(then.image, expected[_GOAL]).track(then.image)
+    desired = started_tracker(context, task.tracker, then.image, expected[_GOAL]).track(then.image)
     for where, tracks in ((_START, seen), (_GOAL, desired)):
         if not tracks:
             mark = int(np.flatnonzero(~tracks.found)[0])
             return _unseen(task.camera, mark, where, tracks.reasons[mark])
         if (same := _seen_twice(tracks.points_px)) is not None:
             return _unseen(task.camera, same, where, "its place is that of another mark")
-    return TwoImages(seen.points_px, desired.points_px, TrackedPoints(task.camera, tracker))
+    return TwoImages(
+        seen.points_px, desired.points_px, TrackedPoints(task.camera, tracker, len(seen.points_px))
+    )
 
 
 def _exact_pair(

@@ -133,6 +133,8 @@ def _with(values: Any, keys: list[str], value: Any) -> Any:
         changed[int(key)] = _with(values[int(key)], deeper, value) if deeper else value
         return changed
     table = dict(values) if isinstance(values, Mapping) else {}
+    if isinstance(values, str):  # the name of a part stands for its table
+        table = {"kind": values}
     if deeper:
         table[key] = _with(table.get(key), deeper, value)
     elif value is None:
@@ -174,19 +176,27 @@ def _with_parts(cell: Cell) -> Cell:
             raise InputError(str(cell.path), key, table, "a table")
         return settings.from_table(table, place.at(key))
 
-    def moved(table: Any, role: str, key: str) -> Any:
-        motion = load_part(role, table.motion, place.at(f"{key}.motion"))
-        return table.model_copy(update={"motion": motion})
+    def filled(table: Table, at: str, **roles: str) -> Table:
+        """Return a table with the parts that stand at some of its keys, each of its role."""
+        update = {}
+        for key, role in roles.items():
+            given, usual = getattr(table, key), type(table).model_fields[key].default
+            if given is not None:
+                update[key] = load_part(role, given, place.at(f"{at}.{key}"), usual or "")
+        return table.model_copy(update=update)
 
-    arms = {
-        name: arm if arm.motion is None else moved(arm, "arm_motion", f"arms.{name}")
-        for name, arm in cell.arms.items()
-    }
+    roles = {"tracker": "tracker", "planner": "planner"}
+    of_task = {key: role for key, role in roles.items() if hasattr(cell.task, key)}
     update = {
         "law": law("law", cell.law),
         "laws": {name: law(f"laws.{name}", table) for name, table in cell.laws.items()},
-        "target": moved(cell.target, "motion", "target"),
-        "arms": arms,
+        "target": filled(cell.target, "target", motion="motion"),
+        "arms": {
+            name: filled(arm, f"arms.{name}", motion="arm_motion")
+            for name, arm in cell.arms.items()
+        },
+        "task": filled(cell.task, "task", **of_task),
+        "perception": filled(cell.perception, "perception", filter="filter"),
     }
     return cell.model_copy(update=update)
 

@@ -1,13 +1,12 @@
 """The default filter of the target's pose: an error-state Kalman filter on SE(3)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, frozen
-from vergence.errors import InputError
 from vergence.estimation.belief import Belief
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
@@ -21,6 +20,7 @@ from vergence.estimation.target_filter import (
     unused,
 )
 from vergence.estimation.view import Seen
+from vergence.parts import knob, part
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
 CONSENSUS = 5  # points that must agree to overrule the prediction: any three agree on some pose
@@ -107,7 +107,7 @@ def predict_and_correct(
     return correct(pose, velocity, predicted, poses, points, measured, covariance, gate)
 
 
-@dataclass(frozen=True, slots=True)
+@part("filter", "pose")
 class PoseFilter:
     """Pose and velocity of a rigid target from any number of cameras, fixed or carried.
 
@@ -125,17 +125,16 @@ class PoseFilter:
     covariance grows until points are let in again.
     """
 
-    acceleration_density: float = 0.01  # m²/s³, of the white acceleration of the target
-    angular_acceleration_density: float = 0.25  # rad²/s³
-    gate: float = 13.8  # χ² with 2 degrees of freedom: one good point in a thousand is lost
-    fading: float = 0.9  # weight of the past in the consistency test, for each image
-
-    def __post_init__(self) -> None:
-        for name in ("acceleration_density", "angular_acceleration_density", "gate"):
-            if not getattr(self, name) > 0.0:
-                raise InputError("PoseFilter", name, getattr(self, name), "a number above zero")
-        if not 0.0 < self.fading < 1.0:
-            raise InputError("PoseFilter", "fading", self.fading, "between 0 and 1")
+    acceleration_density: float = knob(
+        0.01, "m²/s³", above=0, upto=1e12
+    )  # of the target's white acceleration
+    angular_acceleration_density: float = knob(0.25, "rad²/s³", above=0, upto=1e12)  # likewise
+    gate: float = knob(
+        13.8, above=0, upto=1e12
+    )  # χ² with 2 degrees of freedom: one good point in a thousand is lost
+    fading: float = knob(
+        0.9, above=0, below=1
+    )  # weight of the past in the consistency test, for each image
 
     def start(
         self,

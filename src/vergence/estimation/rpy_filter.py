@@ -1,12 +1,12 @@
 """The filter of [Lippiello2005]: position, roll-pitch-yaw and their rates."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray, frozen
-from vergence.errors import InputError
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
 from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
@@ -20,8 +20,7 @@ from vergence.estimation.target_filter import (
 )
 from vergence.estimation.view import Seen
 from vergence.geometry import matrix_to_rpy, rpy_rates_to_omega, rpy_to_matrix, se3
-
-PAPER_NOISE = 1e-6 * np.repeat([0.0, 0.0, 5.0, 20.0], 3)  # Q per frame, section V
+from vergence.parts import knob, part
 
 
 @njit(cache=True)
@@ -65,26 +64,30 @@ def rpy_rows(
     return rows
 
 
-@dataclass(frozen=True, slots=True)
+@part("filter", "rpy")
 class RpyPoseFilter:
     """The extended Kalman filter of [Lippiello2005] section III, kept for reproduction.
 
     State w = (o, φ, ϑ, ψ, rates), eq. (7) to (18), with these corrections: the noise of a
     measurement is in normalized coordinates (the paper gives px²: divide by the focal length in
-    pixels, squared); the zero block of (14) has 6 columns; the Joseph form replaces (12b). Angles
+    pixels, squared); the zero block of (14) has 6 columns; the Joseph form replaces (12b); points
+    pass a gate, since without one a single wrong corner throws the filter off its target. Angles
     are never wrapped inside. Near pitch ±90° the state is singular and the estimate unreliable:
     `PoseFilter` has no such place.
     """
 
-    noise: FloatArray = field(default_factory=lambda: PAPER_NOISE)  # diagonal of Q, (12,), a frame
-    frame_period: float = 1.0 / 26.0  # s, the frame that Q is meant for
-    gate: float = np.inf  # on the Mahalanobis distance squared; the paper has none
-    fading: float = 0.9  # weight of the past in the consistency test, for each image
+    velocity_noise: float = knob(5e-6, "m²/s²", least=0, upto=1e6)  # in Q, a frame, section V
+    angle_rate_noise: float = knob(2e-5, "rad²/s²", least=0, upto=1e6)  # in Q, a frame
+    frame_period_s: float = knob(1.0 / 26.0, "s", above=0, upto=1e3)  # the frame Q is meant for
+    gate: float = knob(13.8, above=0, upto=1e12)  # on the Mahalanobis distance squared of a point
+    fading: float = knob(
+        0.9, above=0, below=1
+    )  # weight of the past in the consistency test, for each image
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "noise", frozen(self.noise, (12,), "noise"))
-        if not self.frame_period > 0.0:
-            raise InputError("RpyPoseFilter", "frame_period", self.frame_period, "above zero")
+    @cached_property
+    def noise(self) -> FloatArray:
+        """The diagonal of Q, (12,), a frame."""
+        return np.repeat([0.0, 0.0, self.velocity_noise, self.angle_rate_noise], 3)
 
     def start(
         self,
@@ -125,7 +128,7 @@ class RpyPoseFilter:
         dt = time - belief.time
         if dt == 0.0:
             return belief
-        noise = self.noise * (abs(dt) / self.frame_period)
+        noise = self.noise * (abs(dt) / self.frame_period_s)
         w, P = predict_rpy(belief.vector, belief.vector_covariance, dt, noise)
         return replace(belief, time=time, vector=w, vector_covariance=P)
 

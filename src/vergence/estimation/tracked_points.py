@@ -2,7 +2,10 @@
 
 from typing import Protocol
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray, as_floats
+from vergence.errors import InputError, ShapeError
 from vergence.signals import Frame, ImagePoints, Observation, SearchWindows
 
 
@@ -49,26 +52,41 @@ class TrackedPoints:
     Args:
         camera: the camera's name; other cameras' frames are passed over.
         tracker: has been shown the points already.
+        count: how many points there are; as many as the tracker says if None.
     """
 
-    def __init__(self, camera: str, tracker: TracksPoints) -> None:
+    def __init__(self, camera: str, tracker: TracksPoints, count: int | None = None) -> None:
         self._camera = camera
         self._tracker = tracker
+        self._count = count
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return the points in the frames that arrived, or None if none did."""
+        """Return the points in the frames that arrived, or None if none did.
+
+        Raises:
+            ShapeError: if the tracker measures more points or fewer.
+            InputError: if it says that it found a point and not where.
+        """
         views = tuple(self._view(frame) for frame in frames if frame.camera == self._camera)
         return Observation(views[-1].time, views) if views else None
 
     def _view(self, frame: Frame) -> ImagePoints:
         assert frame.image is not None
         tracks = self._tracker.track(frame.image)
+        points_px = as_floats(tracks.points_px, (self._count, 2), "points_px of the tracker")
+        count = len(points_px)
+        covariance_px = as_floats(tracks.covariance_px, (count, 2, 2), "covariance_px")
+        found = np.asarray(tracks.found, dtype=np.bool_)
+        if len(found) != count or len(tracks.reasons) != count:
+            raise ShapeError("found and reasons of the tracker", found.shape, (count,))
+        if not (np.isfinite(points_px[found]).all() and np.isfinite(covariance_px[found]).all()):
+            raise InputError("tracker", "points_px", "found, but not finite", "finite places")
         return ImagePoints(
             frame.camera,
             frame.time,
-            tracks.points_px,
-            tracks.covariance_px,
-            tracks.found,
+            points_px,
+            covariance_px,
+            found,
             tracks.reasons,
             tracks.windows,
         )

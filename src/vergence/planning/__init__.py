@@ -4,6 +4,7 @@ from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.fixed_reference import FixedReference
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
+from vergence.planning.path_planner import PathPlanner
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.separation import proves_no_path
@@ -15,6 +16,7 @@ __all__ = [
     "Obstacle",
     "OptimisedPlanner",
     "Path",
+    "PathPlanner",
     "PlanFailure",
     "PlanningProblem",
     "PotentialFieldPlanner",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.parts import knob, part
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
@@ -33,7 +34,7 @@ class _Candidate:
     roughness: float
 
 
-@dataclass(frozen=True, slots=True)
+@part("planner", "optimised")
 class OptimisedPlanner:
     """Smooth joint paths under visibility and joint limits, from several guesses.
 
@@ -43,12 +44,16 @@ class OptimisedPlanner:
     by cell, and a bidirectional tree. The same problem always has the same answer.
     """
 
-    controls: int = 12  # of the spline; twice as many for what the tree finds
-    samples: int = 60  # where visibility is weighed; it is checked at eight times as many
-    smoothing: float = 0.005
-    branches: int = 3  # of the goal's inverse kinematics
-    waypoints: int = 121  # of the path that comes out
-    tree_samples: int = 4000  # before the tree gives up; 0 for no tree
+    controls: int = knob(
+        12, least=4, upto=100
+    )  # of the spline; twice as many for what the tree finds
+    samples: int = knob(
+        60, least=8, upto=1000
+    )  # where visibility is weighed; it is checked at eight times as many
+    smoothing: float = knob(0.005, least=0, upto=1)  # weight of the path's curvature
+    branches: int = knob(3, least=1, upto=16)  # of the goal's inverse kinematics
+    waypoints: int = knob(121, least=8, upto=10000)  # of the path that comes out
+    tree_samples: int = knob(4000, least=0, upto=1000000)  # before the tree gives up; 0 for no tree
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return the smoothest path found that keeps every constraint, or what stood in the way.

@@ -1,18 +1,17 @@
 """The planner of the paper, in front of its kernels."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.geometry import se3, so3_exp, so3_log
+from vergence.parts import knob, part
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.field import ARRIVED, STUCK, Field, FieldPath, descend
 from vergence.planning.path import Path
 from vergence.planning.problem import PlanningProblem
 
 
-@dataclass(frozen=True, slots=True)
+@part("planner", "potential_field")
 class PotentialFieldPlanner:
     """Image and joint trajectories down a potential field; [Mezouar2001] sections 2 and 3.
 
@@ -20,12 +19,12 @@ class PotentialFieldPlanner:
     minimum where a path exists, and says so; `OptimisedPlanner` finds more.
     """
 
-    step: float = 0.02  # ε, of Υ
-    steps_max: int = 1500
-    gain_image: float = 0.02  # γ
-    gain_joint: float = 0.5  # χ
-    image_zone_px: float = 100.0  # width of the zone along the image's border
-    joint_zone: float = 0.2  # width of the zone at a joint limit, of half the range
+    step: float = knob(0.02, above=0, upto=1)  # ε, of Υ
+    steps_max: int = knob(1500, least=1, upto=100000)  # before the walk is given up
+    gain_image: float = knob(0.02, least=0, upto=1e3)  # γ, of the repulsion by the image's border
+    gain_joint: float = knob(0.5, least=0, upto=1e3)  # χ, of the repulsion by joint limits
+    image_zone_px: float = knob(100.0, "px", above=0, upto=1e4)  # width along the image's border
+    joint_zone: float = knob(0.2, above=0, upto=1)  # width at a joint limit, of half the range
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return a path that keeps every constraint, or what stood in the way.

@@ -5,7 +5,8 @@ from vergence.vision.board_file import read_board
 from vergence.vision.image import grey_image
 from vergence.vision.picking import Picked, pick_features
 from vergence.vision.ssd_tracker import SsdTracker
-from vergence.vision.tracks import PointTracker, Tracks
+from vergence.vision.ssd_tracking import SsdTracking
+from vergence.vision.tracks import PointTracker, PointTracking, Tracks
 from vergence.vision.two_view import (
     TwoView,
     TwoViewFailure,
@@ -17,7 +18,9 @@ __all__ = [
     "Board",
     "Picked",
     "PointTracker",
+    "PointTracking",
     "SsdTracker",
+    "SsdTracking",
     "Tracks",
     "TwoView",
     "TwoViewFailure",

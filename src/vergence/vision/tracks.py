@@ -1,6 +1,6 @@
 """What a point tracker is and what it answers."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,8 +15,9 @@ class Tracks(NamedTuple):
     covariance_px: FloatArray  # (M, 2, 2) px²; where not found, of the search range
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
-    residuals: FloatArray  # (M,) grey levels, root mean square; NaN where nothing was compared
-    correlations: FloatArray  # (M,) with the template, -1 … 1; NaN where nothing was compared
+    # (M,) root mean square, grey levels; NaN where nothing was compared, None if nothing ever is
+    residuals: FloatArray | None = None
+    correlations: FloatArray | None = None  # (M,) with the template, -1 … 1; likewise
     windows: SearchWindows | None = None  # where the points were looked for
 
     def __bool__(self) -> bool:
@@ -44,7 +45,7 @@ def nothing_found(points_px: FloatArray, reason: str, deviation_px: float = 100.
 
 
 class PointTracker(Protocol):
-    """Follows points from image to image: the place for a tracker of one's own."""
+    """Follows points from image to image."""
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Measure the points in a new image.
@@ -52,5 +53,19 @@ class PointTracker(Protocol):
         Args:
             image: grey, (height, width).
             predicted_px: where to look, (M, 2); None for where the points were last.
+        """
+        ...
+
+
+@runtime_checkable
+class PointTracking(Protocol):
+    """A part that makes trackers: what a cell names, with its numbers."""
+
+    def start(self, image: ImageArray, points_px: FloatArray) -> PointTracker:
+        """Return the tracker of points that a first image shows.
+
+        Args:
+            image: grey, (height, width).
+            points_px: the points in it, (M, 2).
         """
         ...

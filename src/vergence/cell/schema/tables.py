@@ -40,7 +40,6 @@ _Desired = (
 )
 _Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
 _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
-_Density = Annotated[float, Field(ge=1e-9, le=1e6)]
 
 
 class SceneTable(Table):
@@ -154,6 +153,7 @@ class TrackTable(Table):
     desired: _Desired = (
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
+    tracker: Part = "ssd"  # what follows the features from image to image
     tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
     tolerance_px: Pixels = 1.0  # mean error above which an arm at rest has not reached its goal
     image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
@@ -180,7 +180,8 @@ class ReachTable(Table):
     goal_deg: _Joints  # joints when the desired image was taken; metres if they slide
     goal_image: Path | None = None  # that image; a simulation without one takes it by itself
     distance_m: Length  # believed distance of that camera from the reference plane, d*
-    planner: Literal["optimised", "potential_field"] = "optimised"  # optimised, or the paper's
+    planner: Part = "optimised"  # of the path in the image: or the paper's, or one's own
+    tracker: Part = "round_marks"  # what follows the features from image to image
     margin_px: Pixels = 10.0  # kept from the border of the image
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
     camera_speed_m_s: Speed = 0.25  # on the way
@@ -209,7 +210,7 @@ class PerceptionTable(Table):
     cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = (
         None  # those that are looked through; all if absent
     )
-    filter: Literal["pose", "rpy"] = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper
+    filter: Part = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper, or one's own
     selection: Literal["information", "indexes"] = (
         "information"  # of features: or by spread, as [Lippiello2005]
     )
@@ -222,5 +223,3 @@ class PerceptionTable(Table):
         None  # how well the target's placement is known: 0.01 to follow, else 0
     )
     start_error_deg: _Angle | None = None  # and its angle: 2 to follow
-    acceleration_density: _Density = 0.01  # m²/s³, of the target, for the filter on SE(3)
-    angular_acceleration_density: _Density = 0.25  # rad²/s³

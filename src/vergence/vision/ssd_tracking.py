@@ -1,0 +1,14 @@
+"""The pyramid search of [Nelson1995] as a part of a cell."""
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.parts import part
+from vergence.vision.ssd_tracker import SsdTracker
+
+
+@part("tracker", "ssd")
+class SsdTracking:
+    """Follows windows of the first image by a pyramid search and an alignment; see `SsdTracker`."""
+
+    def start(self, image: ImageArray, points_px: FloatArray) -> SsdTracker:
+        """Return the tracker of points (M, 2) in the first image."""
+        return SsdTracker(image, points_px)

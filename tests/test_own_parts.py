@@ -1,0 +1,251 @@
+"""Planners, trackers and filters of one's own: found beside the cell, checked as all parts are."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vergence.assembly import plan, run_cell
+from vergence.cell import Cell, load_cell
+from vergence.errors import InputError
+from vergence.estimation import PoseFilter, RpyPoseFilter
+from vergence.places import CELLS
+from vergence.planning import OptimisedPlanner, PotentialFieldPlanner
+from vergence.registry import BUILT_IN, find
+from vergence.signals import OutcomeKind
+from vergence.vision import SsdTracking
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+NEAR = {  # of the gantry's goal: a straight path stays in view
+    "arms.gantry.start_deg": "[-0.216, 0.146, 0.012, 39.017, -1.363, 1.977]",
+    "task.camera_speed_m_s": "1.0",
+}
+SHORT = {"duration_s": "0.2", "target.motion": '{ kind = "stationary" }'}
+
+
+def own(folder: Path, cell: str, settings: dict[str, str]) -> Cell:
+    """A shipped cell with the examples' parts beside it."""
+    if not (folder / cell).exists():
+        shutil.copytree(CELLS, folder, dirs_exist_ok=True)
+        for example in EXAMPLES.glob("my_*.py"):
+            shutil.copy(example, folder / cell)
+    return load_cell(folder / cell, settings)
+
+
+def test_a_planner_beside_the_cell_plans_and_runs(tmp_path: Path) -> None:
+    settings = {"task.planner": '{ kind = "my_planner:Straight", waypoints = 50 }', **NEAR}
+    cell = own(tmp_path, "gantry", settings)
+    path = plan(cell, images=False)
+    assert path
+    assert (path.planner, len(path.q)) == ("straight", 50)
+    np.testing.assert_allclose(path.q[25] - path.q[24], path.q[1] - path.q[0])  # it is straight
+    assert run_cell(cell, images=False).outcome.kind is OutcomeKind.COMPLETED
+    far = plan(own(tmp_path, "gantry", {"task.planner": "my_planner:Straight"}), images=False)
+    assert "leaves the image" in str(far)
+
+
+def test_a_planner_is_named_on_the_command_line(tmp_path: Path, capsys, monkeypatch) -> None:
+    from vergence.app.plan import Request, plan
+
+    own(tmp_path, "gantry", {})
+    monkeypatch.chdir(tmp_path / "gantry")  # a part is found in the current folder, too
+    settings = [f"{key}={value}" for key, value in NEAR.items()]
+    request = Request("gantry", "my_planner:Straight", False, None, settings)
+    assert plan(request, tmp_path / "out", False) == 0
+    assert "found by the straight planner" in capsys.readouterr().out
+
+
+def test_a_tracker_beside_the_cell_follows_rendered_images(tmp_path: Path) -> None:
+    settings = {"task.tracker": '{ kind = "my_tracker:LucasKanade", noise_px = 0.7 }', **SHORT}
+    run = run_cell(own(tmp_path, "puma560", settings))
+    assert run.outcome.kind is OutcomeKind.COMPLETED
+    seen = run.cameras["wrist"]
+    assert seen.found.all()
+    np.testing.assert_allclose(np.nanmax(np.abs(seen.points_px - seen.true_px)), 0.0, atol=0.5)
+
+
+def test_a_filter_beside_the_cell_follows_the_target(tmp_path: Path) -> None:
+    settings = {"perception.filter": '{ kind = "my_filter:Stationary", slow_m_s = 1.0 }', **SHORT}
+    run = run_cell(own(tmp_path, "lippiello2005", settings), images=False)
+    assert run.outcome.kind is OutcomeKind.COMPLETED
+    assert not run.target.velocity[1:].any()  # the filter of one's own says that it is at rest
+
+
+@pytest.mark.parametrize(
+    ("cell", "key", "default", "kind"),
+    [
+        ("gantry", "planner", OptimisedPlanner, "potential_field"),
+        ("puma560", "tracker", SsdTracking, "round_marks"),
+        ("panda", "filter", PoseFilter, "rpy"),
+    ],
+)
+def test_a_part_is_named_by_its_kind_and_written_as_it_is_read(
+    cell: str, key: str, default: type, kind: str
+) -> None:
+    table = "perception" if key == "filter" else "task"
+    loaded = load_cell(cell)
+    assert getattr(getattr(loaded, table), key) == default()
+    other = load_cell(cell, {f"{table}.{key}": kind})
+    assert type(getattr(getattr(other, table), key)) is find(key, kind)
+    assert getattr(other.replace(seed=3), table) == getattr(other, table)
+
+
+def test_numbers_of_a_part_are_keys_of_the_cell() -> None:
+    cell = load_cell("gantry", {"task.planner.tree_samples": "0"})
+    assert cell.task.planner == OptimisedPlanner(tree_samples=0)
+    cell = load_cell("gantry", {"task.planner": "potential_field", "task.planner.step": "0.1"})
+    assert cell.task.planner == PotentialFieldPlanner(step=0.1)
+    cell = load_cell("panda", {"perception.filter.gate": "9"})  # of the usual kind
+    assert cell.perception.filter == PoseFilter(gate=9)
+
+
+@pytest.mark.parametrize("role", ["planner", "filter", "tracker"])
+def test_a_wrong_number_gets_the_same_answer_in_python_and_in_a_cell(role: str) -> None:
+    for kind in BUILT_IN[role]:
+        cls = find(role, kind)
+        for name, about in cls.__pydantic_fields__.items():
+            with pytest.raises(InputError) as said:
+                cls(**{name: float("nan")})
+            assert said.value.key == name
+            if any(hasattr(bound, "gt") or hasattr(bound, "ge") for bound in about.metadata):
+                with pytest.raises(InputError) as said:
+                    cls(**{name: -1})
+                key, cell = {
+                    "planner": ("task.planner", "gantry"),
+                    "tracker": ("task.tracker", "puma560"),
+                    "filter": ("perception.filter", "panda"),
+                }[role]
+                with pytest.raises(InputError) as in_cell:
+                    load_cell(cell, {key: kind, f"{key}.{name}": "-1"})
+                assert in_cell.value.allowed == said.value.allowed
+                assert in_cell.value.key == f"{key}.{name}"
+
+
+def test_the_densities_of_the_paper_are_the_rpy_filters() -> None:
+    noise = RpyPoseFilter().noise
+    np.testing.assert_allclose(noise, 1e-6 * np.repeat([0.0, 0.0, 5.0, 20.0], 3))
+
+
+BAD = '''
+import numpy as np
+import vergence as vg
+from vergence.planning import Path
+from vergence.vision import Tracks
+
+
+@vg.part("planner")
+class Raises:
+    def plan(self, problem):
+        return 1 / 0
+
+
+@vg.part("planner")
+class Nothing:
+    def plan(self, problem):
+        return None
+
+
+@vg.part("planner")
+class Elsewhere:
+    def plan(self, problem):
+        return Path.through(problem, np.tile(problem.q_start + 0.1, (3, 1)), "elsewhere")
+
+
+@vg.part("planner")
+class Infinite:
+    def plan(self, problem):
+        path = Path.through(problem, np.tile(problem.q_start, (3, 1)), "infinite")
+        q = path.q.copy()
+        q[1] = np.nan
+        object.__setattr__(path, "q", q)
+        return path
+
+
+@vg.part("tracker")
+class NoTracker:
+    def start(self, image, points_px):
+        return "a tracker"
+
+
+@vg.part("tracker")
+class Late:
+    """Works until its first image of the run."""
+
+    def start(self, image, points_px):
+        return self
+
+    def track(self, image, predicted_px=None):
+        raise ValueError("a lens cap")
+
+
+@vg.part("tracker")
+class TooFew:
+    def start(self, image, points_px):
+        return self
+
+    def track(self, image, predicted_px=None):
+        return Tracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0, bool), ())
+
+
+@vg.part("tracker")
+class NotFinite:
+    def start(self, image, points_px):
+        self.__dict__["count"] = len(points_px)
+        return self
+
+    def track(self, image, predicted_px=None):
+        count = self.count
+        nothing, size = np.full((count, 2), np.nan), (count, 1, 1)
+        return Tracks(nothing, np.tile(np.eye(2), size), np.ones(count, bool), ("",) * count)
+
+
+@vg.part("filter")
+class Halves:
+    def start(self, time, T_world_target, velocity=None, covariance=None):
+        raise TypeError("no start")
+    def predict(self, belief, time): ...
+'''
+
+
+@pytest.fixture(scope="module")
+def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the cells, each beside parts that do not work."""
+    folder = tmp_path_factory.mktemp("bad")
+    shutil.copytree(CELLS, folder, dirs_exist_ok=True)
+    for cell in ("gantry", "puma560", "lippiello2005"):
+        (folder / cell / "bad.py").write_text(BAD)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("cell", "key", "kind", "said"),
+    [
+        ("gantry", "task.planner", "bad:Raises", "raised ZeroDivisionError: division by zero"),
+        ("gantry", "task.planner", "bad:Nothing", "whose plan returned NoneType"),
+        ("gantry", "task.planner", "bad:Elsewhere", "a path that begins elsewhere"),
+        ("gantry", "task.planner", "bad:Infinite", "waypoints that are not finite"),
+        ("gantry", "task.planner", "bad:NoTracker", "declared as tracker"),
+        ("gantry", "task.planner", "optimized", "did you mean optimised"),
+        ("puma560", "task.tracker", "bad:NoTracker", "whose start returned str"),
+        ("puma560", "task.tracker", "sdd", "did you mean ssd"),
+        ("puma560", "task.planner", "optimised", "a key that is not known"),
+        ("lippiello2005", "perception.filter", "bad:Halves", "has no method update"),
+        ("lippiello2005", "perception.filter", "kalman", "pose, rpy, or module:Class"),
+    ],
+)
+def test_a_part_that_does_not_work_is_named_before_anything_moves(
+    bad: Path, cell: str, key: str, kind: str, said: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        run_cell(load_cell(bad / cell, {key: kind, **SHORT}), images=cell == "puma560")
+    assert said in str(caught.value)
+    assert caught.value.source == str(bad / cell / "cell.toml")
+    assert caught.value.key.startswith(key)
+
+
+@pytest.mark.parametrize("kind", ["bad:Late", "bad:TooFew", "bad:NotFinite"])
+def test_a_tracker_that_fails_in_a_run_ends_it_with_a_named_outcome(bad: Path, kind: str) -> None:
+    run = run_cell(load_cell(bad / "puma560", {"task.tracker": kind, **SHORT}))
+    assert run.outcome.kind is OutcomeKind.PART_RAISED
+    assert "perception" in run.outcome.reason
