@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vergence.app.watch.knobs import knobs, law_choices
 from vergence.assembly import plan, run_cell
 from vergence.cell import Cell, load_cell
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, RpyPoseFilter
+from vergence.experiments import compare, law_table
 from vergence.places import CELLS
 from vergence.planning import OptimisedPlanner, PotentialFieldPlanner
 from vergence.registry import BUILT_IN, find
@@ -127,6 +129,24 @@ def test_the_densities_of_the_paper_are_the_rpy_filters() -> None:
     np.testing.assert_allclose(noise, 1e-6 * np.repeat([0.0, 0.0, 5.0, 20.0], 3))
 
 
+def test_a_whole_law_beside_the_cell_runs_and_is_compared(tmp_path: Path) -> None:
+    square = "[[0.06, 0.06, 0.0], [-0.06, 0.06, 0.0], [-0.06, -0.06, 0.0], [0.06, -0.06, 0.0]]"
+    settings = {**SHORT, "duration_s": "1", "task.desired": '"centred"', "target.features": square}
+    cell = own(tmp_path, "puma560", settings | {"law": '{ kind = "my_law:Transpose" }'})
+    x, y, z = cell.target.position_m
+    cell = cell.replace(target={"position_m": (x + 0.08, y, z)})
+    slow, fast = (run_cell(c, images=False) for c in (cell.replace(law={"gain": 0.1}), cell))
+    errors = [np.nanmax(run.cameras["wrist"].error_px[-1]) for run in (slow, fast)]
+    assert errors[1] < 0.5 * errors[0] < 0.5 * np.nanmax(slow.cameras["wrist"].error_px[0])
+    assert cell.replace(seed=7).law == cell.law
+    assert law_table(cell, "my_law:Transpose")["kind"] == "my_law:Transpose"
+    assert law_table(cell, "image_based")["gain"] == 0.4  # numbers that both have are the cell's
+    compared = compare(cell, ["own", "image_based"], starts=1, spread=0.05, duration_s=0.3)
+    assert [score.law for score in compared.scores] == ["own", "image_based"]
+    assert [knob["key"] for knob in knobs(cell.law)] == ["gain"]
+    assert "my_law:Transpose (as in the cell)" in law_choices(cell)
+
+
 BAD = '''
 import numpy as np
 import vergence as vg
@@ -198,6 +218,23 @@ class NotFinite:
         count = self.count
         nothing, size = np.full((count, 2), np.nan), (count, 1, 1)
         return Tracks(nothing, np.tile(np.eye(2), size), np.ones(count, bool), ("",) * count)
+
+
+@vg.part("law")
+class NoBind:
+    def command(self, observation, reference, joints): ...
+
+
+@vg.part("law")
+class NoCommand:
+    def bind(self, setting):
+        return self
+
+
+@vg.part("law")
+class Unbound:
+    def bind(self, setting):
+        raise KeyError("no such arm")
 
 
 @vg.part("filter")

@@ -71,7 +71,7 @@ _ROLES = (  # of parts, and where they stand in the file
 def _parts() -> Iterator[str]:
     """Yield the sections of the law: the servo, its solvers, limits and objectives."""
     yield from ("(the-law)=", "## The law", "")
-    settings = find("law", "servo")
+    settings = find("servo", "servo")
     yield from (_text(settings), "")
     yield from _part(settings)
     for role, place in _ROLES:

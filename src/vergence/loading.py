@@ -76,6 +76,19 @@ def part_class(role: str, kind: Any, place: Place) -> Any:
     return find(role, kind, folder=place.folder, source=place.source, key=key)
 
 
+def names_law(kind: Any, place: Place) -> bool:
+    """Tell whether a kind is a whole law of one's own, rather than an objective of the servo."""
+    if not isinstance(kind, str):
+        return False
+    if ":" not in kind:
+        return kind in kinds("law")
+    try:
+        find("law", kind, folder=place.folder)
+    except InputError:
+        return False  # whoever asks for an objective then says what is wrong with it
+    return True
+
+
 def make_part(cls: Any, values: Mapping[str, Any], place: Place) -> Any:
     """Return a part of a class from the values of its fields, those that hold parts as tables.
 

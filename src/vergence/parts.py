@@ -175,6 +175,12 @@ def table_of(value: Any, *, defaults: bool = True) -> dict[str, Any]:
     return table
 
 
+def written(value: Any) -> dict[str, Any]:
+    """Return a part as the table that it is read from, by its own method `table` if it has one."""
+    table = getattr(value, "table", None)
+    return dict(table()) if callable(table) else table_of(value)
+
+
 def _values(value: Any) -> Iterator[tuple[str, Any, Any]]:
     infos: Mapping[str, Any] = type(value).__pydantic_fields__
     for name, info in infos.items():

@@ -47,7 +47,8 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     },
     "arm_motion": {"joints": f"{_MOTIONS}:JointMotion", "poses": f"{_MOTIONS}:PoseMotion"},
     "limits": {"limits": f"{_CONTROL}.limits:Limits"},
-    "law": {"servo": f"{_CONTROL}:ServoSettings"},
+    "servo": {"servo": f"{_CONTROL}:ServoSettings"},
+    "law": {},
     "term": {"term": f"{_CONTROL}:WeightedObjective"},
     "solver": {
         "quadratic_program": f"{_CONTROL}.solvers:QuadraticProgram",
@@ -60,6 +61,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "feature": ("value", "interaction"),
     "objective": ("quadratic",),
     "limit": ("rows",),
+    "law": ("bind",),
     "motion": ("poses",),
     "planner": ("plan",),
     "filter": ("start", "predict", "update"),

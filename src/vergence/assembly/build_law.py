@@ -1,5 +1,7 @@
 """From the law of a cell file to the servo that runs."""
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ from vergence.cell.schema import ReachTable
 from vergence.control import (
     CameraMounting,
     Law,
+    LawSetting,
     Limits,
     OptimalTracking,
     PoseServo,
@@ -24,6 +27,7 @@ from vergence.control import (
 from vergence.errors import InputError
 from vergence.features import interaction_matrix_points
 from vergence.geometry import se3_inverse
+from vergence.loading import asking
 from vergence.parts import kind_of
 from vergence.registry import kinds
 
@@ -39,6 +43,8 @@ def build_law(context: LawContext) -> Law:
         InputError: if the law does not fit the task, or its numbers do not fit the arm.
     """
     cell = context.cell
+    if not isinstance(cell.law, ServoSettings):
+        return _own_law(context)
     _require_suitable(context)
     try:
         law = _pose_servo(context) if _is_pose(cell.law) else _servo(context)
@@ -50,6 +56,32 @@ def build_law(context: LawContext) -> Law:
         raise InputError(str(cell.path), key, error.given, error.allowed) from None
     _require_motion(context)
     return law
+
+
+def _own_law(context: LawContext) -> Law:
+    """Return the law that a part of one's own makes for the cell."""
+    part, source = context.cell.law, str(context.cell.path)
+    names = [context.camera_name, *(n for n in context.points_px if n != context.camera_name)]
+    setting = LawSetting(
+        context.arm,
+        {name: _mounting(context, name) for name in names},
+        dict(_known_depths(context)),
+        context.period_s(),
+        context.inner_period_s,
+        context.joints[context.cell.task.arm],
+    )
+    with asking(part, source, "law"):
+        law: Law = part.bind(setting)
+    if not callable(getattr(law, "command", None)):
+        given = f"{kind_of(part)}, whose bind returned {type(law).__name__}"
+        raise InputError(source, "law", given, "an object with a method command")
+    return law
+
+
+def _known_depths(context: LawContext) -> Iterator[tuple[str, FloatArray]]:
+    for name in context.points_px:
+        with suppress(InputError):  # where nothing is known of it
+            yield name, context.depth_m(name, None)
 
 
 _TABLES = {"Limits": "limits"}  # a part's table below [law]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PlainSerializer, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError
 
 from vergence.cell.schema import (
     TABLES,
@@ -12,6 +12,7 @@ from vergence.cell.schema import (
     CameraTable,
     Duration,
     Name,
+    Part,
     PerceptionTable,
     SceneTable,
     Table,
@@ -23,13 +24,10 @@ from vergence.cell.schema import (
 from vergence.cell.settings_text import settings_text
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
-from vergence.loading import Place, load_part
+from vergence.loading import Place, load_part, names_law
 from vergence.places import find_cell
 from vergence.registry import find
 from vergence.validation import explain
-
-# The law as its part reads it; this room knows no law.
-LawSettings = Annotated[Any, PlainSerializer(lambda law: law.table())]
 
 
 class Cell(Table):
@@ -45,8 +43,8 @@ class Cell(Table):
     target: TargetTable  # what is looked at
     task: Task  # what is to be done about it
     perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
-    law: LawSettings  # how the arm is moved
-    laws: dict[Name, LawSettings] = Field(  # others, by name, to compare it with
+    law: Part  # how the arm is moved
+    laws: dict[Name, Part] = Field(  # others, by name, to compare it with
         default_factory=dict, max_length=64
     )
     _path: Path = PrivateAttr(default=Path())
@@ -169,12 +167,14 @@ def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
 def _with_parts(cell: Cell) -> Cell:
     """Return the cell with the parts that its tables describe; imports them, so it comes last."""
     place = Place(str(cell.path), "", cell.path.parent)
-    settings = find("law", "servo")
+    servo = find("servo", "servo")
 
     def law(key: str, table: Any) -> Any:
         if not isinstance(table, Mapping):
             raise InputError(str(cell.path), key, table, "a table")
-        return settings.from_table(table, place.at(key))
+        if names_law(table.get("kind"), place):
+            return load_part("law", table, place.at(key))
+        return servo.from_table(table, place.at(key))
 
     def filled(table: Table, at: str, **roles: str) -> Table:
         """Return a table with the parts that stand at some of its keys, each of its role."""

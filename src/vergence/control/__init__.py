@@ -18,6 +18,7 @@ from vergence.control.guard import (
 from vergence.control.image_motion import FeatureState, ImageMotion, MotionSettings
 from vergence.control.inner import InnerLaw
 from vergence.control.law import Law
+from vergence.control.law_part import LawPart, LawSetting
 from vergence.control.limits import Limit, Limits, TargetView
 from vergence.control.mounting import CameraMounting
 from vergence.control.moving_pose import MovingPose, moved, pose_difference
@@ -67,6 +68,8 @@ __all__ = [
     "InteractionModel",
     "JointQuadratic",
     "Law",
+    "LawPart",
+    "LawSetting",
     "Limit",
     "Limits",
     "MotionSettings",

@@ -24,7 +24,7 @@ class WeightedObjective:
     camera: str = knob("", live=False)  # that it is about; the task's if empty
 
 
-@part("law", "servo")
+@part("servo", "servo")
 class ServoSettings:
     """Objectives, limits and solver, and what is assumed of the features between images.
 

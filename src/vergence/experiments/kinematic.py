@@ -8,7 +8,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.assembly import assemble_parts
 from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
-from vergence.control import OptimalTracking, PseudoInverse
+from vergence.control import OptimalTracking, PseudoInverse, ServoSettings
 from vergence.experiments.batch import IdealRun
 from vergence.geometry import transform_points
 from vergence.runtime.timeouts import Timeouts
@@ -36,6 +36,8 @@ def is_ideal(cell: Cell) -> bool:
 def is_quick(cell: Cell) -> bool:
     """Tell whether the batch kernel is likely to know its law."""
     law = cell.law
+    if not isinstance(law, ServoSettings):
+        return False
     as_it_is = not (law.feed_forward or law.prediction)
     tracking = isinstance(law.objective, OptimalTracking) and isinstance(law.solver, PseudoInverse)
     return is_ideal(cell) and tracking and as_it_is and len(law.objectives) == 1

@@ -6,8 +6,8 @@ from typing import Any
 from vergence.cell import Cell
 from vergence.control import ServoSettings
 from vergence.errors import InputError, nearest
-from vergence.loading import Place, part_class
-from vergence.parts import field_names
+from vergence.loading import Place, names_law, part_class
+from vergence.parts import field_names, written
 
 OWN = "own"
 PRESETS: Mapping[str, Mapping[str, Any]] = {
@@ -45,22 +45,23 @@ def law_table(cell: Cell, name: str) -> dict[str, Any]:
     Args:
         cell: the cell.
         name: "own", one of the file's `[laws.NAME]`, one of `PRESETS`, or ``module:Class`` of an
-            objective.
+            objective or of a whole law.
 
     Raises:
         InputError: if there is no such law.
     """
     if name == OWN:
-        return dict(cell.law.table())
+        return written(cell.law)
     if name in cell.laws:
-        return dict(cell.laws[name].table())
+        return written(cell.laws[name])
     if ":" not in name and name not in PRESETS:
         allowed = f"{nearest(name, {OWN, *cell.laws, *PRESETS})}, or module:Class"
         raise InputError("laws", "", name, allowed)
     asked = PRESETS.get(name, {"kind": name})
     place = Place(str(cell.path), f"laws.{name}", cell.path.parent)
-    known = {*field_names(part_class("objective", asked["kind"], place))}
-    known |= {*field_names(ServoSettings)}
-    own = cell.law.table()
-    shared = {key: own[key] for key in _SHARED if key in own and key in known}
-    return ServoSettings.from_table({**shared, **asked}, place).table()
+    whole = names_law(asked["kind"], place)
+    known = {*field_names(part_class("law" if whole else "objective", asked["kind"], place))}
+    known |= set() if whole else {*field_names(ServoSettings)}
+    own = written(cell.law)
+    table = {key: own[key] for key in _SHARED if key in own and key in known} | dict(asked)
+    return table if whole else ServoSettings.from_table(table, place).table()

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args, get_origin
 from vergence.cell import Cell
 from vergence.control import PositionBased, QuadraticProgram, ServoSettings
 from vergence.errors import InputError
-from vergence.parts import kind_of
+from vergence.parts import kind_of, written
 from vergence.registry import kinds
 
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
@@ -18,13 +18,16 @@ _ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m", "carries_depth")
 
 def law_choices(cell: Cell) -> dict[str, str]:
     """Return the laws that fit the cell's task: names, and the TOML that asks for each."""
-    own: ServoSettings = cell.law
-    choices = {f"{own.kind} (as in the cell)": _toml(own)}
-    for name, settings in cell.laws.items():
-        choices[name] = _toml(settings)
+    own = cell.law
+    name = own.kind if isinstance(own, ServoSettings) else kind_of(own)
+    choices = {f"{name} (as in the cell)": _inline(written(own))}
+    for other, settings in cell.laws.items():
+        choices[other] = _inline(written(settings))
     for kind in kinds("objective"):
-        if kind != own.kind and kind not in choices and _suits(cell, kind):
+        if kind != name and kind not in choices and _suits(cell, kind):
             choices[kind] = f'{{ kind = "{kind}" }}'
+    if not isinstance(own, ServoSettings):
+        return choices
     for kind in kinds("solver"):
         if kind != kind_of(own.solver):
             name = f"{own.kind}, {kind}"
@@ -34,12 +37,14 @@ def law_choices(cell: Cell) -> dict[str, str]:
     return choices
 
 
-def knobs(law: ServoSettings) -> list[dict[str, Any]]:
+def knobs(law: Any) -> list[dict[str, Any]]:
     """Return what may be changed on a law: keys, labels, units, values and ranges.
 
     Only what acts is there: limits only with a solver that keeps them, the flow's smoothing only
     where the target's motion is fed forward.
     """
+    if not isinstance(law, ServoSettings):
+        return list(_of_part("", law))
     found = []
     if len(law.objectives) == 1:
         found += list(_of_part("", law.objective))
@@ -104,10 +109,6 @@ def _suits(cell: Cell, kind: str) -> bool:
     except InputError:
         return False
     return True
-
-
-def _toml(settings: ServoSettings) -> str:
-    return _inline(settings.table())
 
 
 def _inline(value: Any) -> str:

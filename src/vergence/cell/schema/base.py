@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints
 
-from vergence.parts import is_part, table_of
+from vergence.parts import is_part, written
 
 # Ranges are those of machines: what lies outside is a slip of the pen or of the unit, and would
 # take terabytes or years to simulate.
@@ -36,7 +36,7 @@ MOST_POINTS = 1000
 
 
 def _written(part: Any) -> Any:
-    return table_of(part) if is_part(part) else part
+    return written(part) if is_part(part) else part
 
 
 Part = Annotated[Any, PlainSerializer(_written)]  # as its declaration reads it, see `registry`

@@ -1,0 +1,46 @@
+"""A whole law of one's own: kind = "my_law:Transpose" under [law] in a cell beside this file.
+
+vergence compare CELL --laws own,my_law:Transpose compares it with others.
+"""
+
+import numpy as np
+
+import vergence as vg
+from vergence.control import LawSetting
+
+
+@vg.part("law")
+class Transpose:
+    """v = -λ Lᵀ e: no inverse anywhere, slow but hard to upset."""
+
+    gain: float = vg.knob(0.4, "1/s", above=0, upto=10)  # λ
+
+    def bind(self, setting: LawSetting) -> "TransposeLaw":
+        """Return the law for an arm and its cameras."""
+        return TransposeLaw(self.gain, setting)
+
+
+class TransposeLaw:
+    """The same, made for one arm with a camera at its tip."""
+
+    def __init__(self, gain: float, setting: LawSetting) -> None:
+        self._gain, self._arm = gain, setting.arm
+        name, mounting = next(iter(setting.cameras.items()))
+        self._camera, self._depth_m = mounting.camera, setting.depth_m[name]
+
+    def command(
+        self, observation: vg.Observation, reference: vg.Reference, joints: vg.JointState
+    ) -> vg.JointCommand:
+        """Return joint rates for the next outer period."""
+        seen = self._camera.normalize(observation.views[-1].points_px)
+        error = (seen - self._camera.normalize(reference.points_px)).ravel()
+        L = vg.Points(seen, self._depth_m).interaction()
+        v_camera = -self._gain * L.T @ error
+        return vg.JointCommand(
+            np.linalg.pinv(self._arm.jacobian(joints.position)) @ v_camera, v_camera
+        )
+
+
+if __name__ == "__main__":
+    run = vg.run("puma560", images=False, duration_s=0.5, law={"kind": "my_law:Transpose"})
+    print(run.outcome)
