@@ -65,6 +65,7 @@ _ROLES = (  # of parts, and where they stand in the file
     ("objective", "law"), ("limits", "law.limits"), ("solver", "law.solver"),
     ("planner", "task.planner"), ("tracker", "task.tracker"), ("filter", "perception.filter"),
     ("motion", "target.motion"), ("arm_motion", "arms.NAME.motion"),
+    ("driver", "driver"), ("camera_source", "driver.cameras.NAME"),
 )  # fmt: skip
 
 
@@ -78,7 +79,7 @@ def _parts() -> Iterator[str]:
         for kind in kinds(role):
             cls = find(role, kind)
             title = f"`[{place}]`"
-            title += f' with `kind = "{kind}"`' if len(kinds(role)) > 1 else ""
+            title += f' with `kind = "{kind}"`' if len(kinds(role)) > 1 or role == "driver" else ""
             yield from (f"## {title}", "", _text(cls), "")
             yield from _part(cls)
 

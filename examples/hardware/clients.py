@@ -5,8 +5,7 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from threading import Thread
 
-from link import Link, LinkBrokenError
-from messages import decode, encode
+from vergence.drivers.socket_robot import Link, LinkBrokenError, decode, encode
 
 HELLO_TIMEOUT_S = 1.0
 _LONGEST = 1 << 16  # bytes of a message of a client: set-points of many arms

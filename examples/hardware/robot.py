@@ -1,13 +1,9 @@
-"""A robot as it stands in the hall: a process of its own that is reached over a socket.
+"""A robot in a process of its own that is reached over a socket.
 
 The arm is simulated; a real controller does the same things in the same order. Every period it
 says where its joints are, takes the set-point that comes back, and hands it to its servos through
 a watchdog. When nothing usable comes back any more, the watchdog brakes the arm. The servo waits
 for a client no longer than its period lasts, whatever the client does.
-
-Messages (`messages.py`) are JSON, but for images. Client, first: its name. Robot: period, time,
-joints and rates of every arm, and the images that follow, each a message of its own; or why it
-refuses. Client: the period it answers, and a position and rate for every joint.
 """
 
 import socket
@@ -17,10 +13,15 @@ from queue import SimpleQueue
 from threading import Thread
 
 from clients import Clients
-from link import Link, LinkBrokenError
-from messages import encode, read_answer, said_by_robot
 
 from vergence.cell import load_cell
+from vergence.drivers.socket_robot import (
+    Link,
+    LinkBrokenError,
+    encode,
+    read_answer,
+    said_by_robot,
+)
 from vergence.robot import Arm
 from vergence.runtime import Driver
 from vergence.runtime.hardware import Metronome, Watchdog

@@ -7,10 +7,10 @@ python servo.py puma560 5007
 import sys
 from pathlib import Path
 
-from driver import SocketDriver
-
 from vergence.cell import load_cell
 from vergence.control import OptimalTracking, PseudoInverse, Servo
+from vergence.drivers import Equipment
+from vergence.drivers.socket_robot import SocketRobot
 from vergence.errors import VergenceError
 from vergence.estimation import TrackedPoints
 from vergence.planning import FixedReference
@@ -49,7 +49,8 @@ def main(cell: str, port: int) -> None:
     model = SimulatedDriver(load_cell(cell))
     # What runs for the first time is compiled; a rehearsal spares the robot the wait.
     servo(model, model, 0.2, Path("runs/rehearsal"))
-    driver = SocketDriver(("localhost", port), model.arms, model.cameras, model.inner_rate_hz)
+    equipment = Equipment(cell, model.arms, model.cameras, model.inner_rate_hz)
+    driver = SocketRobot(f"localhost:{port}").open(equipment)
     folder = Path("runs/robot-over-a-socket")
     print(servo(driver, model, 5.0, folder))
     print(f"see it by: vergence report {folder}")

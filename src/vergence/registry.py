@@ -29,7 +29,8 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "posture": f"{_CONTROL}.objectives:Posture",
     },
     "limit": {},
-    "driver": {},
+    "driver": {"socket": "vergence.drivers.socket_robot:SocketRobot"},
+    "camera_source": {"video": "vergence.drivers.cameras:Video"},
     "matcher": {"sift": f"{_VISION}.matching:Sift"},
     "planner": {
         "optimised": f"{_PLANNING}:OptimisedPlanner",
@@ -66,7 +67,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "planner": ("plan",),
     "filter": ("start", "predict", "update"),
     "tracker": ("start",),
-    "driver": ("read", "step", "close"),
+    "camera_source": ("open",),
     "matcher": ("describe", "match"),
 }
 

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driver import SocketDriver
 from hypothesis import given
 from hypothesis import strategies as st
-from link import Link, LinkBrokenError
-from messages import read_answer
 from untrusted import mutants
 
 from vergence.camera import Camera
+from vergence.drivers import Equipment
+from vergence.drivers.socket_robot import Link, LinkBrokenError, SocketDriver, read_answer
 from vergence.errors import DriverSilent
 
 ANSWER = json.dumps({"period": 3, "setpoints": {"puma": [[0.1, -2.0], [0.0, 1e-3]]}}).encode()
@@ -81,14 +80,14 @@ def test_whatever_the_robot_says_is_a_state_or_a_silent_driver(
     pair: Callable[[], tuple[socket.socket, socket.socket]], data: bytes
 ) -> None:
     near, far = pair()
-    driver = SocketDriver.__new__(SocketDriver)
-    vars(driver).update(
-        arms={"puma": ARM}, cameras={"wrist": Camera(4, 3, 5.0, 5.0, 1.5, 1.0)}, videos=()
-    )
-    vars(driver).update(_timeout_s=0.2, _period=0, time=0.0, _frames=[], _link=Link(near, LONGEST))
-    vars(driver).update(_history={"puma": SimpleNamespace(add=lambda _: None, at=lambda _: None)})
+    cameras = {"wrist": Camera(4, 3, 5.0, 5.0, 1.5, 1.0)}
+    equipment = Equipment("", {"puma": ARM}, cameras, 500.0)
     far.sendall(data)
     far.close()
+    try:
+        driver = SocketDriver(Link(near, LONGEST), equipment, 0.2)
+    except DriverSilent:
+        return
     for _ in range(2):
         try:
             driver._receive()

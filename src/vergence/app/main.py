@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from vergence.app import calibrate_command, campaign_commands, names
-from vergence.app.options import CellName, ImageEvery, Images, Json, Out, Seed, Settings
+from vergence.app.options import CellName, Driver, ImageEvery, Images, Json, Out, Seed, Settings
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.errors import VergenceError
 from vergence.places import find_recording
@@ -75,13 +75,7 @@ def run(
     images: Images = True,
     image_every: ImageEvery = 2,
     settings: Settings = None,
-    driver: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME[:ADDRESS]",
-            help="Run on a robot: an installed driver, or module:Class of your own.",
-        ),
-    ] = None,
+    driver: Driver = None,
     as_json: Json = False,
 ) -> None:
     """Run a work cell: progress, a summary, and a folder with recording and report."""

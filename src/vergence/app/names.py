@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from vergence.places import RECORDING, built_in_cells
+from vergence.registry import kinds
 from vergence.studies import PAPERS
 
 LAWS = (  # the cell's own, and those that `vergence.experiments` knows
@@ -23,6 +24,11 @@ _BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 def cells() -> list[str]:
     """Return the names of the cells that come with vergence."""
     return list(built_in_cells())
+
+
+def drivers() -> list[str]:
+    """Return the drivers that ship or are installed."""
+    return list(kinds("driver"))
 
 
 def papers() -> list[str]:

@@ -26,3 +26,11 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replaces a value of the cell file."),
 ]
+Driver = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME[:ADDRESS]",
+        help="Use a real robot: a driver by its name, or module:Class of your own.",
+        autocompletion=names.drivers,
+    ),
+]

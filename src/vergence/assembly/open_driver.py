@@ -1,10 +1,14 @@
-"""The driver that a command names."""
+"""The driver that a command names, with the settings of the cell's table `[driver]`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from vergence.cell import Cell
+from vergence.cell.schema import DriverTable
+from vergence.drivers import CameraSource, Equipment
 from vergence.errors import InputError, VergenceError
+from vergence.loading import Place, load_part, make_part
 from vergence.registry import find, kinds
 from vergence.runtime import Driver
 
@@ -13,28 +17,87 @@ def open_driver(cell: Cell, named: str) -> Driver:
     """Return a driver for a cell.
 
     Args:
-        cell: whose arms and cameras it drives.
+        cell: whose arms and cameras it drives; its table `[driver]` has the settings, if it is of
+            the same kind.
         named: ``NAME``, or ``module:Class`` of one's own in a file beside the cell, in this folder
             or in an installed package; with ``:ADDRESS`` behind it where the driver takes one.
 
     Raises:
         InputError: if there is no such driver, or it cannot be opened.
+        DriverSilent: if the robot does not answer.
     """
+    kind, address = split_name(named)
+    cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
+    settings, place = _settings(cell, kind)
+    if not hasattr(cls, "open"):
+        return _own(cls, cell, named, {"address": address, **settings})
+    if address:
+        settings["address"] = address
+    driver: Driver = _guarded(named, lambda: make_part(cls, settings, place).open(equipment(cell)))
+    return driver
+
+
+def split_name(named: str) -> tuple[str, str]:
+    """Return the kind and the address of ``NAME:ADDRESS`` or ``module:Class:ADDRESS``."""
     first, _, rest = named.partition(":")
     if first in kinds("driver"):
-        kind, address = first, rest
-    else:
-        name, _, address = rest.partition(":")
-        kind = f"{first}:{name}" if name else first
-    folder = cell.path.parent
-    if not (folder / f"{first}.py").is_file():
-        folder = Path.cwd()
-    cls: Any = find("driver", kind, folder=folder, source="--driver", key="")
+        return first, rest
+    name, _, address = rest.partition(":")
+    return f"{first}:{name}" if name else first, address
+
+
+def equipment(cell: Cell) -> Equipment:
+    """Return what a cell says of its hardware.
+
+    Raises:
+        InputError: if its models cannot be read, or a source of `[driver.cameras]` is of no camera.
+    """
+    from vergence.simulation.cell_model import CellModel
+
+    model = CellModel(cell)
+    return Equipment(
+        str(cell.path), model.arms, model.cameras, cell.inner_rate_hz, cell.watched, _sources(cell)
+    )
+
+
+def _settings(cell: Cell, kind: str) -> tuple[dict[str, Any], Place]:
+    """Return the fields of the cell's `[driver]`, if that is of this kind, and where they stand."""
+    table = cell.driver
+    if table is None or table.kind != kind:
+        return {}, Place("--driver", "", cell.path.parent)
+    return dict(table.model_extra or {}), Place(str(cell.path), "driver", cell.path.parent)
+
+
+def _sources(cell: Cell) -> Mapping[str, CameraSource]:
+    table = cell.driver or DriverTable(kind="")
+    place = Place(str(cell.path), "driver.cameras", cell.path.parent)
+    for name in table.cameras:
+        if name not in cell.cameras:
+            raise InputError(place.source, place.key, name, f"cameras: {', '.join(cell.cameras)}")
+    return {
+        name: load_part("camera_source", given, place.at(name))
+        for name, given in table.cameras.items()
+    }
+
+
+def _own(cls: Any, cell: Cell, named: str, values: Mapping[str, Any]) -> Driver:
+    """Return a driver whose class takes the cell, an address, and keywords."""
+    rest = {key: value for key, value in values.items() if key != "address"}
+    driver: Driver = _guarded(named, lambda: cls(cell, values["address"], **rest))
+    return driver
+
+
+def _guarded(named: str, opened: Any) -> Any:
     try:
-        driver: Driver = cls(cell, address)
+        return opened()
     except VergenceError:
         raise
     except Exception as error:
         given = f"{named}, which raised {type(error).__name__}: {error}"
         raise InputError("--driver", "", given, "a driver that opens") from error
-    return driver
+
+
+def _folder(cell: Cell, kind: str) -> Path:
+    """Return where the file of a user's own driver lies: beside the cell, or here."""
+    beside, module = cell.path.parent, kind.partition(":")[0]
+    return beside if (beside / f"{module}.py").is_file() else Path.cwd()

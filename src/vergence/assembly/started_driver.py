@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from vergence.camera import Camera
 from vergence.robot import Arm
 from vergence.runtime.driver import Driver
@@ -14,7 +12,7 @@ _TIMEOUT_S = 5.0  # for a first image
 
 
 class StartedDriver:
-    """Passes on to a driver, after it has waited for an image of each camera with the arms held.
+    """Passes on to a driver, after it has waited for an image of each camera without a set-point.
 
     What a task begins with is read off these images. Time 0 is the first `read` after that, however
     long it took to assemble the loop; only what is exposed from then on is delivered.
@@ -37,15 +35,11 @@ class StartedDriver:
         self.driver = driver
         first: dict[str, Frame] = {}
         sample = driver.read()
-        still = {
-            name: Setpoint(state.position, np.zeros(len(state.position)))
-            for name, state in sample.joints.items()
-        }
         for _ in range(int(_TIMEOUT_S * driver.inner_rate_hz)):
             first |= {frame.camera: frame for frame in sample.frames}
             if all(name in first for name in cameras):
                 break
-            driver.step(still)
+            driver.step({})  # a watchdog that has heard a set-point would not wait for the rest
             sample = driver.read()
         self.missing = tuple(name for name in cameras if name not in first)
         self.joints = {name: state.position for name, state in sample.joints.items()}

@@ -10,6 +10,7 @@ from vergence.cell.schema import (
     TABLES,
     ArmTable,
     CameraTable,
+    DriverTable,
     Duration,
     Name,
     Part,
@@ -43,6 +44,7 @@ class Cell(Table):
     target: TargetTable  # what is looked at
     task: Task  # what is to be done about it
     perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
+    driver: DriverTable | None = None  # the real robot; a simulation does not need it
     law: Part  # how the arm is moved
     laws: dict[Name, Part] = Field(  # others, by name, to compare it with
         default_factory=dict, max_length=64

@@ -12,6 +12,7 @@ from vergence.cell.schema.base import (
 from vergence.cell.schema.tables import (
     ArmTable,
     CameraTable,
+    DriverTable,
     FollowTable,
     PerceptionTable,
     ReachTable,
@@ -26,6 +27,7 @@ __all__ = [
     "ArmTable",
     "Axis",
     "CameraTable",
+    "DriverTable",
     "Duration",
     "FollowTable",
     "Name",
@@ -55,4 +57,5 @@ TABLES: dict[str, type[Table]] = {
     "follow": FollowTable,
     "reach": ReachTable,
     "perception": PerceptionTable,
+    "driver": DriverTable,
 }

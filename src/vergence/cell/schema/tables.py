@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, field_validator, model_validator
 
 from vergence.cell.schema.base import (
     MOST_JOINTS,
@@ -223,3 +223,14 @@ class PerceptionTable(Table):
         None  # how well the target's placement is known: 0.01 to follow, else 0
     )
     start_error_deg: _Angle | None = None  # and its angle: 2 to follow
+
+
+class DriverTable(Table):
+    """The real robot of the cell, for `--driver`; its other keys are the settings of its kind."""
+
+    model_config = ConfigDict(extra="allow")
+
+    kind: Text  # a driver, or module:Class of your own; used where `--driver` names it
+    cameras: dict[Name, Part] = Field(
+        default_factory=dict, max_length=32
+    )  # by camera name: a source of its images on this computer

@@ -13,7 +13,7 @@ _CHUNK = 1 << 16
 
 
 class LinkBrokenError(Exception):
-    """The other side has hung up, or sends what is no message; the text says which."""
+    """The other side hung up, or sent something that is not a message; the text says which."""
 
 
 class Link:
@@ -86,12 +86,18 @@ class Link:
 
 
 def connect(address: tuple[str, int], longest: int, within_s: float = 30.0) -> Link:
-    """Return the link to a robot that may still be starting."""
+    """Return the link to a robot that may still be starting.
+
+    Raises:
+        DriverSilent: if nobody listens there in time.
+    """
     until = monotonic() + within_s
     while True:
         try:
             return Link(socket.create_connection(address, within_s), longest)
         except OSError as error:
             if monotonic() > until:
-                raise DriverSilent(f"nobody listens at {address[0]}:{address[1]}") from error
+                host, port = address
+                reason = error.strerror or "no answer"
+                raise DriverSilent(f"no robot answers at {host}:{port} ({reason})") from error
             sleep(0.1)

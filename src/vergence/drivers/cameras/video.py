@@ -1,0 +1,20 @@
+"""A camera that OpenCV opens."""
+
+from collections.abc import Callable
+
+from vergence.parts import knob, part
+from vergence.runtime.hardware import VideoCamera
+
+
+@part("camera_source", "video")
+class Video:
+    """A USB camera by its number, a network stream by its address, or a video file."""
+
+    source: int | str = 0  # number of a device, path of a file, or address of a stream
+    latency_s: float = knob(
+        0.0, "s", least=0.0, upto=2.0
+    )  # from exposure until the image arrives; see `vergence calibrate --latency`
+
+    def open(self, name: str, clock: Callable[[], float]) -> VideoCamera:
+        """Open the camera; a thread takes its images."""
+        return VideoCamera(name, self.source, clock, self.latency_s)
