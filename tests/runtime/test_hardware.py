@@ -91,7 +91,7 @@ def test_a_camera_that_is_unplugged_ends_the_run_by_name(video: Path) -> None:
     outcome = looped(driver, ScriptedEyes(), rate_hz=50.0, listeners=[notes]).run(10.0)
     driver.close()
     assert outcome.kind is OutcomeKind.IMAGE_LATE
-    assert "no picture for" in outcome.reason
+    assert "no image for" in outcome.reason
     assert sum(len(record.sample.frames) for record in notes.ticks) == 12
     np.testing.assert_array_equal(driver.setpoints[-1]["left"].velocity, 0.0)
 

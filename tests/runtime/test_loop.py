@@ -103,7 +103,7 @@ def test_without_pictures_it_keeps_on_for_its_patience_and_then_ends() -> None:
     outcome = looped(driver, timeouts=Timeouts(image_s=0.3)).run(5.0)
     assert outcome.kind is OutcomeKind.IMAGE_LATE
     assert outcome.time == pytest.approx(0.5 + 0.3, abs=2 / 30)
-    assert "no picture for 0.3" in outcome.reason
+    assert "no image for 0.3" in outcome.reason
     np.testing.assert_array_equal(driver.velocities()[-1], 0.0)
     assert changes_within(driver.velocities(), 8.0, 2e-3)
 

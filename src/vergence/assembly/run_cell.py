@@ -14,9 +14,6 @@ from vergence.runtime.listeners import Listeners
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
 
-# Simulated servos may lag more than a robot's: cells show it, and are not ended by it.
-_SIMULATED = FollowingBound(offset=1.0)
-
 
 def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> Run:
     """Run a cell in simulation.
@@ -70,7 +67,7 @@ def run_driver(
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        loop = _loop(cell, parts, everyone, isinstance(driver, SimulatedDriver))
+        loop = _loop(cell, parts, everyone)
         if attend is not None:
             attend(loop, parts)
         outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
@@ -80,7 +77,8 @@ def run_driver(
     return run
 
 
-def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener], simulated: bool) -> Loop:
+def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
+    servo_hz = cell.arms[cell.task.arm].servo_bandwidth_hz
     return Loop(
         parts.driver,
         cell.task.arm,
@@ -89,7 +87,7 @@ def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener], simulated: bo
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
         listeners=listeners,
-        following=_SIMULATED if simulated else None,
+        following=FollowingBound(servo_hz=servo_hz),
         timeouts=Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s),
         goal=_goal(cell.task),
     )

@@ -19,6 +19,16 @@ def bad_sample(reason: str) -> Fault:
     return Fault(OutcomeKind.BAD_SAMPLE, reason)
 
 
+def bad_command(reason: str) -> Fault:
+    """Return what is wrong with a law's command."""
+    return Fault(OutcomeKind.BAD_COMMAND, reason)
+
+
+def clock_error(reason: str) -> Fault:
+    """Return what is wrong with a clock."""
+    return Fault(OutcomeKind.CLOCK_ERROR, reason)
+
+
 def completed(duration_s: float, time: float) -> Outcome:
     """Return the end of a run that went on as long as it should."""
     reason = f"ran for {round(duration_s, 3):g} s with the target in view"
@@ -40,7 +50,7 @@ def not_reached(error_px: float, why: str, time: float) -> Outcome:
 
 def image_late(waited_s: float, time: float) -> Outcome:
     """Return the end of a run without images."""
-    return Outcome(OutcomeKind.IMAGE_LATE, f"no picture for {waited_s:.2f} s", time)
+    return Outcome(OutcomeKind.IMAGE_LATE, f"no image for {waited_s:.2f} s", time)
 
 
 def target_lost(reasons: Iterable[str], time: float) -> Outcome:

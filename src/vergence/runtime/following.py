@@ -13,34 +13,46 @@ from vergence.signals import OutcomeKind, RobotMode, RobotState, Setpoint
 
 
 class FollowingBound(NamedTuple):
-    """How far an arm may be from its set-points: so far from all those of the last `lag_s`."""
+    """How far an arm may be from its set-points: so far from all those of the last `lag_s`.
 
-    lag_s: float = 0.1  # by which a servo lags behind its set-points
-    offset: float = 0.03  # rad or m, for overshoot and what gravity does
+    A critically damped servo of bandwidth ω that is fed the desired rate errs by at most q̈_max/ω²;
+    this is added to `offset` for each joint. The defaults are those of stiff servos.
+    """
+
+    lag_s: float = 0.1  # by which a servo may lag behind its set-points
+    offset: float = 0.03  # rad or m that gravity, other joints and a late tick explain
+    servo_hz: float = np.inf  # the bandwidth of the joints' servos
+
+    def of(self, arm: Arm) -> FloatArray:
+        """Return the bound for each joint of an arm (n,), rad or m."""
+        bound: FloatArray = self.offset + arm.acceleration_max / (2.0 * np.pi * self.servo_hz) ** 2
+        return bound
 
 
 @njit(cache=True, error_model="numpy")
 def farthest_joint(
-    measured: FloatArray, setpoint: FloatArray, recent: FloatArray, row: int, bound: float
+    measured: FloatArray, setpoint: FloatArray, bound: FloatArray, recent: FloatArray, row: int
 ) -> int:
-    """Return the joint farthest outside of its recent set-points, -1 if none is by the bound.
+    """Return the joint farthest beyond its bound from all recent set-points, -1 if none is.
 
     Args:
         measured: joint positions, (n,).
         setpoint: the last one, (n,); it is written into a row of `recent`.
+        bound: for each joint, rad or m, (n,).
         recent: the last set-points, (K, n).
         row: which one is the oldest.
-        bound: rad or m.
     """
     recent[row] = setpoint
-    worst, joint = bound, -1
+    worst, joint = 0.0, -1
     for i in range(len(measured)):
+        if abs(measured[i] - setpoint[i]) <= bound[i]:
+            continue
         low = high = recent[0, i]
         for k in range(1, len(recent)):
             low, high = min(low, recent[k, i]), max(high, recent[k, i])
-        outside = max(low - measured[i], measured[i] - high)
-        if outside > worst:
-            worst, joint = outside, i
+        beyond = max(low - measured[i], measured[i] - high) - bound[i]
+        if beyond > worst:
+            worst, joint = beyond, i
     return joint
 
 
@@ -73,7 +85,7 @@ class Follower:
         self.guard.approach(start)  # compiles or loads what a hold needs; it moves nothing
         self.holding: Fault | None = None  # why the arm is held, if it is
         self._name, self._names = name, arm.names
-        self._bound, self._patience_s = bound, patience_s
+        self._bound, self._patience_s = bound.of(arm), patience_s
         self._recent = np.tile(start, (max(round(bound.lag_s / dt), 1), 1))
         self._tick = 0
         self._scale = 1.0
@@ -83,20 +95,20 @@ class Follower:
 
     def observe(self, time: float, measured: FloatArray, robot: RobotState | None) -> Fault | None:
         """Take note of where the arm is; return why the run ends, if it was held for too long."""
-        row, self._tick = self._tick % len(self._recent), self._tick + 1
-        bound = self._bound.offset
-        joint = farthest_joint(measured, self.guard.position, self._recent, row, bound)
+        recent = self._recent
+        row, self._tick = self._tick % len(recent), self._tick + 1
+        joint = farthest_joint(measured, self.guard.position, self._bound, recent, row)
         if robot is not None:
             self._scale = robot.speed_scale
         if joint < 0 and self.holding is None and (robot is None or robot.running):
             return None
         return self._hold(time, measured, self._reason(joint, measured, robot))
 
-    def step(self, wanted: FloatArray) -> Setpoint:
+    def step(self, rates: FloatArray) -> Setpoint:
         """Return the next set-point, at desired rates (n,) or on the way to the measured joints."""
         if self.holding is not None:
             return self.guard.approach(self._anchor)
-        return self.guard.step(wanted if self._scale == 1.0 else self._scale * wanted)
+        return self.guard.step(rates if self._scale == 1.0 else self._scale * rates)
 
     def _reason(self, joint: int, measured: FloatArray, robot: RobotState | None) -> Fault | None:
         if robot is not None and not robot.running:
@@ -111,7 +123,7 @@ class Follower:
     def _hold(self, time: float, measured: FloatArray, reason: Fault | None) -> Fault | None:
         """Begin, continue or end a hold; return why the run ends, if it does."""
         if reason is not None:
-            moved = np.abs(measured - self._held_at).max() > self._bound.offset
+            moved = (np.abs(measured - self._held_at) > self._bound).any()
             if self.holding is None and (moved or time - self._freed > self._patience_s):
                 self._since, self._held_at = time, measured
             # An arm that does not follow is met where it was found, not chased: its sensors may
@@ -126,5 +138,5 @@ class Follower:
         return self.holding if emergency or time - self._since > self._patience_s else None
 
     def _anchored(self, measured: FloatArray) -> bool:
-        gap = float(np.abs(self.guard.position - measured).max())
-        return gap < 0.5 * self._bound.offset and not self.guard.moving
+        near = (np.abs(self.guard.position - measured) < 0.5 * self._bound).all()
+        return bool(near) and not self.guard.moving

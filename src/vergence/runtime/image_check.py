@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.runtime.endings import Fault, bad_sample
+from vergence.runtime.endings import Fault, bad_sample, clock_error
 from vergence.signals import Frame, OutcomeKind, Sample
 
 EARLY_S = 0.01  # a stamp may be so far ahead of the sample's clock
@@ -48,7 +48,7 @@ class ImageCheck:
         age = sample.time - frame.time
         if not age >= -EARLY_S:
             reason = f"an image of {frame.camera} is stamped {-age:.3g} s in the future"
-            return Fault(OutcomeKind.CLOCK_ERROR, reason)
+            return clock_error(reason)
         if age > self._age_s:
             reason = f"an image of {frame.camera} arrived {age:.3g} s after its exposure"
             return Fault(OutcomeKind.IMAGE_LATE, reason)

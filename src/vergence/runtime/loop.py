@@ -138,7 +138,7 @@ class Loop:
             sample = self._border.admit(self._driver.read())
             if isinstance(sample, Fault):
                 return Outcome(*sample, self._now)
-            self._now = sample.time
+            self._now = self._border.time
             if not self._followers and (outcome := self._begin(sample)):
                 return outcome
             if self._interrupt.asked:
@@ -155,7 +155,7 @@ class Loop:
             if (worst := float(outside.max())) > _OUTSIDE:
                 joint = f"{arm.names[int(outside.argmax())]} of {name}"
                 reason = f"{joint} starts {worst:.3g} outside its range"
-                return Outcome(OutcomeKind.JOINT_LIMIT, reason, sample.time)
+                return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
             self._followers[name] = Follower(
                 arm, name, start, dt, self._following, timeouts.robot_s
             )
@@ -169,52 +169,53 @@ class Loop:
             if self._tick and stuck.any():
                 names = self._driver.arms[self._arm].names
                 at_limit = [name for name, held in zip(names, stuck, strict=True) if held]
-                return endings.joint_limit(at_limit, sample.time)
+                return endings.joint_limit(at_limit, self._now)
         if not turns:
             return None
-        if sample.time >= duration_s:
-            return self._completed(duration_s, sample.time)
+        sample = self._border.in_run_time(sample)
+        if self._now >= duration_s:
+            return self._completed(duration_s)
         self._part = "perception"
         observation = self._perception.observe(sample.frames)
         self._part = "planner"
         if observation is None:
             return self._wait(sample)
-        self._last_image = sample.time
-        self._losses.report(sample.time, observation)
+        self._last_image = self._now
+        self._losses.report(self._now, observation)
         reference = self._planner.reference(observation.time)
         self._part = "law"
         return self._decide(sample, observation, reference)
 
     def _wait(self, sample: Sample) -> Outcome | None:
         """Go on without an image, for a while."""
-        waited = sample.time - self._last_image
+        waited = self._now - self._last_image
         if waited > self._timeouts.image_s:
-            return endings.image_late(waited, sample.time)
-        self._record(sample, None, self._planner.reference(sample.time))
+            return endings.image_late(waited, self._now)
+        self._record(sample, None, self._planner.reference(self._now))
         return None
 
     def _decide(
         self, sample: Sample, observation: Observation, reference: Reference
     ) -> Outcome | None:
         """Ask the law for a command, unless the target is lost or the arm is held."""
-        time, self._command = sample.time, None
+        self._command = None
         if not shows_target(observation):
             self._record(sample, observation, reference)
-            if time - self._last_seen > self._timeouts.target_s:
-                return endings.target_lost(reasons(observation), time)
+            if self._now - self._last_seen > self._timeouts.target_s:
+                return endings.target_lost(reasons(observation), self._now)
             return None
-        self._last_seen = time
+        self._last_seen = self._now
         if self._followers[self._arm].holding is not None:
             self._record(sample, observation, reference)
             return None
         command = self._law.command(observation, reference, sample.joints[self._arm])
         if fault := self._border.check_command(self._arm, command):
-            return Outcome(*fault, time)
+            return Outcome(*fault, self._now)
         self._command = command
         self._record(sample, observation, reference)
         self._arrival.observe(observation, reference, command, sample.joints[self._arm].position)
-        self._tell_of_stall(time)
-        return None if command.fault is None else Outcome(*command.fault, time)
+        self._tell_of_stall()
+        return None if command.fault is None else Outcome(*command.fault, self._now)
 
     def _step(self, sample: Sample) -> Outcome | None:
         """Hand the next set-points to the driver; return how the run ends, if it does."""
@@ -222,12 +223,12 @@ class Loop:
             robot = sample.robots.get(name)
             if name == self._arm or robot is not None:
                 measured = sample.joints[name].position
-                if fault := follower.observe(sample.time, measured, robot):
-                    return Outcome(*fault, sample.time)
-        self._tell_of_hold(sample.time)
-        rates = self._rates(sample.time)
+                if fault := follower.observe(self._now, measured, robot):
+                    return Outcome(*fault, self._now)
+        self._tell_of_hold()
+        rates = self._rates()
         if isinstance(rates, Fault):
-            return Outcome(*rates, sample.time)
+            return Outcome(*rates, self._now)
         setpoints = {
             name: follower.step(rates if name == self._arm else self._rest[name])
             for name, follower in self._followers.items()
@@ -238,11 +239,9 @@ class Loop:
         self._tick += 1
         return None
 
-    def _rates(self, time: float) -> FloatArray | Fault:
+    def _rates(self) -> FloatArray | Fault:
         """Return the rates to move at: the command's, less what its age has taken from them."""
-        share = 0.0
-        if self._command is not None:
-            share = command_share(time - self._last_image, self._period_s, self._timeouts.decay_s)
+        share = self._share
         self._part = "law"
         if share == 0.0:
             self._command = None
@@ -257,7 +256,14 @@ class Loop:
                 return fault
         return rates if share == 1.0 else share * rates
 
-    def _tell_of_hold(self, time: float) -> None:
+    @property
+    def _share(self) -> float:
+        """How much is left of the command."""
+        if self._command is None:
+            return 0.0
+        return command_share(self._now - self._last_image, self._period_s, self._timeouts.decay_s)
+
+    def _tell_of_hold(self) -> None:
         holding = self._followers[self._arm].holding
         kind = holding.kind.value if holding else ""
         if holding is not None:
@@ -265,38 +271,32 @@ class Loop:
         if kind != self._held:
             self._held = kind
             reason = holding.reason if holding else f"{self._arm} follows again"
-            self._listeners.event(time, kind or "following", reason)
+            self._listeners.event(self._now, kind or "following", reason)
 
-    def _tell_of_stall(self, time: float) -> None:
+    def _tell_of_stall(self) -> None:
         stalled = self._arrival.stalled
         if stalled != self._stalled:
             self._stalled = stalled
             text = f"held by {self._arrival.holder()}" if stalled else "the arm moves again"
-            self._listeners.event(time, "stalled" if stalled else "moving", text)
+            self._listeners.event(self._now, "stalled" if stalled else "moving", text)
 
     def _record(
         self, sample: Sample, observation: Observation | None, reference: Reference
     ) -> None:
         commands = {}
         if self._command is not None:
-            share = command_share(
-                sample.time - self._last_image, self._period_s, self._timeouts.decay_s
-            )
-            faded = replace(
-                self._command,
-                velocity=share * self._command.velocity,
-                v_camera=share * self._command.v_camera,
-            )
-            commands = {self._arm: self._command if share == 1.0 else faded}
+            share, asked = self._share, self._command
+            faded = replace(asked, velocity=share * asked.velocity, v_camera=share * asked.v_camera)
+            commands = {self._arm: asked if share == 1.0 else faded}
         setpoints = {name: follower.guard.setpoint for name, follower in self._followers.items()}
-        record = TickRecord(sample.time, sample, observation, reference, commands, setpoints)
+        record = TickRecord(self._now, sample, observation, reference, commands, setpoints)
         self._listeners.tick(record)
 
-    def _completed(self, duration_s: float, time: float) -> Outcome:
+    def _completed(self, duration_s: float) -> Outcome:
         holding = self._followers[self._arm].holding
         if holding is not None:
-            return Outcome(*holding, time)
-        return self._arrival.outcome(duration_s, time)
+            return Outcome(*holding, self._now)
+        return self._arrival.outcome(duration_s, self._now)
 
     def _stopped(self) -> Outcome:
         return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)

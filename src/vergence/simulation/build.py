@@ -91,7 +91,9 @@ def _place(element: Any, placement: Placement, camera: bool = False) -> None:
 def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
     """Attach an arm and give every joint towards its last body that follows none a position servo.
 
-    The arm's weight is compensated, as a robot's own controller does.
+    The arm's weight, and friction, damping and springs of these joints, are compensated, as a
+    robot's own controller does. A servo that shapes only the inertia would not overcome a friction
+    that was identified on a geared drive. Effort limits stay.
     """
     model = _read(cell, f"arms.{name}.model", table.model, table.body)
     for key in list(model.keys):
@@ -106,6 +108,9 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
             model.delete(actuator)
     for body in model.bodies:
         body.gravcomp = 1.0
+    for joint in model.joints:
+        if joint.name in joints:
+            joint.damping, joint.stiffness, joint.frictionloss = np.zeros(3), np.zeros(3), 0.0
     couplings = [eq for eq in model.equalities if eq.active and eq.type == _FOLLOWS]
     for coupling in couplings:
         coupling.solref = [2.0 * spec.option.timestep, 1.0]  # as stiff as MuJoCo holds one
