@@ -5,18 +5,19 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from faults import DRIVER_FAULTS, LAW_FAULTS, FaultyDriver, FaultyLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scripted_cell import Notes, looped
+from scripted_cell import Notes, ScriptedDriver, looped
 
 from vergence.robot import Arm, Chain
 from vergence.runtime import Timeouts
-from vergence.signals import Outcome, OutcomeKind
+from vergence.signals import Outcome, OutcomeKind, Setpoint
+from vergence.studies.driver_faults import DRIVER_FAULTS
+from vergence.studies.faulty_driver import FaultyDriver
+from vergence.studies.guarantees_faults import keeps_limits
+from vergence.studies.law_faults import LAW_FAULTS, FaultyLaw
 
-ROUNDING = 1e-9
 TIMEOUTS = Timeouts(robot_s=0.6)
-UNREACHABLE = {"step raises OSError", "step raises ValueError", "step raises DriverSilent"}
 
 
 @pytest.fixture(autouse=True)
@@ -36,25 +37,6 @@ def drawn_arm(rng: np.random.Generator) -> Arm:
     return Arm(names, chain, -half, half, rng.uniform(0.5, 3, n), 10 ** rng.uniform(0.5, 1.5, n))
 
 
-def assert_safe(driver: FaultyDriver, reaches_rest: bool) -> None:
-    """Check every set-point that was handed over, until rest."""
-    dt = 1.0 / driver.inner_rate_hz
-    if not driver.handed:
-        return
-    for name, arm in driver.arms.items():
-        position = np.array([setpoints[name].position for setpoints in driver.handed])
-        velocity = np.array([setpoints[name].velocity for setpoints in driver.handed])
-        assert np.isfinite(position).all()
-        assert (position >= arm.q_min - ROUNDING).all()
-        assert (position <= arm.q_max + ROUNDING).all()
-        assert (abs(velocity) <= arm.rate_max * (1 + ROUNDING)).all()
-        change = abs(np.diff(velocity, axis=0, prepend=np.zeros((1, arm.joint_count))))
-        assert (change <= arm.acceleration_max * dt * (1 + ROUNDING) + ROUNDING).all()
-        np.testing.assert_allclose(np.diff(position, axis=0), dt * velocity[1:], atol=1e-9)
-        if reaches_rest:
-            np.testing.assert_allclose(velocity[-1], 0.0, atol=1e-9)
-
-
 def outcome_of(driver: FaultyDriver, law: FaultyLaw, duration_s: float = 1.5) -> Outcome:
     notes = Notes()
     outcome = looped(driver, law=law, listeners=[notes], timeouts=TIMEOUTS).run(duration_s)
@@ -71,27 +53,27 @@ def slow_rates(arm: Arm) -> np.ndarray:
 
 @pytest.mark.parametrize("fault", DRIVER_FAULTS)
 def test_a_fault_of_the_driver_ends_by_name_with_the_arm_braked(fault: str) -> None:
-    driver = FaultyDriver(fault=fault)
+    driver = FaultyDriver(ScriptedDriver(), DRIVER_FAULTS[fault])
     outcome = outcome_of(driver, FaultyLaw(np.array([0.3, -0.2])))
-    assert outcome.kind in DRIVER_FAULTS[fault]
-    assert_safe(driver, fault not in UNREACHABLE)
+    assert outcome.kind in DRIVER_FAULTS[fault].ends
+    assert keeps_limits(driver, not DRIVER_FAULTS[fault].deaf)
     assert max(abs(s["left"].velocity).max() for s in driver.handed) > 0.1
 
 
 @pytest.mark.parametrize("fault", DRIVER_FAULTS)
 def test_a_driver_that_is_faulty_from_the_start_never_moves_its_arm_unchecked(fault: str) -> None:
-    driver = FaultyDriver(fault=fault, at=0.0)
+    driver = FaultyDriver(ScriptedDriver(), DRIVER_FAULTS[fault], at=0.0)
     outcome = outcome_of(driver, FaultyLaw(np.array([0.3, -0.2])))
     assert isinstance(outcome.kind, OutcomeKind)
-    assert_safe(driver, fault not in UNREACHABLE)
+    assert keeps_limits(driver, not DRIVER_FAULTS[fault].deaf)
 
 
 @pytest.mark.parametrize("fault", LAW_FAULTS)
 def test_a_fault_of_the_law_ends_by_name_with_the_arm_braked(fault: str) -> None:
-    driver = FaultyDriver()
-    outcome = outcome_of(driver, FaultyLaw(np.array([0.3, -0.2]), fault))
-    assert outcome.kind in LAW_FAULTS[fault][0]
-    assert_safe(driver, True)
+    driver = FaultyDriver(ScriptedDriver())
+    outcome = outcome_of(driver, FaultyLaw(np.array([0.3, -0.2]), LAW_FAULTS[fault]))
+    assert outcome.kind in LAW_FAULTS[fault].ends
+    assert keeps_limits(driver)
 
 
 @settings(max_examples=40, deadline=None)
@@ -105,19 +87,35 @@ def test_any_two_faults_on_any_arm_end_by_name_inside_the_limits(
 ) -> None:
     rng = np.random.default_rng(seed)
     arm = drawn_arm(rng)
-    driver = FaultyDriver(
-        fault=fault,
-        at=rng.uniform(0.0, 0.6),
-        rng=rng,
+    scripted = ScriptedDriver(
         arms={"left": arm},
         inner_rate_hz=float(rng.choice([125.0, 500.0, 1000.0])),
         camera_rate_hz=float(rng.choice([25.0, 30.0, 60.0])),
         latency_s=float(rng.choice([0.0, 0.004, 0.05])),
     )
-    law = FaultyLaw(slow_rates(arm), law_fault, at=rng.uniform(0.0, 0.6), rng=rng)
+    driver = FaultyDriver(scripted, DRIVER_FAULTS[fault], rng.uniform(0.0, 0.6), rng)
+    law = FaultyLaw(slow_rates(arm), LAW_FAULTS[law_fault], rng.uniform(0.0, 0.6), rng)
     outcome = outcome_of(driver, law, 1.0)
     assert isinstance(outcome.kind, OutcomeKind)
-    assert_safe(driver, fault not in UNREACHABLE)
+    assert keeps_limits(driver, not DRIVER_FAULTS[fault].deaf)
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity"),
+    [
+        ([0.0, 1.1], [0.0, 0.0]),  # outside its range
+        ([0.0, 0.0], [0.0, 2.1]),  # too fast
+        ([0.0, 0.0], [0.1, 0.0]),  # from rest in one tick
+        ([np.nan, 0.0], [0.0, 0.0]),
+    ],
+)
+def test_a_set_point_past_a_limit_is_noticed(position, velocity) -> None:
+    driver = FaultyDriver(ScriptedDriver())
+    others = Setpoint(np.zeros(3), np.zeros(3))
+    driver.step({"left": Setpoint(np.zeros(2), np.zeros(2)), "right": others})
+    assert keeps_limits(driver)
+    driver.step({"left": Setpoint(np.array(position), np.array(velocity)), "right": others})
+    assert not keeps_limits(driver, to_rest=False)
 
 
 def test_there_are_enough_faults() -> None:

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from vergence.control import guard
+from vergence.runtime import loop
 from vergence.signals import Setpoint
 from vergence.studies import guarantees
+from vergence.studies.guarantees_faults import FAULTS, blind_check, try_fault
 from vergence.studies.guarantees_runs import LAWS, arms, attempt
 
 
@@ -54,3 +56,14 @@ def test_the_hard_cases_hold(known):
 
 def test_a_heading_that_led_the_papers_law_to_a_limit_is_completed(known):
     assert guarantees._follows(known[0], "constrained tracking", 0.1, np.pi / 2, 32.0)
+
+
+def test_faults_on_the_arms_of_the_cells_end_by_name_inside_the_limits(known):
+    for index in range(3, len(FAULTS) * len(known), 11):
+        assert try_fault(known, 7, index).good, FAULTS[index // len(known)]
+
+
+def test_an_arm_goes_on_no_longer_than_stated_after_its_last_image(known, monkeypatch):
+    assert blind_check(known[:1], 0).holds
+    monkeypatch.setattr(loop, "command_share", lambda age_s, period_s, decay_s: 1.0)
+    assert not blind_check(known[:1], 0).holds

@@ -98,9 +98,11 @@ class Follower:
         recent = self._recent
         row, self._tick = self._tick % len(recent), self._tick + 1
         joint = farthest_joint(measured, self.guard.position, self._bound, recent, row)
+        stopped = False
         if robot is not None:
             self._scale = robot.speed_scale
-        if joint < 0 and self.holding is None and (robot is None or robot.running):
+            stopped = not robot.running or robot.speed_scale == 0.0
+        if joint < 0 and self.holding is None and not stopped:
             return None
         return self._hold(time, measured, self._reason(joint, measured, robot))
 
@@ -113,6 +115,9 @@ class Follower:
     def _reason(self, joint: int, measured: FloatArray, robot: RobotState | None) -> Fault | None:
         if robot is not None and not robot.running:
             reason = f"{self._name} reports: {robot.mode.value}"
+            return Fault(OutcomeKind.PROTECTIVE_STOP, reason)
+        if robot is not None and robot.speed_scale == 0.0:
+            reason = f"the speed of {self._name} is set to zero on the robot"
             return Fault(OutcomeKind.PROTECTIVE_STOP, reason)
         if joint < 0:
             return None

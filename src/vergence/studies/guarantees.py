@@ -16,6 +16,7 @@ from vergence.signals import OutcomeKind
 from vergence.simulation import IdealCell
 from vergence.studies import guarantees_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
+from vergence.studies.guarantees_faults import blind_check, faults_check
 from vergence.studies.guarantees_random import PAIRS_SEED, success_check, try_pair
 from vergence.studies.guarantees_runs import (
     CAMERA_MODEL,
@@ -51,7 +52,8 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
         progress: told what is being done.
         seed: of the random runs and pairs.
     """
-    puma, _, gantry, *_ = arms()
+    known = arms()
+    puma, _, gantry, *_ = known
     count = PAIRS_QUICK if quick else PAIRS
     with processes() as pool:
         limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, seed, pool, progress)
@@ -59,7 +61,10 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
             partial(try_pair, gantry, PAIRS_SEED + seed),
             count,
             pool,
-            lambda done: progress(f"{count} random pairs", 0.4 + 0.4 * done),
+            lambda done: progress(f"{count} random pairs", 0.4 + 0.35 * done),
+        )
+        faults = faults_check(
+            known, seed, pool, lambda done: progress("faults", 0.75 + 0.05 * done)
         )
     progress("headings", 0.8)
     headings = _headings(puma)
@@ -69,7 +74,15 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     passed, sigma = _singularity(puma)
     progress("soft limits", 0.97)
     others = (passed, _outside_start(puma), _conflict(puma))
-    checks = (limits, headings, speed, success_check(pairs), *others)
+    checks = (
+        limits,
+        faults,
+        blind_check(known, seed),
+        headings,
+        speed,
+        success_check(pairs),
+        *others,
+    )
     return StudyResult(TITLE, checks, figures.draw(out, ends, sigma, pairs), seed)
 
 
