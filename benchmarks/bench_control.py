@@ -9,6 +9,7 @@ from numba import njit
 
 from harness import calls, loops, row
 from peer_programs import machinevision, visp
+from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control import (
     MotionSettings,
@@ -18,7 +19,12 @@ from vergence.control import (
     Situation,
     TrackingSetup,
 )
-from vergence.control.objectives import optimal_tracking_tick, pack_setup, tracking_twist
+from vergence.control.objectives import optimal_tracking_tick, pack_setup
+from vergence.control.objectives._tracking import (
+    image_square,
+    tracking_displacement,
+    unpack_gains,
+)
 from vergence.robot import Arm
 
 POSE = np.array([-2.19, 0.75, -3.01, 0.1, -0.87, 0.2])
@@ -47,6 +53,16 @@ def setup_of(arm: Arm, S: float) -> TrackingSetup:
     setup = servo.tracking
     assert setup is not None
     return setup
+
+
+@njit(cache=True, error_model="numpy")
+def tracking_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray) -> None:
+    """The law alone, (17): no arm, no avoidance; fills the camera twist (6,)."""
+    gains, focal_px = unpack_gains(weights), weights[7:9]
+    BtB, Bt_error, _ = image_square(features, focal_px, gains.period)
+    u = tracking_displacement(BtB, Bt_error, gains, 0.0, gains.avoiding)
+    for i in range(6):
+        v_camera[i] = u[i] / gains.period
 
 
 def law_alone(setup: TrackingSetup) -> Callable[[], None]:

@@ -37,7 +37,11 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "potential_field": f"{_PLANNING}:PotentialFieldPlanner",
     },
     "filter": {"pose": f"{_ESTIMATION}:PoseFilter", "rpy": f"{_ESTIMATION}:RpyPoseFilter"},
-    "tracker": {"ssd": f"{_VISION}:SsdTracking", "round_marks": f"{_VISION}.marks:MarkTracking"},
+    "tracker": {
+        "ssd": f"{_VISION}:SsdTracking",
+        "round_marks": f"{_VISION}.marks:MarkTracking",
+        "tags": f"{_VISION}.marks:TagTracking",
+    },
     "motion": {
         "stationary": f"{_MOTIONS}:Stationary",
         "line": f"{_MOTIONS}:Line",

@@ -23,7 +23,6 @@ from vergence.control.objectives._tracking import (
     optimal_tracking_tick,
     pack_setup,
     tracking_displacement,
-    tracking_twist,
     unpack_tick,
 )
 from vergence.errors import InputError, ShapeError
@@ -163,16 +162,6 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     np.testing.assert_allclose(
         [tick.w, tick.penalty, tick.sigma], [m.value, m.penalty, m.smallest_singular_value]
     )
-
-
-def test_the_law_alone_is_the_tick_without_avoidance() -> None:
-    law = tracking_law(ARM, np.ones(4))
-    weights, joints = pack_setup(law.tracking)
-    features = drawn_features(np.random.default_rng(31), 4)
-    result, v_camera = np.empty(16), np.empty(6)
-    optimal_tracking_tick(weights, joints, START, features, result)
-    tracking_twist(weights, features, v_camera)
-    np.testing.assert_array_equal(v_camera, unpack_tick(result).v_camera)
 
 
 def test_a_feature_that_was_not_found_has_no_say() -> None:

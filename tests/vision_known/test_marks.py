@@ -9,8 +9,8 @@ from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.vision.marks import (
     MarkerDetector,
+    TagTracking,
     circle_centre_bias,
-    marker_corners,
     measure_round_marks,
 )
 
@@ -133,10 +133,23 @@ def test_a_window_keeps_the_pixels_of_the_picture() -> None:
     assert len(detector.detect(image[:, :100]).ids) == 0
 
 
-def test_corners_of_a_marker_run_clockwise_from_its_top_left() -> None:
-    corners = marker_corners(0.1)
-    np.testing.assert_allclose(corners[0], [-0.05, 0.05, 0.0])
-    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.1, 0.1, 0.0])
+def test_corners_of_markers_are_followed_by_their_numbers() -> None:
+    moved = QUAD + (30.0, 20.0)
+    tracker = TagTracking().start(marker_picture(7, QUAD), QUAD[[2, 0]] + 3.0)
+    tracks = tracker.track(marker_picture(7, moved))
+    assert tracks.found.all()
+    np.testing.assert_allclose(tracks.points_px, moved[[2, 0]], atol=0.5)
+    other = tracker.track(marker_picture(8, moved))  # another marker in the same place
+    assert not other.found.any()
+    assert other.reasons == ("marker 7 is not seen",) * 2
+    np.testing.assert_array_equal(other.points_px, tracks.points_px)  # where they were last
+
+
+def test_points_without_a_marker_are_refused() -> None:
+    with pytest.raises(InputError, match=r"no corner of a marker within 10 px of \(20, 30\)"):
+        TagTracking().start(marker_picture(7, QUAD), np.array([[20.0, 30.0]]))
+    with pytest.raises(InputError, match="did you mean apriltag_36h11"):
+        TagTracking(dictionary="apriltag36h11")
 
 
 def test_a_dictionary_that_is_not_known_is_answered_with_those_that_are() -> None:

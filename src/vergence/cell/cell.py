@@ -172,6 +172,8 @@ def _with_parts(cell: Cell) -> Cell:
     servo = find("servo", "servo")
 
     def law(key: str, table: Any) -> Any:
+        if isinstance(table, str):  # a name stands for a table of that kind
+            table = {"kind": table}
         if not isinstance(table, Mapping):
             raise InputError(str(cell.path), key, table, "a table")
         if names_law(table.get("kind"), place):

@@ -1,13 +1,5 @@
 """Control: objectives, limits, solvers, the servo that sums them, and the guard behind it."""
 
-from vergence.control.conditioning import (
-    CameraDirections,
-    Resolvability,
-    camera_directions,
-    gain_matrix,
-    has_full_rank,
-    resolvability,
-)
 from vergence.control.guard import (
     Guard,
     closing_rates,
@@ -56,7 +48,6 @@ from vergence.control.term import Term
 
 __all__ = [
     "AXES",
-    "CameraDirections",
     "CameraMounting",
     "CameraState",
     "DampedPseudoInverse",
@@ -83,7 +74,6 @@ __all__ = [
     "PseudoInverse",
     "Quadratic",
     "QuadraticProgram",
-    "Resolvability",
     "Servo",
     "ServoSettings",
     "Situation",
@@ -93,19 +83,15 @@ __all__ = [
     "TrackingSetup",
     "WeightedObjective",
     "axis_mask",
-    "camera_directions",
     "closing_rates",
-    "gain_matrix",
     "guarded_step",
     "guarded_steps",
-    "has_full_rank",
     "least_squares",
     "moved",
     "optimal_tracking_tick",
     "pack_setup",
     "unpack_chain",
     "pose_difference",
-    "resolvability",
     "resolve_redundant",
     "singular_fault",
     "stoppable_speed",

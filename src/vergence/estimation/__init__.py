@@ -3,7 +3,6 @@
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.corner_view import CornerView
-from vergence.estimation.extrapolation import extrapolate
 from vergence.estimation.fit_pose import fit_pose
 from vergence.estimation.held_target import (
     HandPose,
@@ -73,7 +72,6 @@ __all__ = [
     "WindowRule",
     "add_obstacles",
     "blocked_from_hand",
-    "extrapolate",
     "fit_pose",
     "pose_from_points",
     "predict_visibility",

@@ -68,12 +68,6 @@ class Trajectory:
             joint_rates=self._joints(sigma, 1) * speed,
         )
 
-    def image_acceleration(self, time: float) -> FloatArray:
-        """Return d²s*/dt², (N, 2), px/s²; continuous in time."""
-        sigma, speed, force = self.law.at(time)
-        result: FloatArray = self._image(sigma, 2) * speed**2 + self._image(sigma, 1) * force
-        return result
-
     def joints(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return joint positions, rates and accelerations at a time, each (n,)."""
         sigma, speed, force = self.law.at(time)

@@ -29,11 +29,6 @@ class Manipulability(NamedTuple):
     J_axes: FloatArray  # (6, m) by axis; J_camera itself where no joint moves several axes
 
 
-def determinant_measure(J: FloatArray) -> float:
-    """Return |det J| of a square Jacobian, [Nelson1995] eq. (20)."""
-    return float(abs(np.linalg.det(J)))
-
-
 def yoshikawa_measure(J: FloatArray) -> float:
     """Return √det(J Jᵀ) of a Jacobian (m, n) with m ≤ n, [Nelson1995] eq. (21)."""
     return float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0)))
@@ -47,19 +42,6 @@ def transmissibility_measure(J: FloatArray) -> float:
 def manipulability_measure(J: FloatArray) -> float:
     """Return (21), or (22) where the arm has fewer joints than the Jacobian (m, n) has rows."""
     return yoshikawa_measure(J) if J.shape[1] >= J.shape[0] else transmissibility_measure(J)
-
-
-def relative_manipulability(J: FloatArray, a: FloatArray, d: FloatArray) -> float:
-    """Return det(J Jᵀ)^(1/m) / (Σ aᵢ² + dᵢ²)^(1/n), [Nelson1995] eq. (23).
-
-    Args:
-        J: Jacobian (m, n).
-        a: link lengths of Denavit and Hartenberg, (n,), m.
-        d: link offsets, (n,), m.
-    """
-    m, n = J.shape
-    size = float(np.sum(np.square(a) + np.square(d)))
-    return float(max(np.linalg.det(J @ J.T), 0.0) ** (1 / m) / size ** (1 / n))
 
 
 @njit(cache=True, error_model="numpy")
@@ -313,25 +295,3 @@ def manipulability(
         arm.sigma,
         arm.J_axes,
     )
-
-
-def numeric_camera_gradient(
-    chain: Chain,
-    q: FloatArray,
-    q_min: FloatArray,
-    q_max: FloatArray,
-    k: float,
-    per_joint: bool = False,
-    step: float = 1e-3,
-) -> FloatArray:
-    """Return ∂w'/∂x (6,) along the tip's own axes by differences, [Nelson1995] eq. (31) with T = 1.
-
-    It moves the arm by δ = 0.001 m (and rad) along each axis in turn: [w'(q + J⁻¹ δ) - w'(q)]/|δ|.
-    This is the check of the exact gradient in `manipulability`; nothing else uses it.
-    """
-    here = manipulability(chain, q, q_min, q_max, k, per_joint, 0.0)
-    moved = [
-        manipulability(chain, q + step * column, q_min, q_max, k, per_joint, 0.0).value
-        for column in here.J_inverse.T
-    ]
-    return (np.array(moved) - here.value) / step

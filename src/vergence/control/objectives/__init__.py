@@ -7,7 +7,6 @@ from vergence.control.objectives._tracking import (
     TrackingTick,
     optimal_tracking_tick,
     pack_setup,
-    tracking_twist,
     unpack_chain,
     unpack_tick,
 )
@@ -55,6 +54,5 @@ __all__ = [
     "state_of",
     "tip_goal",
     "tip_twist",
-    "tracking_twist",
     "unpack_tick",
 ]

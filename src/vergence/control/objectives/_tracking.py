@@ -249,16 +249,6 @@ def optimal_tracking_tick(
     result[n + 6], result[n + 7], result[n + 8], result[n + 9] = scale, w, P, arm.sigma
 
 
-@njit(cache=True, error_model="numpy")
-def tracking_twist(weights: FloatArray, features: FloatArray, v_camera: FloatArray) -> None:
-    """The law alone, (17): no arm, no avoidance; fills the camera twist (6,)."""
-    gains, focal_px = unpack_gains(weights), weights[7:9]
-    BtB, Bt_error, _ = image_square(features, focal_px, gains.period)
-    u = tracking_displacement(BtB, Bt_error, gains, 0.0, gains.avoiding)
-    for i in range(6):
-        v_camera[i] = u[i] / gains.period
-
-
 def unpack_tick(result: FloatArray) -> TrackingTick:
     """Give the numbers of `optimal_tracking_tick` their names again."""
     n = len(result) - 10

@@ -126,31 +126,44 @@ def _line(
     variance = 2.0 * max(residual, fit.spread_px**2) / n + systematic
     rows = np.empty((2, 6))
     for k in range(2):
-        wanted = middle + (2 * k - 1) * np.sqrt(spread / n)
-        a, b = first, last - 1
-        while b - a > 1:  # the samples lie along the edge in order
-            m = (a + b) // 2
-            s = nv * (pixels[m, 0] - pixels[first, 0]) - nu * (pixels[m, 1] - pixels[first, 1])
-            rising = nv * (pixels[last - 1, 0] - pixels[first, 0]) > nu * (
-                pixels[last - 1, 1] - pixels[first, 1]
-            )
-            if (s < wanted) == rising:
-                a = m
-            else:
-                b = m
-        sa = nv * (pixels[a, 0] - pixels[first, 0]) - nu * (pixels[a, 1] - pixels[first, 1])
-        sb = nv * (pixels[b, 0] - pixels[first, 0]) - nu * (pixels[b, 1] - pixels[first, 1])
-        share = (wanted - sa) / (sb - sa)
-        for j in range(3):
-            points[k, j] = samples.points[a, j] + share * (
-                samples.points[b, j] - samples.points[a, j]
-            )
+        along = middle + (2 * k - 1) * np.sqrt(spread / n)
+        _point_at(samples.points[first:last], pixels[first:last], nu, nv, along, points[k])
         u, v, _ = pixel_rows(fit.T, lens, points[k], rows)
         s = nv * (u - pixels[first, 0]) - nu * (v - pixels[first, 1])
         offset = so / n + slope * (s - middle)
         places[k, 0], places[k, 1] = u + offset * nu, v + offset * nv
         _fill(covariances[k], variance, nu, nv)
     return 2
+
+
+@njit(cache=True)
+def _point_at(
+    points: FloatArray, pixels: FloatArray, nu: float, nv: float, along: float, point: FloatArray
+) -> None:
+    """Fill the point (3,) of an edge that is so far along it from its first sample, px.
+
+    Args:
+        points: samples of the edge, in order along it, (N, 3).
+        pixels: of them, (N, 2).
+        nu: of the unit normal across the edge.
+        nv: likewise.
+        along: where.
+        point: is filled.
+    """
+    a, b = 0, len(points) - 1
+    rising = nv * (pixels[b, 0] - pixels[0, 0]) > nu * (pixels[b, 1] - pixels[0, 1])
+    while b - a > 1:
+        m = (a + b) // 2
+        s = nv * (pixels[m, 0] - pixels[0, 0]) - nu * (pixels[m, 1] - pixels[0, 1])
+        if (s < along) == rising:
+            a = m
+        else:
+            b = m
+    sa = nv * (pixels[a, 0] - pixels[0, 0]) - nu * (pixels[a, 1] - pixels[0, 1])
+    sb = nv * (pixels[b, 0] - pixels[0, 0]) - nu * (pixels[b, 1] - pixels[0, 1])
+    share = (along - sa) / (sb - sa)
+    for j in range(3):
+        point[j] = points[a, j] + share * (points[b, j] - points[a, j])
 
 
 @njit(cache=True)

@@ -1,9 +1,10 @@
 """Marks that users put on things: round ones, and AprilTag or ArUco markers."""
 
-from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector, marker_corners
+from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector
 from vergence.vision.marks.mark_tracker import MarkTracker
 from vergence.vision.marks.mark_tracking import MarkTracking
 from vergence.vision.marks.round import RoundMarks, circle_centre_bias, measure_round_marks
+from vergence.vision.marks.tag_tracking import TagTracking
 
 __all__ = [
     "DICTIONARIES",
@@ -12,7 +13,7 @@ __all__ = [
     "MarkTracking",
     "MarkerDetector",
     "RoundMarks",
+    "TagTracking",
     "circle_centre_bias",
-    "marker_corners",
     "measure_round_marks",
 ]

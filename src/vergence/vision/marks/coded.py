@@ -30,18 +30,6 @@ class CodedMarks(NamedTuple):
     covariance_px: FloatArray  # (M, 4, 2, 2) px²
 
 
-def marker_corners(size: float) -> FloatArray:
-    """Return the corners of a marker in its own frame, (4, 3), m, in the order they are found in.
-
-    The frame is in its middle, x to its right, y to its top, z out of it.
-
-    Args:
-        size: side of its black square, m.
-    """
-    h = 0.5 * size
-    return np.array([[-h, h, 0.0], [h, h, 0.0], [h, -h, 0.0], [-h, -h, 0.0]])
-
-
 @dataclass(frozen=True, slots=True)
 class MarkerDetector:
     """Finds the markers of one dictionary, their corners refined to a fraction of a pixel."""

@@ -1,0 +1,81 @@
+"""Corners of AprilTag or ArUco markers as what a cell follows."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.errors import InputError
+from vergence.parts import knob, part
+from vergence.vision.image import grey_image
+from vergence.vision.marks.coded import CodedMarks, MarkerDetector
+from vergence.vision.tracks import PointTracker, Tracks, nothing_found
+
+
+@part("tracker", "tags")
+class TagTracking:
+    """Follows corners of markers by the markers' numbers, so that none is taken for another."""
+
+    dictionary: str = knob("apriltag_36h11")  # of the markers, such as aruco_4x4_50
+    noise_px: float = knob(0.2, "px", above=0, upto=100)  # standard deviation of a found corner
+    away_px: float = knob(10.0, "px", above=0, upto=1e4)  # of a point from its corner at the start
+
+    def __post_init__(self) -> None:
+        MarkerDetector(self.dictionary)  # which names those that are known
+
+    def start(self, image: ImageArray, points_px: FloatArray) -> PointTracker:
+        """Return the tracker of the corners next to places (M, 2) in the first image.
+
+        Raises:
+            InputError: if no marker has a corner next to a place.
+        """
+        detector = MarkerDetector(self.dictionary, self.noise_px)
+        grey, _ = grey_image(image)
+        found = _no_marks(detector) if grey is None else detector.detect(grey)
+        corners = [_next_to(found, place, self.away_px) for place in points_px]
+        for place, corner in zip(points_px, corners, strict=True):
+            if corner is None:
+                u, v = place.round().astype(int).tolist()
+                given = f"no corner of a marker within {self.away_px:g} px of ({u}, {v})"
+                raise InputError("task", "tracker", given, f"markers of {self.dictionary} there")
+        return _TagTracker(detector, [corner for corner in corners if corner], points_px)
+
+
+class _TagTracker:
+    """Finds the same corners of the same markers in each image."""
+
+    def __init__(
+        self, detector: MarkerDetector, corners: list[tuple[int, int]], points_px: FloatArray
+    ) -> None:
+        self._detector, self._corners = detector, corners
+        self._points = np.array(points_px, dtype=np.float64)
+
+    def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
+        """Find the corners in a new image; markers are looked for in all of it."""
+        grey, reason = grey_image(image)
+        if grey is None:
+            return nothing_found(self._points, reason)
+        seen = self._detector.detect(grey)
+        lost = nothing_found(self._points.copy(), "")
+        rows = {number: row for row, number in enumerate(seen.ids.tolist())}
+        reasons = []
+        for j, (number, corner) in enumerate(self._corners):
+            row = rows.get(number)
+            reasons.append("" if row is not None else f"marker {number} is not seen")
+            if row is not None:
+                lost.found[j] = True
+                lost.points_px[j] = seen.corners_px[row, corner]
+                lost.covariance_px[j] = seen.covariance_px[row, corner]
+        self._points = lost.points_px
+        return lost._replace(reasons=tuple(reasons))
+
+
+def _no_marks(detector: MarkerDetector) -> CodedMarks:
+    return detector.detect(np.empty((0, 0), np.uint8))
+
+
+def _next_to(found: CodedMarks, place: FloatArray, away_px: float) -> tuple[int, int] | None:
+    """Return number and corner of the marker whose corner is nearest to a place (2,)."""
+    if not len(found.ids):
+        return None
+    distance = np.linalg.norm(found.corners_px - place, axis=2)
+    row, corner = np.unravel_index(int(distance.argmin()), distance.shape)
+    return (int(found.ids[row]), int(corner)) if distance[row, corner] <= away_px else None
