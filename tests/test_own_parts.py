@@ -42,7 +42,7 @@ def test_a_planner_beside_the_cell_plans_and_runs(tmp_path: Path) -> None:
     assert path
     assert (path.planner, len(path.q)) == ("straight", 50)
     np.testing.assert_allclose(path.q[25] - path.q[24], path.q[1] - path.q[0])  # it is straight
-    assert run_cell(cell, images=False).outcome.kind is OutcomeKind.COMPLETED
+    assert run_cell(cell, images=False).outcome.succeeded
     far = plan(own(tmp_path, "gantry", {"task.planner": "my_planner:Straight"}), images=False)
     assert "leaves the image" in str(far)
 
