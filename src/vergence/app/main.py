@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from vergence.app import calibrate_command, campaign_commands, names
+from vergence.app import calibrate_command, campaign_commands, goal_command, names
 from vergence.app.options import CellName, Driver, ImageEvery, Images, Json, Out, Seed, Settings
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.errors import VergenceError
@@ -76,12 +76,18 @@ def run(
     image_every: ImageEvery = 2,
     settings: Settings = None,
     driver: Driver = None,
+    goal: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PHOTO", help="Go where this was taken, by images alone; see `vergence goal`."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run a work cell: progress, a summary, and a folder with recording and report."""
     from vergence.app.run import run as command
 
-    code = command(cell, out, seed, images, image_every, settings or (), as_json, driver)
+    code = command(cell, out, seed, images, image_every, settings or (), as_json, driver, goal)
     raise typer.Exit(code)
 
 
@@ -271,6 +277,7 @@ def watch(
 
 campaign_commands.register(app)
 calibrate_command.register(app)
+goal_command.register(app)
 
 
 @app.command(epilog="Example: vergence bench control")

@@ -23,11 +23,16 @@ def run(
     settings: Sequence[str],
     as_json: bool,
     driver: str | None = None,
+    goal: Path | None = None,
 ) -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
     from vergence.cell import load_cell
 
     loaded = load_cell(cell, overrides(settings), seed)  # a mistake is told before all is loaded
+    if goal is not None:
+        from vergence.assembly import with_goal
+
+        loaded = with_goal(loaded, goal)
     if out is not None and (out / RECORDING).exists():
         raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
     from vergence.app.progress import working

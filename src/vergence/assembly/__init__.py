@@ -5,6 +5,7 @@ from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.open_driver import open_driver
 from vergence.assembly.parts import Parts
+from vergence.assembly.photograph import with_goal
 from vergence.assembly.plan import plan
 from vergence.assembly.run import changed_cell, run
 from vergence.assembly.run_cell import run_cell, run_driver
@@ -20,4 +21,5 @@ __all__ = [
     "run",
     "run_cell",
     "run_driver",
+    "with_goal",
 ]

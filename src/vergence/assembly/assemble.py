@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from vergence.assembly.follow import follow_parts
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
+from vergence.assembly.photograph import is_by_photograph, photograph_parts
 from vergence.assembly.reach import reach_parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.track import track_parts
@@ -48,5 +49,7 @@ def assemble_parts(
             return track_parts(context, cell.task, started, images)
         case FollowTable():
             return follow_parts(context, cell.task, started, images)
+        case ReachTable() if is_by_photograph(cell):
+            return photograph_parts(context, cell.task, started, images)
         case ReachTable():
             return reach_parts(context, cell.task, started, images)

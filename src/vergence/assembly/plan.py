@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.photograph import is_by_photograph, plan_approach
 from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.run import changed_cell
 from vergence.assembly.started_driver import StartedDriver
@@ -41,6 +42,8 @@ def plan(
     try:
         started = StartedDriver(driver, loaded.watched)
         context = LawContext.of(loaded, started)
+        if is_by_photograph(loaded):
+            return plan_approach(context, loaded.task, started)
         pair = measure_twice(context, loaded.task, started, images)
         return pair if isinstance(pair, PlanFailure) else plan_reach(context, loaded.task, pair)
     finally:

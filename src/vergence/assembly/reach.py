@@ -12,7 +12,7 @@ from vergence.assembly.own_parts import planned_path, started_tracker
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.camera.image_file import read_image_file
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
 from vergence.estimation import TrackedPoints
@@ -69,6 +69,10 @@ def plan_reach(
     view = estimate_two_view(pair.points_px, pair.desired_px, camera)
     if not isinstance(view, TwoView):
         return view
+    if task.distance_m is None:
+        raise InputError(
+            str(context.cell.path), "task.distance_m", "nothing", "the distance at the goal, m"
+        )
     problem = PlanningProblem.from_two_view(
         view,
         task.distance_m,
@@ -96,7 +100,7 @@ def measure_twice(
             there.
     """
     arm = context.model.arms[task.arm]
-    goal = joint_positions(context.cell, _GOAL, task.goal_deg, arm)
+    goal = goal_positions(context.cell, arm)
     now, then = driver.frames[task.camera], _goal_frame(context, task, driver, goal)
     if not images:
         return _exact_pair(context, task, now, then)
@@ -142,11 +146,11 @@ def _goal_frame(
 ) -> Frame:
     """Return the desired image: from its file, or as a simulation takes it by driving there."""
     cell = context.cell
-    if task.goal_image is None:
+    if task.goal is None:
         if isinstance(driver.driver, SimulatedDriver):
             return driver.driver.frame_at(task.camera, task.arm, goal)
-        raise InputError(str(cell.path), "task.goal_image", "nothing", "an image taken at the goal")
-    path = cell.path.parent / task.goal_image
+        raise InputError(str(cell.path), "task.goal", "nothing", "an image taken at the goal")
+    path = cell.path.parent / task.goal
     image, reason = grey_image(read_image_file(path))
     if image is None:
         raise InputError(str(path), "", reason, "an image of the task's camera")

@@ -189,7 +189,7 @@ def _with_parts(cell: Cell) -> Cell:
                 update[key] = load_part(role, given, place.at(f"{at}.{key}"), usual or "")
         return table.model_copy(update=update)
 
-    roles = {"tracker": "tracker", "planner": "planner"}
+    roles = {"tracker": "tracker", "planner": "planner", "matcher": "matcher"}
     of_task = {key: role for key, role in roles.items() if hasattr(cell.task, key)}
     update = {
         "law": law("law", cell.law),

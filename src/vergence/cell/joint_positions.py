@@ -10,6 +10,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, frozen
 from vergence.cell.cell import Cell
+from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
 from vergence.robot import Arm
 
@@ -36,6 +37,19 @@ def joint_positions(cell: Cell, key: str, given: Sequence[float], arm: Arm) -> F
                 str(cell.path), f"{key}[{i}]", given[i], f"{joint} between {low:.6g} and {high:.6g}"
             )
     return frozen(position)
+
+
+def goal_positions(cell: Cell, arm: Arm) -> FloatArray:
+    """Return the joint positions (n,) at which the desired image of `reach` was taken.
+
+    Raises:
+        InputError: if the file does not say, or they are not the arm's.
+    """
+    given = cell.task.goal_deg if isinstance(cell.task, ReachTable) else None
+    if given is None:
+        allowed = "the joints at which the desired image was taken"
+        raise InputError(str(cell.path), "task.goal_deg", "nothing", allowed)
+    return joint_positions(cell, "task.goal_deg", given, arm)
 
 
 def joint_rates(cell: Cell, name: str, arm: Arm, most: FloatArray) -> FloatArray:

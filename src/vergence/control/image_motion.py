@@ -95,6 +95,8 @@ class ImageMotion:
         self, view: ImagePoints, points: FloatArray, depth: FloatArray, q: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Take in a view; return the flow (M, 2) and the depth (M,) at its exposure."""
+        if self._last is not None and len(points) != len(self._last[2]):
+            self._last = self._flow = self._depth = None  # other features
         if self._depth is None or not self._carries_depth:
             self._depth = depth
         if self._flow is None:

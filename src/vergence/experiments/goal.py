@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.assembly import assemble_parts
 from vergence.cell import Cell
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.geometry import matrix_to_rpy, transform_points
 from vergence.signals import Outcome
@@ -62,7 +62,7 @@ class Aim:
     @classmethod
     def _of_picture(cls, cell: Cell, task: ReachTable, driver: SimulatedDriver) -> "Aim":
         arm = driver.arms[task.arm]
-        goal = joint_positions(cell, "task.goal_deg", task.goal_deg, arm)
+        goal = goal_positions(cell, arm)
         truth = driver.frame_at(task.camera, task.arm, goal).truth
         assert truth is not None
         return cls(_rows(driver.features), _rows(truth.points_px), {})

@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.cell import Cell
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError, nearest
 from vergence.experiments.goal import Aim, listed, merged, placed
@@ -86,7 +86,7 @@ class Draws:
                 driver.world.update()
             seen_from = [q]
             if isinstance(cell.task, ReachTable):
-                seen_from.append(joint_positions(cell, "task.goal_deg", cell.task.goal_deg, arm))
+                seen_from.append(goal_positions(cell, arm))
             truths = [driver.frame_at(camera, name, place).truth for place in seen_from]
             if all(t is not None and _in_picture(t, driver.cameras[camera], cell) for t in truths):
                 break

@@ -20,7 +20,7 @@ from vergence.runtime.listener import Listener
 from vergence.runtime.listeners import Listeners
 from vergence.runtime.losses import LossReports, reasons, shows_target
 from vergence.runtime.schedule import Schedule, command_share
-from vergence.runtime.stages import Perception, Planner
+from vergence.runtime.stages import EndsTask, Perception, Planner
 from vergence.runtime.stopping import brake, raised
 from vergence.runtime.tick import TickRecord
 from vergence.runtime.timeouts import Timeouts
@@ -184,7 +184,15 @@ class Loop:
         self._losses.report(self._now, observation)
         reference = self._planner.reference(observation.time)
         self._part = "law"
-        return self._decide(sample, observation, reference)
+        return self._decide(sample, observation, reference) or self._concluded(self._now)
+
+    def _concluded(self, time: float) -> Outcome | None:
+        """Tell what the planner has to tell; return how the task ends, if it does."""
+        if not isinstance(self._planner, EndsTask):
+            return None
+        for event in self._planner.events():
+            self._listeners.event(*event)
+        return self._planner.conclusion(time)
 
     def _wait(self, sample: Sample) -> Outcome | None:
         """Go on without an image, for a while."""
@@ -296,6 +304,8 @@ class Loop:
         holding = self._followers[self._arm].holding
         if holding is not None:
             return Outcome(*holding, self._now)
+        if isinstance(self._planner, EndsTask):
+            return self._planner.unfinished(self._now)
         return self._arrival.outcome(duration_s, self._now)
 
     def _stopped(self) -> Outcome:

@@ -1,8 +1,9 @@
 """The stages of the loop that users may replace, as the loop sees them."""
 
-from typing import Protocol
+from collections.abc import Iterable
+from typing import Protocol, runtime_checkable
 
-from vergence.signals import Frame, Observation, Reference
+from vergence.signals import Frame, Observation, Outcome, Reference
 
 
 class Perception(Protocol):
@@ -22,4 +23,21 @@ class Planner(Protocol):
         Args:
             time: exposure of the image that the law compares it with, s.
         """
+        ...
+
+
+@runtime_checkable
+class EndsTask(Protocol):
+    """A planner that knows when its task is done."""
+
+    def conclusion(self, time: float) -> Outcome | None:
+        """Return how the task ends, once it does."""
+        ...
+
+    def unfinished(self, time: float) -> Outcome:
+        """Return how the task ends if its time is over."""
+        ...
+
+    def events(self) -> Iterable[tuple[float, str, str]]:
+        """Return what happened since the last call: time in s, name, and a sentence."""
         ...

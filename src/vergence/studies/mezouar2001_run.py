@@ -11,7 +11,7 @@ from vergence.assembly.law_context import LawContext
 from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import VergenceError
 from vergence.geometry import se3_inverse, so3_log
@@ -108,7 +108,7 @@ def plan_section6(cell: Cell, images: bool) -> Section6:
             name: plan_reach(context, task.model_copy(update={"planner": planner}), pair)
             for name, planner in PLANNERS.items()
         }
-        goal = joint_positions(cell, "task.goal_deg", task.goal_deg, driver.arms[task.arm])
+        goal = goal_positions(cell, driver.arms[task.arm])
         shown = (
             driver.first_frame(task.camera).image,
             driver.frame_at(task.camera, task.arm, goal).image,

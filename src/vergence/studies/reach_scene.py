@@ -8,7 +8,7 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.cell import Cell
-from vergence.cell.joint_positions import joint_positions
+from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
 from vergence.planning import PlanningProblem
@@ -42,7 +42,7 @@ class Scene:
             T_target = driver.world.target_pose()
             camera = driver.cameras[task.camera]
             marks = driver.features
-            q_goal = joint_positions(cell, "task.goal_deg", task.goal_deg, driver.arms[task.arm])
+            q_goal = goal_positions(cell, driver.arms[task.arm])
         finally:
             driver.close()
         T_goal = frozen(arm.forward_kinematics(q_goal))

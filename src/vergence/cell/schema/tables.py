@@ -177,9 +177,16 @@ class ReachTable(Table):
     kind: Literal["reach"]
     arm: Text  # which moves
     camera: Text  # carried by the arm
-    goal_deg: _Joints  # joints when the desired image was taken; metres if they slide
-    goal_image: Path | None = None  # that image; a simulation without one takes it by itself
-    distance_m: Length  # believed distance of that camera from the reference plane, d*
+    goal: Path | None = None  # a photograph of what to see; beside it may lie NAME.camera.yaml
+    goal_deg: _Joints | None = (
+        None  # joints when it was taken; metres if they slide; a simulation can take it there
+    )
+    distance_m: Length | None = (
+        None  # rough distance of that camera from what it sees; the arm's motion tells it as well
+    )
+    matcher: Part = "sift"  # what recognises the photograph
+    tolerance_m: Length = 1e-3  # distance from the goal at which it is reached, for sure
+    tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 0.2  # and angle
     planner: Part = "optimised"  # of the path in the image: or the paper's, or one's own
     tracker: Part = "round_marks"  # what follows the features from image to image
     margin_px: Pixels = 10.0  # kept from the border of the image

@@ -63,7 +63,11 @@ def compare_images(
 def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
     if not matches:
         return TwoViewFailure(TwoViewProblem.NOT_RECOGNISED, matches.reason)
-    view = estimate_two_view(matches.points_px, matches.points_star_px, camera, noise_px=NOISE_PX)
+    points = matches.points_px, matches.points_star_px
+    view = estimate_two_view(*points, camera, noise_px=NOISE_PX)
+    if isinstance(view, TwoViewFailure) and view.problem is TwoViewProblem.TOO_FEW:
+        # With little parallax a plane explains everything; what it is not, later images tell.
+        view = estimate_two_view(*points, camera, noise_px=NOISE_PX, flat=True)
     if isinstance(view, TwoView):
         agree, rotation = view.inliers, view.rotation
     elif view.problem is TwoViewProblem.NO_TRANSLATION and view.rotation is not None:

@@ -1,0 +1,125 @@
+"""The task `reach` by a photograph: to where it was taken, by images alone."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from vergence.assembly.build_law import build_law
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.own_parts import planned_path
+from vergence.assembly.parts import Parts
+from vergence.assembly.started_driver import StartedDriver
+from vergence.camera.photograph import Photograph, read_photograph
+from vergence.cell import Cell
+from vergence.cell.joint_positions import goal_positions
+from vergence.cell.schema import ReachTable
+from vergence.errors import InputError
+from vergence.planning.approach import (
+    Approach,
+    ApproachSettings,
+    GoalImage,
+    InlineWorker,
+    ThreadWorker,
+)
+from vergence.planning.failure import PlanFailure
+from vergence.planning.path import Path as PlannedPath
+from vergence.planning.trajectory import Trajectory
+from vergence.signals import Outcome, OutcomeKind
+from vergence.simulation import SimulatedDriver
+from vergence.vision.two_view import TwoViewFailure
+
+
+def is_by_photograph(cell: Cell) -> bool:
+    """Whether a cell's task is to reach what a photograph shows, without known features."""
+    task = cell.task
+    if not isinstance(task, ReachTable):
+        return False
+    return cell.target.features is None or task.goal_deg is None
+
+
+def photograph_parts(
+    context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
+) -> Parts | Outcome:
+    """Put together what goes to where a photograph was taken; or why it cannot."""
+    if not images:
+        raise InputError(str(context.cell.path), "task.goal", "no images", "images to recognise it")
+    approach = make_approach(context, task, driver)
+    plan = approach.begin(driver.frames[task.camera])
+    if isinstance(plan, TwoViewFailure):
+        return Outcome(OutcomeKind.INFEASIBLE, str(plan), 0.0)
+    if isinstance(plan, PlanFailure):
+        return plan.outcome(0.0)
+    if plan.duration > context.cell.duration_s:
+        longest = context.cell.duration_s
+        reason = f"the path takes {plan.duration:.1f} s, duration_s is {longest:g}"
+        return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
+    seen = approach.recognition
+    assert seen is not None
+    # The points followed change on the way, so no motion of theirs can be told from image to image.
+    cell = context.cell
+    cell = cell.model_copy(update={"law": replace(cell.law, feed_forward=False)})
+    context = replace(context, cell=cell).with_points({task.camera: seen.points_px})
+    return Parts(driver, approach, approach, build_law(context), context)
+
+
+def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) -> Approach:
+    """Return what goes to where a photograph was taken; it has not looked yet."""
+    taken = take_goal(context, task, driver)
+    camera = context.cameras[task.camera]
+    settings = ApproachSettings(
+        tolerance_m=task.tolerance_m,
+        tolerance_rad=float(np.deg2rad(task.tolerance_deg)),
+        distance_m=taken.distance_m if task.distance_m is None else task.distance_m,
+        margin_px=task.margin_px,
+        margin_joint=task.margin_joint,
+        camera_speed_m_s=task.camera_speed_m_s,
+    )
+    simulated = isinstance(driver.driver, SimulatedDriver)
+    return Approach(
+        GoalImage.of(taken.image, camera, task.matcher, taken.shown),
+        task.camera,
+        task.arm,
+        context.arm_to_camera(task.camera),
+        lambda problem: planned_path(context, task.planner, problem),
+        settings,
+        InlineWorker() if simulated else ThreadWorker(),
+    )
+
+
+def take_goal(context: LawContext, task: ReachTable, driver: StartedDriver) -> Photograph:
+    """Return the photograph: from its file, or as a simulation takes it by driving there."""
+    cell, camera = context.cell, context.cameras[task.camera]
+    if task.goal is not None:
+        return read_photograph(cell.path.parent / task.goal, camera)
+    if task.goal_deg is None or not isinstance(driver.driver, SimulatedDriver):
+        raise InputError(str(cell.path), "task.goal", "nothing", "a photograph taken at the goal")
+    arm = context.model.arms[task.arm]
+    goal = goal_positions(cell, arm)
+    image = driver.driver.frame_at(task.camera, task.arm, goal).image
+    assert image is not None
+    return Photograph(image, None, {}, None)
+
+
+def plan_approach(
+    context: LawContext, task: ReachTable, driver: StartedDriver
+) -> PlannedPath | PlanFailure | TwoViewFailure:
+    """Recognise the photograph from the start and plan the path to where it was taken."""
+    plan = make_approach(context, task, driver).begin(driver.frames[task.camera])
+    return plan.path if isinstance(plan, Trajectory) else plan
+
+
+def with_goal(cell: Cell, photograph: Path) -> Cell:
+    """Return a cell whose task is to go where a photograph was taken, with the same camera."""
+    task = cell.task
+    kept = task.model_dump() if isinstance(task, ReachTable) else {}
+    goal = {
+        **kept,
+        "kind": "reach",
+        "arm": task.arm,
+        "camera": task.camera,
+        "goal": photograph.resolve(),
+        "goal_deg": None,
+    }
+    changed = cell.replace(task=goal, target={"features": None})
+    return changed if kept else changed.replace(law={"kind": "image_based"})

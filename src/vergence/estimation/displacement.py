@@ -1,0 +1,102 @@
+"""How far a camera still is from where a photograph was taken, once it looks almost the same."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.geometry import se3, so3_exp, so3_log
+
+_ITERATIONS = 8
+_DOUBTFUL = 3.0  # standard deviations from which a point counts less and less
+
+
+class Displacement(NamedTuple):
+    """Pose of a camera in the frame of the photograph."""
+
+    T_goal_camera: FloatArray  # (4, 4) m
+    covariance: FloatArray  # (6, 6) of its position and rotation, m and rad
+    agrees: BoolArray  # (K,) points that agree with it
+
+    @property
+    def distance_m(self) -> float:
+        """How far the camera is from its goal."""
+        return float(np.linalg.norm(self.T_goal_camera[:3, 3]))
+
+    @property
+    def angle_rad(self) -> float:
+        """How far it is turned from its goal."""
+        R = np.ascontiguousarray(self.T_goal_camera[:3, :3])
+        return float(np.linalg.norm(so3_log(R)))
+
+    def within(self, tolerance_m: float, tolerance_rad: float, deviations: float = 3.0) -> bool:
+        """Tell whether the whole confidence region is inside the tolerance."""
+        far_m, far_rad = self.at_most(deviations)
+        return far_m <= tolerance_m and far_rad <= tolerance_rad
+
+    def at_most(self, deviations: float = 3.0) -> tuple[float, float]:
+        """Return the largest distance, m, and angle, rad, in the confidence region."""
+        position, turn = self.covariance[:3, :3], self.covariance[3:, 3:]
+        return (
+            self.distance_m + deviations * float(np.sqrt(np.linalg.eigvalsh(position)[-1])),
+            self.angle_rad + deviations * float(np.sqrt(np.linalg.eigvalsh(turn)[-1])),
+        )
+
+
+def fit_displacement(
+    points: FloatArray, covariance: FloatArray, points_goal: FloatArray
+) -> Displacement | None:
+    """Fit the pose of a camera to points of the photograph that it sees again.
+
+    Args:
+        points: where it sees them, (K, 2), normalized coordinates.
+        covariance: of these, (K, 2, 2).
+        points_goal: the points in the frame of the photograph, (K, 3), m.
+
+    Returns:
+        The pose, its covariance by what the points leave unexplained if that is more than stated;
+        None with fewer than four points, or if they do not determine it.
+    """
+    if len(points) < 4:
+        return None
+    root = np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1)
+    R, t = np.eye(3), np.zeros(3)  # X_camera = R X_goal + t
+    for _ in range(_ITERATIONS):
+        X = points_goal @ R.T + t
+        if X[:, 2].min() <= 0.0:
+            return None
+        r, J = _residuals(X, points, root)
+        square = np.sum(r**2, axis=1)
+        weight = 1.0 / (1.0 + square / _DOUBTFUL**2)
+        A = np.einsum("k,kai,kaj->ij", weight, J, J)
+        b = np.einsum("k,kai,ka->i", weight, J, r)
+        if np.linalg.cond(A) > 1e12:
+            return None
+        step = -np.linalg.solve(A, b)
+        turn = so3_exp(np.ascontiguousarray(step[3:]))
+        R, t = turn @ R, turn @ t + step[:3]
+    freedom = 2 * len(points) - 6
+    scale = max(1.0, float(np.sum(weight * square)) / max(freedom, 1))
+    # The camera in the goal's frame: R' = Rᵀ, t' = -Rᵀ t.
+    C = scale * np.linalg.inv(A)
+    back = np.zeros((6, 6))
+    back[:3, :3] = back[3:, 3:] = -R.T
+    agrees: BoolArray = square < (2.0 * _DOUBTFUL) ** 2 * scale
+    return Displacement(se3(R.T.copy(), -R.T @ t), back @ C @ back.T, agrees)
+
+
+def _residuals(
+    X: FloatArray, points: FloatArray, root: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return whitened residuals (K, 2) and slopes (K, 2, 6) by translation and rotation."""
+    z = X[:, 2]
+    m = X[:, :2] / z[:, None]
+    by_X = np.zeros((len(X), 2, 3))
+    by_X[:, 0, 0] = by_X[:, 1, 1] = 1.0 / z
+    by_X[:, :, 2] = -m / z[:, None]
+    by_turn = np.zeros((len(X), 3, 3))  # -[X]×
+    by_turn[:, 0, 1], by_turn[:, 0, 2] = X[:, 2], -X[:, 1]
+    by_turn[:, 1, 0], by_turn[:, 1, 2] = -X[:, 2], X[:, 0]
+    by_turn[:, 2, 0], by_turn[:, 2, 1] = X[:, 1], -X[:, 0]
+    J = np.concatenate((by_X, by_X @ by_turn), axis=2)
+    return np.einsum("kab,kb->ka", root, m - points), root @ J

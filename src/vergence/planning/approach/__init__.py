@@ -1,0 +1,15 @@
+"""The way to a photograph: recognise it, plan, follow the plan, look again, arrive."""
+
+from vergence.planning.approach.approach import Approach, Plan
+from vergence.planning.approach.goal import ApproachSettings, GoalImage
+from vergence.planning.approach.worker import InlineWorker, ThreadWorker, Worker
+
+__all__ = [
+    "Approach",
+    "ApproachSettings",
+    "GoalImage",
+    "InlineWorker",
+    "Plan",
+    "ThreadWorker",
+    "Worker",
+]

@@ -1,0 +1,126 @@
+"""The end of the way: the photograph itself is what the tracker compares the images with."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.estimation.displacement import Displacement, fit_displacement
+from vergence.estimation.goal_fit import GoalFit, points_in
+from vergence.planning.approach.goal import GoalImage
+from vergence.planning.approach.points import depth_between
+from vergence.signals import Reference
+from vergence.vision import SsdTracker, pick_features
+from vergence.vision.tracks import Tracks
+
+_POINTS = 48
+_FEWEST = 8  # of them that have to be found
+_APART_PX = 16.0
+_BORDER_PX = 40.0
+_FLOOR_PX = 0.03  # what a measured place may be off beside its stated deviation
+_REST_S = 0.4  # over which the camera must not move more than a tenth of the tolerance
+
+
+class GoalPoints:
+    """Well-textured points of the photograph, looked for in the images.
+
+    Args:
+        goal: the photograph.
+        star_px: points recognised, (N, 2); the others are picked among them.
+    """
+
+    def __init__(self, goal: GoalImage, star_px: FloatArray) -> None:
+        self.goal = goal
+        self.points_px = _picked(goal, star_px)
+        self._tracker = SsdTracker(goal.image, self.points_px)
+        self._depth_m = np.ones(len(self.points_px))
+        self._seen: list[tuple[float, Displacement]] = []
+
+    def learn(self, fit: GoalFit) -> None:
+        """Take the depths of the points from those of a fit."""
+        known = points_in(fit.T_world_goal, fit.points_world[fit.agrees])
+        points = self.goal.camera.normalize(self.points_px)
+        self._depth_m = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
+
+    def shift_px(self, T_goal_camera: FloatArray) -> float:
+        """Return how far the points are from their places, from a pose of the camera, median."""
+        seen = points_in(T_goal_camera, self._points_goal())
+        if (seen[:, 2] <= 0).any():
+            return float("inf")
+        shift = self.goal.camera.project(seen) - self.points_px
+        return float(np.median(np.linalg.norm(shift, axis=1)))
+
+    def track(
+        self, image: ImageArray, time: float, T_goal_camera: FloatArray | None = None
+    ) -> Tracks | None:
+        """Measure the points in an image; None if too few are found.
+
+        Args:
+            image: grey, (height, width).
+            time: of it, s.
+            T_goal_camera: where the camera is thought to be; where it was last if None.
+        """
+        predicted = None
+        if T_goal_camera is not None:
+            seen = points_in(T_goal_camera, self._points_goal())
+            if (seen[:, 2] <= 0).any():
+                return None
+            predicted = self.goal.camera.project(seen)
+        tracks = self._tracker.track(image, predicted)
+        if tracks.found.sum() < max(_FEWEST, len(tracks.found) // 3):
+            return None
+        found, camera = tracks.found, self.goal.camera
+        points = camera.normalize(tracks.points_px[found])
+        covariance = camera.normalize_covariance(
+            tracks.covariance_px[found] + _FLOOR_PX**2 * np.eye(2), points
+        )
+        displacement = fit_displacement(points, covariance, self._points_goal()[found])
+        if displacement is None:
+            return None
+        self._seen = [(t, d) for t, d in self._seen if t >= time - _REST_S] + [(time, displacement)]
+        return tracks
+
+    @property
+    def displacement(self) -> Displacement | None:
+        """How far the camera was from the goal in the last image that told."""
+        return self._seen[-1][1] if self._seen else None
+
+    def at_rest(self, tolerance_m: float, tolerance_rad: float) -> bool:
+        """Tell whether the camera has moved less than a tenth of the tolerances lately."""
+        if len(self._seen) < 4 or self._seen[-1][0] - self._seen[0][0] < 0.8 * _REST_S:
+            return False
+        first, last = self._seen[0][1], self._seen[-1][1]
+        moved = np.linalg.norm(first.T_goal_camera[:3, 3] - last.T_goal_camera[:3, 3])
+        turned = abs(first.angle_rad - last.angle_rad)
+        return bool(moved <= 0.1 * tolerance_m and turned <= 0.1 * tolerance_rad)
+
+    def reference(self, time: float) -> Reference:
+        """Return the points as the photograph shows them."""
+        return Reference(
+            time,
+            self.points_px,
+            velocity_px=np.zeros_like(self.points_px),
+            depth_m=self._depth_m,
+            desired_depth_m=self._depth_m,
+        )
+
+    def _points_goal(self) -> FloatArray:
+        points = self.goal.camera.normalize(self.points_px)
+        rays: FloatArray = np.column_stack((points, np.ones(len(points))))
+        return rays * self._depth_m[:, None]
+
+
+def _picked(goal: GoalImage, star_px: FloatArray) -> FloatArray:
+    """Return the best points of the photograph among those that were recognised, (K, 2)."""
+    import cv2
+
+    rows, columns = goal.image.shape
+    hull = np.zeros((rows, columns), dtype=np.uint8)
+    corners = cv2.convexHull(np.rint(star_px).astype(np.int32))
+    cv2.fillConvexPoly(hull, corners, 1)
+    border = int(_BORDER_PX)
+    inside = np.zeros_like(hull)
+    inside[border : rows - border, border : columns - border] = 1
+    mask = (hull * inside) > 0
+    if goal.mask is not None:
+        mask &= goal.mask
+    picked = pick_features(goal.image, _POINTS, mask, _APART_PX).points_px
+    return picked if len(picked) >= _FEWEST else star_px[: 2 * _POINTS]

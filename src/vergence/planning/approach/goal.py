@@ -1,0 +1,39 @@
+"""What is to be reached, and how."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+from vergence.arrays import BoolArray, ImageArray
+from vergence.camera import Camera
+from vergence.vision.matching import Matcher
+
+
+class GoalImage(NamedTuple):
+    """A photograph as the arm's camera would have taken it, and what recognises it."""
+
+    image: ImageArray  # (height, width) grey
+    camera: Camera  # the arm's
+    matcher: Matcher
+    described: Any  # the image as the matcher describes it
+    mask: BoolArray | None = None  # (height, width) where the photograph shows something
+
+    @classmethod
+    def of(
+        cls, image: ImageArray, camera: Camera, matcher: Matcher, mask: BoolArray | None = None
+    ) -> Self:
+        """Describe a photograph."""
+        return cls(image, camera, matcher, matcher.describe(image, mask), mask)
+
+
+@dataclass(frozen=True, slots=True)
+class ApproachSettings:
+    """How a photograph is approached."""
+
+    tolerance_m: float = 1e-3  # distance from the goal that the confidence region must be within
+    tolerance_rad: float = 0.0035  # and angle
+    distance_m: float | None = None  # rough distance from camera to object at the goal
+    exact_distance: bool = False  # whether it is known well, as by a length in the photograph
+    margin_px: float = 10.0  # kept from the border of the image
+    margin_joint: float = 0.01  # of half a joint's range
+    camera_speed_m_s: float = 0.25  # on the path
+    points: int = 16  # that are followed

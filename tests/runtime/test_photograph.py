@@ -1,0 +1,109 @@
+"""Going where a photograph was taken, by images alone; or saying why not before a move."""
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence.assembly import run_driver, with_goal
+from vergence.camera.photograph import write_photograph
+from vergence.cell import load_cell
+from vergence.geometry import se3_inverse, so3_log
+from vergence.signals import OutcomeKind
+from vergence.simulation import SimulatedDriver
+
+GOAL_DEG = np.array([1.5, -1.0, 2.0, 3.0, -2.0, 40.0])  # from the start
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return load_cell("puma560").replace(target={"motion": "stationary"}, duration_s=30.0)
+
+
+@pytest.fixture(scope="module")
+def taken(cell):
+    """Return the image taken at the goal, the camera's pose there, and its intrinsics."""
+    driver = SimulatedDriver(cell)
+    q = driver.read().joints["puma"].position + np.deg2rad(GOAL_DEG)
+    frame = driver.frame_at("wrist", "puma", q)
+    driver.close()
+    return frame.image, frame.truth.T_world_camera, driver.cameras["wrist"]
+
+
+def run_to(cell, image, folder, name="goal.png"):
+    """Run the cell to a photograph; return the run and where its camera ended."""
+    path = folder / name
+    assert cv2.imwrite(str(path), image)
+    cell = with_goal(cell, path)
+    driver = SimulatedDriver(cell)
+    try:
+        run = run_driver(cell, driver, (), images=True)
+        return run, driver.world.camera_pose("wrist"), driver.read().joints["puma"].position
+    finally:
+        driver.close()
+
+
+def apart(T, T_goal):
+    E = se3_inverse(T_goal) @ T
+    turn = np.linalg.norm(so3_log(np.ascontiguousarray(E[:3, :3])))
+    return np.linalg.norm(E[:3, 3]), np.rad2deg(turn)
+
+
+def test_a_photograph_alone_brings_the_camera_where_it_was_taken(cell, taken, tmp_path):
+    image, T_goal, _ = taken
+    run, T_end, _ = run_to(cell, image, tmp_path)
+    assert run.outcome.kind is OutcomeKind.REACHED
+    distance, angle = apart(T_end, T_goal)
+    assert distance < 0.5e-3
+    assert angle < 0.1
+    names = [event.name for event in run.events]
+    assert names.count("path planned") >= 2
+    assert "arriving" in names
+
+
+def test_other_light_and_a_hidden_part_do_not_keep_it_from_arriving(cell, taken, tmp_path):
+    image, T_goal, _ = taken
+    changed = np.clip(0.6 * image.astype(float) + 50, 0, 255).astype(np.uint8)
+    changed[:, :130] = 90
+    run, T_end, _ = run_to(cell, changed, tmp_path)
+    assert run.outcome.kind is OutcomeKind.REACHED
+    distance, angle = apart(T_end, T_goal)
+    assert distance < 1e-3
+    assert angle < 0.2
+
+
+def test_a_photograph_by_another_camera_leads_to_its_place(cell, taken, tmp_path):
+    from vergence.camera import Camera
+
+    image, T_goal, camera = taken
+    phone = Camera(1024, 768, focal_px=0.9 * 1024 * camera.fx / 640)
+    v, u = np.indices((768, 1024))
+    rays = phone.normalize(np.column_stack((u.ravel(), v.ravel())).astype(float))
+    grid = camera.project(np.column_stack((rays, np.ones(len(rays))))).reshape(768, 1024, 2)
+    grid = grid.astype(np.float32)
+    photograph = cv2.remap(image, grid[..., 0], grid[..., 1], cv2.INTER_CUBIC)
+    write_photograph(tmp_path / "phone.jpg", photograph, phone, {})
+    run, T_end, _ = run_to(cell, photograph, tmp_path, "phone.jpg")
+    assert run.outcome.kind is OutcomeKind.REACHED
+    distance, angle = apart(T_end, T_goal)
+    assert distance < 1e-3
+    assert angle < 0.2
+
+
+@pytest.mark.parametrize(
+    ("spoil", "word"),
+    [
+        (lambda image: image[:, ::-1].copy(), "mirrored"),
+        (lambda image: cv2.GaussianBlur(image, (0, 0), 15), "blurred"),
+        (lambda image: np.full_like(image, 255), "white"),
+    ],
+    ids=["mirrored", "blurred", "white"],
+)
+def test_a_photograph_that_is_not_recognised_is_refused_before_a_move(
+    cell, taken, tmp_path, spoil, word
+):
+    start = np.deg2rad(cell.arms["puma"].start_deg)
+    run, _, q = run_to(cell, spoil(taken[0]), tmp_path)
+    assert run.outcome.kind is OutcomeKind.INFEASIBLE
+    assert run.outcome.time == 0.0
+    assert word in run.outcome.reason
+    np.testing.assert_allclose(q, start, atol=1e-9)
