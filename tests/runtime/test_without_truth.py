@@ -57,7 +57,7 @@ def with_goal_image(cell, folder):
     goal = joint_positions(cell, "task.goal_deg", task.goal_deg, driver.arms[task.arm])
     cv2.imwrite(str(folder / "goal.png"), driver.frame_at(task.camera, task.arm, goal).image)
     driver.close()
-    return cell.replace(task={"goal_image": str(folder / "goal.png")})
+    return cell.replace(task={"goal": str(folder / "goal.png")})
 
 
 def run(cell, wrap):
@@ -86,7 +86,7 @@ def test_every_cell_runs_alike_with_and_without_truth(name, tmp_path):
 def test_without_a_goal_image_a_driver_that_cannot_take_one_is_refused():
     cell = load_cell("gantry")
     driver = SimulatedDriver(cell)
-    with pytest.raises(InputError, match=r"task\.goal_image"):
+    with pytest.raises(InputError, match=r"task\.goal"):
         run_driver(cell, Bare(driver), [], images=True)
     driver.close()
 

@@ -60,6 +60,8 @@ class Arrival:
         view: ImagePoints = observation.views[-1]
         if view.points_px.shape != reference.points_px.shape:
             return
+        if self._rows and self._rows[-1].desired_px.shape != reference.points_px.shape:
+            self._rows.clear()  # other features
         error = np.where(view.found[:, None], view.points_px - reference.points_px, np.nan)
         self._rows.append(_Row(view.time, error, reference.points_px, q.copy(), command.active))
         while self._rows[0].time < view.time - _WINDOW_S:
