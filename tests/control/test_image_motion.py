@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from servo_scene import CAMERA, PERIOD, SQUARE, START, in_view, puma, seen
 
-from vergence.control import CameraMounting, ImageMotion, MotionSettings
+from vergence.control import CameraMounting, CarriedDepth, ImageMotion, MotionSettings
 from vergence.signals import ImagePoints, JointState
 
 ARM = puma()
@@ -29,7 +29,7 @@ def features_on_the_way(motion, believed, ticks=40, hidden=()):
 def test_the_depth_of_what_stands_follows_from_the_cameras_motion(hidden):
     _, depth = seen(ARM, START, WORLD)
     motion = ImageMotion(
-        ARM, CameraMounting(CAMERA), MotionSettings(feed_forward=False, carries_depth=True)
+        ARM, CameraMounting(CAMERA), MotionSettings(feed_forward=False, depth=CarriedDepth())
     )
     features, points_px, now = features_on_the_way(motion, depth, hidden=hidden)
     assert (now < 0.85 * depth).all()
@@ -50,7 +50,7 @@ def test_depth_stays_as_it_is_believed_unless_it_is_to_be_carried():
 def test_a_depth_believed_far_too_small_stays_in_front_of_the_camera():
     believed = np.full(4, 0.1)
     motion = ImageMotion(
-        ARM, CameraMounting(CAMERA), MotionSettings(feed_forward=False, carries_depth=True)
+        ARM, CameraMounting(CAMERA), MotionSettings(feed_forward=False, depth=CarriedDepth())
     )
     features, *_ = features_on_the_way(motion, believed)
     np.testing.assert_allclose(features.depth, 0.01)

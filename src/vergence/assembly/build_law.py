@@ -12,9 +12,14 @@ from vergence.assembly.motion_needed import require_motion
 from vergence.cell.schema import ReachTable
 from vergence.control import (
     CameraMounting,
+    CarriedDepth,
+    Depth,
+    DepthFromFeatures,
+    HeldDepth,
     Law,
     LawSetting,
     Limits,
+    MotionSettings,
     OptimalTracking,
     PoseServo,
     PositionBased,
@@ -24,6 +29,7 @@ from vergence.control import (
     Situation,
     axis_mask,
 )
+from vergence.control.depth.from_features import fixes_pose
 from vergence.errors import InputError
 from vergence.features import interaction_matrix_points
 from vergence.geometry import se3_inverse
@@ -112,6 +118,7 @@ def _servo(context: LawContext) -> Servo:
         if name not in cell.cameras:
             raise InputError("law", "objectives", name, ", ".join(cell.cameras))
     reaches = isinstance(cell.task, ReachTable)
+    depth = _depth(context, names)
     depth_m = None if reaches else {name: context.depth_m(name, settings.depth_m) for name in names}
     return Servo(
         context.arm,
@@ -122,13 +129,38 @@ def _servo(context: LawContext) -> Servo:
         depth_m=depth_m,
         situation=Situation(
             context.period_s(),
-            settings.motion,
+            settings.motion(depth, context.declared_stationary),
             None if context.is_fixed else context.solids,
             _POINT_DEPTHS,
             context.joints[cell.task.arm],
             _FEWEST_OF_PATH if reaches else 1,
+            {name: known for name in names if (known := context.known_features(name)) is not None},
         ),
     )
+
+
+def _depth(context: LawContext, names: list[str]) -> Depth:
+    """Return where the depth of the features is had from: as the file says, or by what is known.
+
+    Raises:
+        InputError: if motion is to be fed forward on a depth that is wrong for a moving target.
+    """
+    law = context.cell.law
+    depth = law.depth if law.depth is not None else _best_depth(context, names)
+    if law.feed_forward and not depth.estimates_motion:
+        given = f"true, with the depth {kind_of(depth)}"
+        allowed = "from_features or from_pose for depth: else a wrong depth feigns motion"
+        raise InputError("law", "feed_forward", given, allowed)
+    return depth
+
+
+def _best_depth(context: LawContext, names: list[str]) -> Depth:
+    if isinstance(context.cell.task, ReachTable):
+        return HeldDepth()  # the plan knows it at every instant
+    known = [context.known_features(name) for name in names]
+    if all(features is not None and fixes_pose(features) for features in known):
+        return DepthFromFeatures()
+    return CarriedDepth() if context.declared_stationary else HeldDepth()
 
 
 def _pose_servo(context: LawContext) -> PoseServo:
@@ -143,7 +175,7 @@ def _pose_servo(context: LawContext) -> PoseServo:
         corners=context.target_corners() if constrained else None,
         situation=Situation(
             context.inner_period_s,
-            settings.motion,
+            MotionSettings(settings.feed_forward, settings.prediction),
             None if context.is_fixed else context.solids,
             _POSE_DEPTHS,
             context.joints[context.cell.task.arm],

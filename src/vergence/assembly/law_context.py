@@ -12,6 +12,7 @@ from vergence.camera import Camera
 from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.geometry import se3_compose, se3_inverse, transform_points
+from vergence.parts import kind_of
 from vergence.robot import Arm
 from vergence.simulation import placement_pose
 from vergence.simulation.solids import Solids
@@ -153,6 +154,23 @@ class LawContext:
         T_camera_features = se3_compose(se3_inverse(self.model.camera_pose(name)), T_world_features)
         points: FloatArray = transform_points(T_camera_features, features)
         return points
+
+    @property
+    def declared_stationary(self) -> bool:
+        """Whether the cell declares the target stationary before the task's camera."""
+        target = self.cell.target
+        if kind_of(target.motion) != "stationary":
+            return False
+        holder = target.carried_by
+        return holder in (None, self.cell.task.arm) or self.cell.arms[holder].motion is None
+
+    def known_features(self, camera: str) -> FloatArray | None:
+        """Return the features that the cell states for a camera, (M, 3), m; None if it has none."""
+        tool = self.cell.tool
+        if tool is not None and tool.camera == camera:
+            return np.array(tool.features)
+        known = self.cell.target.features
+        return None if known is None else np.array(known)
 
     def _features(self, camera: str) -> tuple[FloatArray, FloatArray]:
         """Return what a camera looks at: points (M, 3) in a frame, and its pose (4, 4)."""

@@ -1,5 +1,13 @@
 """Control: objectives, limits, solvers, the servo that sums them, and the guard behind it."""
 
+from vergence.control.depth import (
+    CarriedDepth,
+    Depth,
+    DepthFromFeatures,
+    DepthFromMotion,
+    DepthFromPose,
+    HeldDepth,
+)
 from vergence.control.guard import (
     Guard,
     closing_rates,
@@ -50,9 +58,15 @@ __all__ = [
     "AXES",
     "CameraMounting",
     "CameraState",
+    "CarriedDepth",
     "DampedPseudoInverse",
+    "Depth",
+    "DepthFromFeatures",
+    "DepthFromMotion",
+    "DepthFromPose",
     "FeatureState",
     "Guard",
+    "HeldDepth",
     "ImageBased",
     "ImageMotion",
     "InnerLaw",

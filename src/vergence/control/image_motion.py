@@ -1,18 +1,19 @@
 """Where the features are now, and how fast the target moves them: latency and motion undone."""
 
 from collections import deque
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
+from vergence.control.depth import Depth, Depths, HeldDepth, MeasuredPoints
+from vergence.control.depth.depth import in_front
 from vergence.control.mounting import CameraMounting
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import Arm, forward_kinematics
-from vergence.signals import ImagePoints, JointState
-
-_LEAST_DEPTH = 0.1  # of the depth believed at first
+from vergence.signals import ImagePoints, JointState, TargetState
 
 
 class FeatureState(NamedTuple):
@@ -21,6 +22,7 @@ class FeatureState(NamedTuple):
     points: FloatArray  # (M, 2) normalized coordinates, now
     flow: FloatArray  # (M, 2) their motion by the target's own, 1/s
     depth: FloatArray  # (M,) m, as believed
+    depth_share: float = float("nan")  # its largest deviation, a share; NaN if unknown
 
 
 class MotionSettings(NamedTuple):
@@ -28,18 +30,39 @@ class MotionSettings(NamedTuple):
 
     Attributes:
         feed_forward: whether the target's own motion is estimated and fed forward; else the target
-            is taken for stationary.
+            is taken for stationary. If None, where the depth is right for a target that moves: the
+            motion that a wrong depth feigns would be fed forward like any other.
         prediction: whether features are carried from their exposure to now; else they are taken as
             they are, late.
         flow_smoothing_s: time constant of the target's motion in the image, s.
-        carries_depth: whether the depth of the start is updated from the camera's motion, which is
-            right for a stationary target; else it stays as given.
+        depth: where the depth of the features is had from.
     """
 
-    feed_forward: bool = True
+    feed_forward: bool | None = None
     prediction: bool = True
     flow_smoothing_s: float = 0.1
-    carries_depth: bool = False
+    depth: Depth = HeldDepth()
+
+    @property
+    def feeds_forward(self) -> bool:
+        """Whether the target's own motion is fed forward."""
+        if self.feed_forward is None:
+            return self.depth.estimates_motion
+        return self.feed_forward
+
+    @property
+    def as_it_is(self) -> bool:
+        """Whether features and depth are taken as they are."""
+        return not (self.feeds_forward or self.prediction) and isinstance(self.depth, HeldDepth)
+
+
+class _Exposure(NamedTuple):
+    """The last view."""
+
+    time: float  # s
+    q: FloatArray  # (n,)
+    points: FloatArray  # (M, 2) normalized coordinates
+    depths: Depths
 
 
 class ImageMotion:
@@ -55,6 +78,10 @@ class ImageMotion:
         mounting: of the camera.
         settings: what is assumed.
         memory_s: how far back the joints are remembered; more than the latency.
+        features: in the target's frame, (M, 3), m; None where they are not known.
+
+    Raises:
+        InputError: if the depth needs features that are not known.
     """
 
     def __init__(
@@ -63,57 +90,85 @@ class ImageMotion:
         mounting: CameraMounting,
         settings: MotionSettings | None = None,
         memory_s: float = 2.0,
+        features: FloatArray | None = None,
     ) -> None:
         settings = settings or MotionSettings()
         self._arm, self._mounting, self._memory_s = arm, mounting, memory_s
-        self._smoothing_s = settings.flow_smoothing_s if settings.feed_forward else np.inf
-        self._prediction, self._carries_depth = settings.prediction, settings.carries_depth
+        self._smoothing_s = settings.flow_smoothing_s if settings.feeds_forward else np.inf
+        self._prediction = settings.prediction
+        self._held = isinstance(settings.depth, HeldDepth)
+        self._bind = partial(settings.depth.bind, features)
+        self._depth_source = self._bind()
         self._history: deque[tuple[float, FloatArray]] = deque()
-        self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, q, points
+        self._last: _Exposure | None = None
         self._flow: FloatArray | None = None
-        self._depth: FloatArray | None = None  # at the last exposure
 
-    def update(self, view: ImagePoints, depth: FloatArray, joints: JointState) -> FeatureState:
+    def update(
+        self,
+        view: ImagePoints,
+        depth: FloatArray,
+        joints: JointState,
+        target: TargetState | None = None,
+    ) -> FeatureState:
         """Take in a view and return the features now.
 
         Args:
             view: the newest measurement.
-            depth: of the features, (M,), m; if it is carried on, as it was at the first view.
+            depth: of the features, (M,), m, as it is believed without any measurement.
             joints: now.
+            target: from a filter, where one runs.
         """
         self._remember(joints)
         q_exposed = self._joints_at(view.time)
         points = self._mounting.camera.normalize(view.points_px)
-        flow, exposed_depth = self._update(view, points, depth, q_exposed)
+        if self._last is not None and len(points) != len(self._last.points):
+            self._last = self._flow = None  # other features
+            self._depth_source = self._bind()
+        if self._last is None or view.time > self._last.time:
+            self._expose(view, points, depth, q_exposed, target)
+        assert self._last is not None
+        assert self._flow is not None
+        flow, exposed = self._flow, self._last.depths
+        if self._held:
+            exposed = Depths(depth)
         if not self._prediction:
-            return FeatureState(points, flow, exposed_depth)
-        now = self._seen_from(points, exposed_depth, q_exposed, joints.position)
+            return FeatureState(points, flow, *exposed)
+        now = self._seen_from(points, exposed.depth_m, q_exposed, joints.position)
         ahead = now[:, :2] + flow * (joints.time - view.time)
-        return FeatureState(ahead, flow, _least(now[:, 2], depth) if self._carries_depth else depth)
+        moved = np.where(np.isfinite(now[:, 2]), now[:, 2], exposed.depth_m)
+        depth_now = depth if self._held else in_front(moved, depth)
+        return FeatureState(ahead, flow, depth_now, exposed.share)
 
-    def _update(
-        self, view: ImagePoints, points: FloatArray, depth: FloatArray, q: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Take in a view; return the flow (M, 2) and the depth (M,) at its exposure."""
-        if self._last is not None and len(points) != len(self._last[2]):
-            self._last = self._flow = self._depth = None  # other features
-        if self._depth is None or not self._carries_depth:
-            self._depth = depth
+    def _expose(
+        self,
+        view: ImagePoints,
+        points: FloatArray,
+        depth: FloatArray,
+        q: FloatArray,
+        target: TargetState | None,
+    ) -> None:
+        """Take in a new view: its depths, and what the last one leaves unexplained as flow."""
+        measured = MeasuredPoints(
+            view.time,
+            points,
+            view.found,
+            view.covariance_px / np.outer(*2 * [self._mounting.camera.focal_px]),
+            self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q)),
+            depth,
+            target,
+        )
+        depths = self._depth_source.update(measured)
         if self._flow is None:
             self._flow = np.zeros_like(points)
-        if self._last is not None and view.time > self._last[0]:
-            time, q_last, points_last = self._last
-            elapsed = view.time - time
-            stationary = self._seen_from(points_last, self._depth, q_last, q)
+        if self._last is not None:
+            last, elapsed = self._last, view.time - self._last.time
+            before = depth if self._held else last.depths.depth_m
+            stationary = self._seen_from(last.points, before, last.q, q)
             share = elapsed / (elapsed + self._smoothing_s)
             change = share * ((points - stationary[:, :2]) / elapsed - self._flow)
             known = view.found & np.isfinite(change).all(axis=1)
             self._flow = self._flow + np.where(known[:, None], change, 0.0)
-            if self._carries_depth:
-                carried = np.where(np.isfinite(stationary[:, 2]), stationary[:, 2], self._depth)
-                self._depth = _least(carried, depth)
-        self._last = (view.time, q, points)
-        return self._flow, self._depth
+        self._last = _Exposure(view.time, q, points, depths)
 
     def _seen_from(
         self, points: FloatArray, depth: FloatArray, q_from: FloatArray, q_to: FloatArray
@@ -141,11 +196,6 @@ class ImageMotion:
                 return earlier[1] + min(share, 1.0) * (later[1] - earlier[1])
             later = earlier
         return later[1]
-
-
-def _least(carried: FloatArray, believed: FloatArray) -> FloatArray:
-    """Keep a carried depth (M,) in front of the camera, though it was believed too small."""
-    return np.maximum(carried, _LEAST_DEPTH * believed)
 
 
 @njit(cache=True, error_model="numpy")

@@ -76,7 +76,7 @@ class PoseServo:
             return JointCommand(np.zeros(self._arm.joint_count), np.zeros(6))
         motion = self._situation.motion
         goal = tip_goal(target, desired, self._mounting, joints.time if motion.prediction else None)
-        if not motion.feed_forward:
+        if motion.feed_forward is False:
             goal = MovingPose(goal.T, np.zeros(6))
         self._trajectory.aim(goal, joints.position)
         if self._view is not None:

@@ -1,6 +1,7 @@
 """The servo: a sum of objectives under limits, solved for joint rates."""
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -58,6 +59,8 @@ class Situation(NamedTuple):
         depth_range: bounds on true over believed depth, where the limits give none.
         start: joint positions at the start, (n,); those of the first tick if None.
         fewest: found features below which the target is lost.
+        features: in the target's frame, (M, 3), m, by camera, where they are known; "" for the only
+            camera.
     """
 
     period_s: float = 1 / 30
@@ -66,6 +69,7 @@ class Situation(NamedTuple):
     depth_range: tuple[float, float] = (0.5, 2.0)
     start: FloatArray | None = None
     fewest: int = 1
+    features: Mapping[str, FloatArray] = MappingProxyType({})
 
 
 class Servo:
@@ -120,9 +124,10 @@ class Servo:
             )
         )
         motion = self._situation.motion
-        needed = motion.feed_forward or motion.prediction
         self._motions = {
-            name: ImageMotion(arm, mounting, motion) if needed else None
+            name: None
+            if motion.as_it_is
+            else ImageMotion(arm, mounting, motion, features=self._situation.features.get(name))
             for name, mounting in self._mountings.items()
         }
         self._views: dict[str, ImagePoints] = {}
@@ -143,7 +148,7 @@ class Servo:
 
     @property
     def feeds_forward(self) -> bool:
-        """Whether features are carried to now or the target's motion is fed forward."""
+        """Whether features or depth are carried to now, or the target's motion is fed forward."""
         return self._motions[self._first] is not None
 
     def command(
@@ -244,12 +249,12 @@ class Servo:
         if name != self._first:
             reference = Reference(reference.time, reference.elsewhere_px[name])
         depth = self._depth_of(name, reference, len(view.found))
-        motion = self._motions[name]
+        motion, share = self._motions[name], float("nan")
         if motion is None:
             points = camera.normalize(view.points_px)
             flow = np.zeros_like(points)
         else:
-            points, flow, depth = motion.update(view, depth, joints)
+            points, flow, depth, share = motion.update(view, depth, joints, observation.target)
             if self._situation.motion.prediction:
                 reference = reference.at(joints.time)
         found = view.found
@@ -273,6 +278,7 @@ class Servo:
             target=observation.target,
             T_camera_target=reference.T_camera_target,
             time=joints.time,
+            depth_share=share,
             **self._pose(name, joints.position),
         )
 
@@ -337,6 +343,7 @@ class Servo:
             H_joints,
             g_joints,
             A,
+            float("nan") if first is None else first.depth_share,
         )
         return command_of(self._solver.solve(problem), A, self._solver.names)
 

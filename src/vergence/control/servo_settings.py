@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Self
 
+from vergence.control.depth import Depth
 from vergence.control.image_motion import MotionSettings
 from vergence.control.limits import Limits
 from vergence.control.objectives import Objective
@@ -35,9 +36,11 @@ class ServoSettings:
     objectives: tuple[WeightedObjective, ...] = slot("term", many=True)  # each with its weight
     limits: Limits | None = slot("limits", None)  # those of the solver's own defaults if absent
     solver: Solver = slot("solver", QuadraticProgram)  # from objectives to joint rates
-    depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # believed of the features
-    carries_depth: bool = knob(False)  # update the depth from the camera's motion
-    feed_forward: bool = knob(True)  # the target's own motion is estimated and fed forward
+    depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # believed at the start
+    depth: Depth | None = slot("depth", None)  # how it is followed; chosen by what is known if None
+    feed_forward: bool | None = knob(
+        None
+    )  # the target's own motion; if None, where it moves and the depth is right for that
     prediction: bool = knob(True)  # features are carried from their exposure to now
     flow_smoothing_s: float = knob(
         0.1, "s", least=0, upto=10
@@ -57,12 +60,17 @@ class ServoSettings:
         """The first objective."""
         return self.objectives[0].objective
 
-    @property
-    def motion(self) -> MotionSettings:
-        """What is assumed of the features between their exposure and now."""
-        return MotionSettings(
-            self.feed_forward, self.prediction, self.flow_smoothing_s, self.carries_depth
-        )
+    def motion(self, depth: Depth, stationary: bool) -> MotionSettings:
+        """Return what is assumed of the features between their exposure and now.
+
+        Args:
+            depth: where it is had from.
+            stationary: whether the target is declared so.
+        """
+        feeds = self.feed_forward
+        if feeds is None:
+            feeds = depth.estimates_motion and not stationary
+        return MotionSettings(feeds, self.prediction, self.flow_smoothing_s, depth)
 
     @property
     def terms(self) -> list[Term]:

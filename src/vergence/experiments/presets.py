@@ -23,7 +23,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
 }  # fmt: skip
 # What a preset takes from the cell's own law, so that the laws differ in nothing else.
 _SHARED = (
-    "gain", "axes", "Q", "R", "depth_m", "carries_depth", "feed_forward", "prediction",
+    "gain", "axes", "Q", "R", "depth_m", "depth", "feed_forward", "prediction",
     "flow_smoothing_s", "filter_hz", "closed_loop_hz",
 )  # fmt: skip
 

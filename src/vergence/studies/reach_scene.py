@@ -86,11 +86,12 @@ class Scene:
         random: np.random.Generator,
         roll_deg: tuple[float, float] | None = None,
         small: bool = False,
+        tilt_deg: float = 45.0,
     ) -> Self:
         """Draw a displacement of the camera, marks in view at both ends.
 
-        The object faces the camera within 45 degrees at 0.45 to 1.2 m; start and goal are inside
-        the joint limits. Nothing is known of what lies between.
+        The object faces the camera within an angle at 0.45 to 1.2 m; start and goal are inside the
+        joint limits. Nothing is known of what lies between.
 
         Args:
             arm: up to the camera.
@@ -99,6 +100,7 @@ class Scene:
             random: draws it.
             roll_deg: range of the turn about the optical axis, either way; any if None.
             small: whether displacements below both `EASY_M` and `EASY_RAD` count as well.
+            tilt_deg: angle within which the object faces the camera at both ends.
         """
         middle, half = 0.5 * (arm.q_max + arm.q_min), 0.5 * (arm.q_max - arm.q_min)
         free = 1.0 - END_MARGIN_JOINT
@@ -106,7 +108,7 @@ class Scene:
             first, roll = random.uniform(-np.pi, np.pi, 2)
             if roll_deg is not None:
                 roll = first + random.choice([-1.0, 1.0]) * np.radians(random.uniform(*roll_deg))
-            T_start, T_goal = _facing_pose(random, first), _facing_pose(random, roll)
+            T_start, T_goal = (_facing_pose(random, turn, tilt_deg) for turn in (first, roll))
             motion = T_goal @ se3_inverse(T_start)
             if not small and _is_easy(motion):
                 continue
@@ -126,9 +128,9 @@ def _in_view(camera: Camera, marks: FloatArray, T_camera_target: FloatArray) -> 
     return bool(camera.contains(camera.project(points), END_MARGIN_PX).all())
 
 
-def _facing_pose(random: np.random.Generator, roll: float) -> FloatArray:
+def _facing_pose(random: np.random.Generator, roll: float, tilt_deg: float) -> FloatArray:
     """Return the pose of a target that faces a camera, tilted about an axis across the view."""
-    tilt, about = np.radians(45) * np.sqrt(random.uniform()), random.uniform(-np.pi, np.pi)
+    tilt, about = np.radians(tilt_deg) * np.sqrt(random.uniform()), random.uniform(-np.pi, np.pi)
     R = so3_exp(tilt * np.array([np.cos(about), np.sin(about), 0.0])) @ np.diag([1.0, -1.0, -1.0])
     place = np.array([*random.uniform(-0.15, 0.15, 2), random.uniform(0.45, 1.2)])
     T: FloatArray = se3(R @ so3_exp(np.array([0.0, 0.0, roll])), place)

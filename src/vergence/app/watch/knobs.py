@@ -13,7 +13,7 @@ from vergence.registry import kinds
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
 # others, which act on features in the image.
 _ALWAYS = ("feed_forward", "prediction")
-_ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m", "carries_depth")
+_ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m")
 
 
 def law_choices(cell: Cell) -> dict[str, str]:
@@ -55,7 +55,7 @@ def knobs(law: Any) -> list[dict[str, Any]]:
     for knob in _of_part("", law):
         if knob["key"] not in acting:
             continue
-        if knob["key"] == "flow_smoothing_s" and not law.feed_forward:
+        if knob["key"] == "flow_smoothing_s" and law.feed_forward is False:
             continue
         found.append(knob)
     return found

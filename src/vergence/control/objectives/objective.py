@@ -49,6 +49,7 @@ class CameraState:
         target: pose and velocity of the target; None where no filter estimates it.
         T_camera_target: desired pose of the target, (4, 4); None where none is given.
         time: now, s.
+        depth_share: largest standard deviation of a depth, a share of it; NaN if unknown.
     """
 
     mounting: CameraMounting | None
@@ -67,6 +68,7 @@ class CameraState:
     target: TargetState | None = None
     T_camera_target: FloatArray | None = None
     time: float = 0.0
+    depth_share: float = float("nan")
 
     @property
     def camera(self) -> Camera:

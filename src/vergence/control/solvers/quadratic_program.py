@@ -26,6 +26,7 @@ from vergence.robot import manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.03
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
+_DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _STALL_S = 0.5  # at rest, before the limit on manipulability yields
 _YIELD_RATE = 2.0  # 1/s, at which it does
@@ -97,11 +98,21 @@ class BoundProgram:
                  problem.null_space_rates),
             scene,
             self._setting.period_s,
-            self.settings,
+            self._with_depths(problem.depth_share),
             self._avoidance,
         )  # fmt: skip
         self._yield_at_rest(answer)
         return Solution(*answer)
+
+    def _with_depths(self, share: float) -> ConstraintSettings:
+        """Return the settings with bounds on the depth from its deviation, where that is known."""
+        if self._limits.depth_range is not None or not np.isfinite(share):
+            return self.settings
+        off = _DEPTH_SIGMAS * share + _DEPTH_FLOOR
+        low, high = self._setting.depth_range
+        return self.settings._replace(
+            depth_low=max(1.0 - off, min(low, 0.5)), depth_high=min(1.0 + off, max(high, 2.0))
+        )
 
     def _yield_at_rest(self, answer: ConstrainedRates) -> None:
         """Lower the manipulability to keep while it alone holds the arm at rest.

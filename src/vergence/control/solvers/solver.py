@@ -27,6 +27,7 @@ class Problem(NamedTuple):
     H_joints: FloatArray  # (n, n) of a quadratic in the joint rates; (0, 0) for none
     g_joints: FloatArray  # (n,); (0,) for none
     A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
+    depth_share: float = float("nan")  # largest deviation of a depth, a share; NaN if unknown
 
 
 class Solution(NamedTuple):

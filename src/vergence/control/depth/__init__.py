@@ -1,0 +1,20 @@
+"""Depth as a part: where the law has the depth of its image points from."""
+
+from vergence.control.depth.carried import CarriedDepth
+from vergence.control.depth.depth import Depth, Depths, DepthSource, MeasuredPoints
+from vergence.control.depth.from_features import DepthFromFeatures
+from vergence.control.depth.from_motion import DepthFromMotion
+from vergence.control.depth.from_pose import DepthFromPose
+from vergence.control.depth.held import HeldDepth
+
+__all__ = [
+    "CarriedDepth",
+    "Depth",
+    "DepthFromFeatures",
+    "DepthFromMotion",
+    "DepthFromPose",
+    "DepthSource",
+    "Depths",
+    "MeasuredPoints",
+    "HeldDepth",
+]

@@ -1,0 +1,42 @@
+"""Depth updated from the camera's motion, for a stationary target."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.control.depth.depth import Depths, MeasuredPoints, in_front
+from vergence.geometry import se3_compose, se3_inverse, transform_points
+from vergence.parts import part
+
+
+@part("depth", "carried")
+class CarriedDepth:
+    """The depth believed at the start, updated from the camera's motion; the target must rest."""
+
+    @property
+    def estimates_motion(self) -> bool:
+        """It is not right for a target that moves in depth."""
+        return False
+
+    def bind(self, features: FloatArray | None) -> "CarriedSource":
+        """Return a source for one camera."""
+        return CarriedSource()
+
+
+class CarriedSource:
+    """Moves each point with the camera, from one exposure to the next."""
+
+    def __init__(self) -> None:
+        self._last: tuple[FloatArray, FloatArray] | None = None  # T_camera_scene, points (M, 3)
+
+    def update(self, exposure: MeasuredPoints) -> Depths:
+        """Return the depths of the last exposure, seen from where the camera is now."""
+        depth = exposure.believed_m
+        carried = np.full((len(depth), 3), np.nan)
+        if self._last is not None:
+            T, points = self._last
+            carried = transform_points(se3_compose(exposure.T_camera_scene, se3_inverse(T)), points)
+            known = np.isfinite(carried[:, 2])
+            depth = in_front(np.where(known, carried[:, 2], depth), exposure.believed_m)
+        seen = np.column_stack((exposure.points * depth[:, None], depth))
+        self._last = exposure.T_camera_scene, np.where(exposure.found[:, None], seen, carried)
+        return Depths(depth)

@@ -1,0 +1,63 @@
+"""Where the depth of image points comes from: what is given to a source, and what it answers."""
+
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.signals import TargetState
+
+
+class MeasuredPoints(NamedTuple):
+    """One image of the features, as a depth source is given it."""
+
+    time: float  # s
+    points: FloatArray  # (M, 2) normalized coordinates
+    found: BoolArray  # (M,)
+    covariance: FloatArray  # (M, 2, 2) of the points, normalized
+    T_camera_scene: FloatArray  # (4, 4) at the exposure, of the frame in which the target rests
+    believed_m: FloatArray  # (M,) depth at the start
+    target: TargetState | None = None  # from a filter, where one runs
+
+
+class Depths(NamedTuple):
+    """Depth of the features at an exposure."""
+
+    depth_m: FloatArray  # (M,)
+    share: float = float("nan")  # largest standard deviation, a share of the depth; NaN if unknown
+
+
+class DepthSource(Protocol):
+    """Follows the depth of one camera's features from image to image."""
+
+    def update(self, exposure: MeasuredPoints) -> Depths:
+        """Take in an image and return the depths at its exposure."""
+        ...
+
+
+@runtime_checkable
+class Depth(Protocol):
+    """A way of knowing depth, as a cell file declares it."""
+
+    @property
+    def estimates_motion(self) -> bool:
+        """Whether it is right for a target that moves in depth, so its flow can be fed forward."""
+        ...
+
+    def bind(self, features: FloatArray | None) -> DepthSource:
+        """Return a source for one camera.
+
+        Args:
+            features: in the target's frame, (M, 3), m; None where they are not known.
+
+        Raises:
+            InputError: if it needs what is not known.
+        """
+        ...
+
+
+def in_front(depth_m: FloatArray, believed_m: FloatArray) -> FloatArray:
+    """Return depths (M,) kept in front of the camera, though they were believed too small."""
+    least = 0.1 * believed_m
+    kept: FloatArray = np.maximum(np.where(np.isfinite(depth_m), depth_m, least), least)
+    return kept

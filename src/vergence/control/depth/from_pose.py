@@ -1,0 +1,95 @@
+"""Depth from the target's pose, as a filter estimates it."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import FloatArray
+from vergence.control.depth.depth import Depths, MeasuredPoints, in_front
+from vergence.errors import InputError
+from vergence.parts import part
+
+
+@part("depth", "from_pose")
+class DepthFromPose:
+    """The depth of known features at the pose that the filter estimates."""
+
+    @property
+    def estimates_motion(self) -> bool:
+        """The filter follows a target that moves."""
+        return True
+
+    def bind(self, features: FloatArray | None) -> "PoseSource":
+        """Return a source for one camera.
+
+        Raises:
+            InputError: if the features are not known.
+        """
+        if features is None:
+            raise InputError("law", "depth", "from_pose", "for known features: target.features")
+        return PoseSource(features)
+
+
+class PoseSource:
+    """Looks the features up at the filter's pose.
+
+    Args:
+        features: in the target's frame, (M, 3), m.
+    """
+
+    def __init__(self, features: FloatArray) -> None:
+        self._features = features
+
+    def update(self, exposure: MeasuredPoints) -> Depths:
+        """Return the depths at the estimated pose; those believed before there is one."""
+        target = exposure.target
+        if target is None:
+            return Depths(exposure.believed_m)
+        return depths_at(exposure, target.T_world_target, target.covariance[:6, :6], self._features)
+
+
+def depths_at(
+    exposure: MeasuredPoints,
+    T_scene_target: FloatArray,
+    covariance: FloatArray,
+    features: FloatArray,
+) -> Depths:
+    """Return the depths of features at a pose, with their deviation.
+
+    With a the lever of a feature and r the camera's optical axis along the scene's axes,
+    δz = r·δp + (a × r)·δθ.
+
+    Args:
+        exposure: of the image.
+        T_scene_target: the pose, (4, 4).
+        covariance: of its position and rotation along the scene's axes, (6, 6).
+        features: in the target's frame, (M, 3), m.
+    """
+    depth, deviation = _depths_at(exposure.T_camera_scene, T_scene_target, covariance, features)
+    depth = in_front(depth, exposure.believed_m)
+    return Depths(depth, float((deviation / depth).max(initial=0.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def _depths_at(
+    T_camera_scene: FloatArray, T_scene_target: FloatArray, covariance: FloatArray, P: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the depths (M,) of features P (M, 3) and their deviations (M,)."""
+    depth, deviation = np.empty(len(P)), np.empty(len(P))
+    r, a, row = T_camera_scene[2], np.empty(3), np.empty(6)
+    for j in range(len(P)):
+        depth[j] = r[3]
+        for i in range(3):
+            a[i] = 0.0
+            for k in range(3):
+                a[i] += T_scene_target[i, k] * P[j, k]
+            depth[j] += r[i] * (a[i] + T_scene_target[i, 3])
+            row[i] = r[i]
+        row[3] = a[1] * r[2] - a[2] * r[1]
+        row[4] = a[2] * r[0] - a[0] * r[2]
+        row[5] = a[0] * r[1] - a[1] * r[0]
+        variance = 0.0
+        for i in range(6):
+            for k in range(6):
+                variance += row[i] * covariance[i, k] * row[k]
+        deviation[j] = np.sqrt(max(variance, 0.0))
+    return depth, deviation
