@@ -70,6 +70,20 @@ def test_a_turned_goal_is_not_taken_for_a_mirror_image() -> None:
     assert "mirror image" not in arrival(SQUARE[[2, 3, 0, 1]]).outcome(2.0, 2.0).reason
 
 
+def test_what_another_camera_sees_is_not_held_against_the_goal_of_the_tasks_camera() -> None:
+    watched = Arrival(Goal(), np.ones(6))
+    command = JointCommand(np.zeros(6), np.zeros(6))
+    for k in range(60):
+        found, covariance = np.ones(4, dtype=np.bool_), np.tile(np.eye(2), (4, 1, 1))
+        views = tuple(
+            ImagePoints(name, k / 30, points, covariance, found, ("",) * 4)
+            for name, points in (("c", SQUARE), ("wall", SQUARE + 50.0))
+        )
+        reference = Reference(k / 30, SQUARE, elsewhere_px={"wall": SQUARE})
+        watched.observe(Observation(k / 30, views), reference, command, np.zeros(6))
+    assert watched.error_px == 0.0
+
+
 def test_a_goal_inside_the_view_margin_ends_a_run_as_not_reached() -> None:
     still = {"motion": "stationary"}
     start = vg.run("ur5", images=False, duration_s=0.2, target=still)

@@ -55,9 +55,10 @@ class Arrival:
         self, observation: Observation, reference: Reference, command: JointCommand, q: FloatArray
     ) -> None:
         """Take in what an image showed and what the law made of it, at joint positions q (n,)."""
-        if reference.points_px is None or not observation.views:
+        views = [view for view in observation.views if view.camera not in reference.elsewhere_px]
+        if reference.points_px is None or not views:
             return
-        view: ImagePoints = observation.views[-1]
+        view: ImagePoints = views[-1]
         if view.points_px.shape != reference.points_px.shape:
             return
         if self._rows and self._rows[-1].desired_px.shape != reference.points_px.shape:
