@@ -3,6 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 from enum import StrEnum
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +19,21 @@ from vergence.control import (
     InteractionModel,
     Limits,
     MotionSettings,
+    QuadraticProgram,
     Servo,
     Situation,
     guarded_steps,
 )
+from vergence.estimation import CornerView, NoPose, fit_pose
 from vergence.geometry import se3_inverse, so3_log, transform_points
-from vergence.planning import FixedReference
+from vergence.planning import (
+    FixedReference,
+    OptimisedPlanner,
+    Path,
+    PlanFailure,
+    PlanningProblem,
+    Trajectory,
+)
 from vergence.runtime.arrival import Arrival, Goal
 from vergence.runtime.stages import Planner
 from vergence.signals import ImagePoints, JointState, Observation, Reference
@@ -34,6 +44,7 @@ LONGEST_S = 20.0  # given to a law
 REACHED_PX, REACHED_M, REACHED_DEG = 1.0, 1e-3, 0.1
 BELIEF = (0.7, 1.4)  # range of the believed over the true depth at the start
 GAIN = 1.0  # 1/s
+CAMERA_SPEED, SETTLE_S = 0.25, 4.0  # m/s of a plan, and s after its end
 
 DEPTHS: dict[str, Depth] = {
     "held": HeldDepth(),
@@ -215,3 +226,62 @@ def serve(
     reference = Reference(0.0, scene.goal_px, desired_depth_m=known)
     law = servo_of(scene, choice, believed)
     return drive(scene, law, FixedReference(reference), random, noise_px)
+
+
+class Planned(NamedTuple):
+    """A path to the goal, or why there is none, and how long it took to find."""
+
+    path: Path | PlanFailure | NoPose
+    cpu_s: float
+
+
+def plan(scene: Scene, random: np.random.Generator, noise_px: float = 0.0) -> Planned:
+    """Plan from the images at start and goal, with the target's features known."""
+    begin = process_time()
+    now = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
+    fits = [
+        fit_pose(
+            scene.marks,
+            [CornerView(scene.camera, np.eye(4), px + noise_px * random.standard_normal(px.shape))],
+            max(noise_px, 0.05),
+        )
+        for px in (now, scene.goal_px)
+    ]
+    poses = []
+    for fit in fits:
+        if isinstance(fit, NoPose) and not fit.alternatives:
+            return Planned(fit, process_time() - begin)
+        poses.append(fit.alternatives[0] if isinstance(fit, NoPose) else fit)
+    T_start, T_goal = (pose.T_world_target for pose in poses)
+    T_world_target = scene.arm.forward_kinematics(scene.q_start) @ T_start
+    problem = PlanningProblem(
+        scene.arm,
+        scene.camera,
+        scene.q_start,
+        T_world_target @ se3_inverse(T_goal.copy()),
+        transform_points(T_world_target, scene.marks.copy()),
+    )
+    path = OptimisedPlanner().plan(problem)
+    return Planned(path, process_time() - begin)
+
+
+def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: float = 0.0) -> Finish:
+    """Follow a path as the task `reach` does, and settle at its end."""
+    trajectory = Trajectory.of(path, CAMERA_SPEED)
+    limits = Limits(
+        view_margin_px=0.5 * max(path.image_margin_px, 0.0),
+        joint_margin=0.25 * max(path.joint_margin, 0.0),
+        approach_rate_hz=8.0,
+        manipulability_share=0.0,
+    )
+    law = Servo(
+        scene.arm,
+        scene.camera,
+        ImageBased(gain=2.0 * GAIN, interaction="desired"),
+        limits=limits,
+        solver=QuadraticProgram(damping=1e-3),
+        depth_m=path.depth_m[-1],
+        situation=Situation(1.0 / RATE_HZ, MotionSettings(feed_forward=False)),
+    )
+    longest = trajectory.duration + SETTLE_S
+    return drive(scene, law, trajectory, random, noise_px, longest, trajectory.duration)
