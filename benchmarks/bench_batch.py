@@ -10,16 +10,16 @@ import numpy as np
 from harness import Block, Peer, measured, row
 from vergence.assembly import Parts, assemble_parts
 from vergence.cell import load_cell
-from vergence.experiments.batch import IdealRun, run_batch
+from vergence.experiments.batch import KinematicRun, run_batch
 from vergence.experiments.batch.closed_loop import closed_loops
 from vergence.experiments.batch.run_batch import empty_records, pack
-from vergence.simulation import IdealCell, SimulatedDriver, target_poses
+from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 
 RUN_S, RUNS = 25.0, 500
 TICKS = 750  # of a run, at 30 Hz
 
 
-def first_papers_run() -> IdealRun:
+def first_papers_run() -> KinematicRun:
     """The Puma that follows the board for 2.5 m, four axes and avoidance, two frames late."""
     cell = load_cell("puma560")
     driver = SimulatedDriver(cell, images=False)
@@ -27,7 +27,7 @@ def first_papers_run() -> IdealRun:
     assert isinstance(parts, Parts)
     wanted = parts.planner.reference(0.0).points_px
     assert wanted is not None
-    ideal = IdealCell(
+    ideal = KinematicCell(
         driver.world.arm_to_camera(camera),
         driver.cameras[camera],
         np.array(driver.read().joints[cell.task.arm].position),
@@ -37,10 +37,10 @@ def first_papers_run() -> IdealRun:
         inner_rate_hz=cell.inner_rate_hz,
         latency_frames=cell.cameras[camera].latency_frames,
     )
-    return IdealRun(ideal, parts.law, wanted, RUN_S)
+    return KinematicRun(ideal, parts.law, wanted, RUN_S)
 
 
-def runs_a_second(run: IdealRun) -> float:
+def runs_a_second(run: KinematicRun) -> float:
     """How many runs every core of this machine makes together, from cells to outcomes."""
     run_batch([run] * 8)
     start = time.perf_counter()

@@ -16,7 +16,7 @@ from vergence.camera import Camera
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import CornerExtractor, EdgeTracker, ObjectModel
 
-PICTURES = Path("/usr/share/visp-images-data/ViSP-images/mbt")
+IMAGES = Path("/usr/share/visp-images-data/ViSP-images/mbt")
 PACKAGE = "visp-images-data"
 CAMERA = Camera(640, 480, 547.737, 542.074, 338.704, 234.508)
 SIDE = 0.084  # m, of the cube; its frame is in a corner
@@ -31,15 +31,15 @@ def cube() -> ObjectModel:
 
 def start() -> FloatArray:
     """The pose in the first image, as the package has it."""
-    values = np.loadtxt(PICTURES / "cube.0.pos")
+    values = np.loadtxt(IMAGES / "cube.0.pos")
     T: FloatArray = se3(so3_exp(values[3:].copy()), values[:3].copy())
     return T
 
 
-def pictures() -> Iterator[ImageArray]:
+def real_images() -> Iterator[ImageArray]:
     import cv2
 
-    for path in sorted((PICTURES / "cube").glob("image*.pgm")):
+    for path in sorted((IMAGES / "cube").glob("image*.pgm")):
         yield np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8)
 
 
@@ -64,11 +64,11 @@ def speed_rows(image: ImageArray, T: FloatArray) -> list[dict[str, Any]]:
 
 
 def run() -> list[dict[str, Any]]:
-    name = "known object: pictures of the real cube in which it is seen"
-    if not (PICTURES / "cube").is_dir():
+    name = "known object: images of the real cube in which it is seen"
+    if not (IMAGES / "cube").is_dir():
         none = measured(name, float("nan"), "%")
-        return [none | {"peer": f"real pictures not installed (apt install {PACKAGE})"}]
-    images, T = list(pictures()), start()
+        return [none | {"peer": f"real images not installed (apt install {PACKAGE})"}]
+    images, T = list(real_images()), start()
     follower = ObjectFollower(EdgeTracker(cube()), CAMERA, T, 0.0, 0.04)
     steps = [follower.follow(image, 0.04 * k) for k, image in enumerate(images)]
     share = 100.0 * np.mean([step.sighting is Sighting.SEEN for step in steps])

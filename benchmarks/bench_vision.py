@@ -18,7 +18,7 @@ from harness import Missing, Peer, calls, measured, row
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision import SsdTracker, pick_features
 
-PICTURES = Path("/usr/share/visp-images-data/ViSP-images")
+IMAGES = Path("/usr/share/visp-images-data/ViSP-images")
 PACKAGE = "visp-images-data"
 RIGHT_PX = 1.5
 MARGIN_PX = 16
@@ -56,7 +56,7 @@ def sequence(name: str) -> list[ImageArray]:
     """The images of a sequence, in order; none if they are not installed."""
     import cv2
 
-    paths = sorted((PICTURES / name).glob("*.p?m"))
+    paths = sorted((IMAGES / name).glob("*.p?m"))
     return [np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8) for path in paths]
 
 
@@ -169,7 +169,7 @@ def speed_rows() -> list[dict[str, Any]]:
                 )
                 cv2.matchTemplate(area, window, cv2.TM_SQDIFF)
 
-    name = "SSD tracker: 5 points, ±32 px, two pictures"
+    name = "SSD tracker: 5 points, ±32 px, two images"
     return [
         row(name, ours, Peer("calcOpticalFlowPyrLK", calls(flow)), ratio_aim=0.25),
         row(name, ours, Peer("matchTemplate, whole pixels", calls(match)), ratio_aim=0.25),
@@ -178,9 +178,9 @@ def speed_rows() -> list[dict[str, Any]]:
 
 def run() -> list[dict[str, Any]]:
     rows = speed_rows()
-    if not (PICTURES / "cube").is_dir():
-        missing = Missing("real pictures", f"apt install {PACKAGE}")
-        none = measured("SSD tracker: right on real pictures", float("nan"), "%")
+    if not (IMAGES / "cube").is_dir():
+        missing = Missing("real images", f"apt install {PACKAGE}")
+        none = measured("SSD tracker: right on real images", float("nan"), "%")
         return [*rows, none | {"peer": f"{missing.name} not installed ({missing.advice})"}]
     for name, starts in (("cube", range(0, 69, 3)), ("mire-2", range(0, 490, 10))):
         rows += [right_row(name, starts, gaps) for gaps in ((1,), (2, 3, 5, 7, 10))]

@@ -25,7 +25,7 @@ def main() -> None:
         raise SystemExit(str(plan))
     trajectory = Trajectory.of(plan, camera_speed=0.25)
     print(f"{len(plan.q)} waypoints, {plan.camera_length_m:.2f} m, {trajectory.duration:.1f} s")
-    print(f"never nearer than {plan.image_margin_px:.0f} px to the border of the picture")
+    print(f"never nearer than {plan.image_margin_px:.0f} px to the border of the image")
     halfway = trajectory.reference(trajectory.duration / 2)
     print("halfway the first mark should be at", halfway.points_px[0].round(1))
 

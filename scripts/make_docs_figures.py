@@ -3,7 +3,7 @@
     scripts/make_docs_figures.py [nelson1995 lippiello2005 mezouar2001 guarantees laws]
 
 It runs `vergence reproduce` and `vergence compare` in full, which takes about half an hour, and
-writes pictures into docs/images and tables into docs/papers and docs/guide. What is already in
+writes images into docs/images and tables into docs/papers and docs/guide. What is already in
 build/docs is not run again: delete it to start afresh.
 """
 
@@ -52,12 +52,12 @@ def reproduce(paper: str) -> None:
     lines += ["", f"{held} of {len(checks)} checks hold. What was measured besides:", ""]
     lines += [f"- `{check['name']}`: {check['note']}" for check in checks if check["note"]]
     (DOCS / "papers" / f"_{paper}.md").write_text("\n".join(lines) + "\n")
-    pictures = DOCS / "images" / paper
-    pictures.mkdir(parents=True, exist_ok=True)
-    for old in pictures.glob("*.svg"):
+    images = DOCS / "images" / paper
+    images.mkdir(parents=True, exist_ok=True)
+    for old in images.glob("*.svg"):
         old.unlink()
     for drawing in sorted((BUILD / paper).glob("*.svg")):
-        (pictures / drawing.name).write_text(slim(drawing.read_text()))
+        (images / drawing.name).write_text(slim(drawing.read_text()))
 
 
 def slim(svg: str) -> str:

@@ -5,10 +5,26 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
+import numpy as np
+from board_images import write_board_images
+
+import vergence
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
+def write_frames(folder: Path) -> None:
+    """Write images of a texture that moves two pixels from one to the next."""
+    texture = cv2.imread(str(Path(vergence.__file__).parent / "cells/puma560/leaves.png"), 0)
+    for k in range(5):
+        cv2.imwrite(str(folder / f"{k}.png"), np.roll(texture, 2 * k, axis=1)[:240, :320])
+
+
 def test_every_example_runs_and_says_what_it_did(tmp_path: Path) -> None:
+    for name, write in (("frames", write_frames), ("board", write_board_images)):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name)
     for example in sorted(EXAMPLES.glob("*.py")):
         run = subprocess.run(
             [sys.executable, "-W", "error", str(example)],

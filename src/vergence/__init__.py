@@ -6,6 +6,7 @@ that the import itself takes milliseconds; `__init__.pyi` says what each of them
 
 _ROOMS = {
     "app.report": ("report",),
+    "app.tracking": ("track_points",),
     "assembly": ("plan", "run"),
     "camera": ("Camera", "read_camera", "write_camera"),
     "camera.calibration": ("calibrate_lens", "calibrate_mounting"),

@@ -1,4 +1,5 @@
 from vergence.app.report import report as report
+from vergence.app.tracking import track_points as track_points
 from vergence.assembly import plan as plan
 from vergence.assembly import run as run
 from vergence.camera import Camera as Camera

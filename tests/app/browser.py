@@ -129,7 +129,7 @@ class Browser:
             time.sleep(0.05)
         self.mouse("mouseReleased", *end)
 
-    def picture(self, selector: str) -> Any:
+    def image(self, selector: str) -> Any:
         """Return how an element looks, (height, width, 3)."""
         self.middle(selector)
         clip = self.value(

@@ -8,7 +8,7 @@ from vergence.runtime.recording import Recording
 
 @pytest.fixture(scope="session")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recorded run with pictures; not to be changed."""
+    """A recorded run with images; not to be changed."""
     return made_up_run.record(tmp_path_factory.mktemp("made-up"))
 
 

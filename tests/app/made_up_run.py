@@ -1,4 +1,4 @@
-"""A run that never was: a textured square wanders through a camera's picture, an arm sways."""
+"""A run that never was: a textured square wanders through a camera's image, an arm sways."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -88,7 +88,7 @@ def _tick(
         np.array([True, True, True, not lost]),
         ("", "", "", "the residual is too large" if lost else ""),
     )
-    image = None if texture is None else picture(_middle(time), texture)
+    image = None if texture is None else drawn_image(_middle(time), texture)
     frame = Frame("wrist", time, image, {"puma": q}, _truth(time, true_px))
     command = JointCommand(
         rates,
@@ -125,8 +125,8 @@ def _truth(time: float, true_px: FloatArray) -> FrameTruth:
     return FrameTruth(target, camera, true_px, np.full(4, 0.6), np.ones(4, dtype=bool))
 
 
-def picture(middle_px: FloatArray, texture: ImageArray) -> ImageArray:
-    """Return a picture with the texture's middle at a pixel, to a fraction of one."""
+def drawn_image(middle_px: FloatArray, texture: ImageArray) -> ImageArray:
+    """Return an image with the texture's middle at a pixel, to a fraction of one."""
     import cv2
 
     shift = middle_px - (np.array(texture.shape[::-1]) - 1) / 2

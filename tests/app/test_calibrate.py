@@ -1,4 +1,4 @@
-"""`vergence calibrate`: from a cell's own pictures to a camera that the cell reads."""
+"""`vergence calibrate`: from a cell's own images to a camera that the cell reads."""
 
 import json
 import shutil
@@ -25,17 +25,17 @@ def call(*words: object, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Twelve pictures by the wrist camera of the UR5, with poses; not to be changed."""
+    """Twelve images by the wrist camera of the UR5, with poses; not to be changed."""
     folder = tmp_path_factory.mktemp("calibrate")
     with pytest.MonkeyPatch.context() as patch:
-        words = ("--synthetic", "ur5", "--pictures", 12, "--out", folder, "--json")
+        words = ("--synthetic", "ur5", "--images", 12, "--out", folder, "--json")
         assert call(*words, monkeypatch=patch) == 0
     return folder
 
 
 @pytest.fixture
 def images(made: Path, tmp_path: Path) -> Path:
-    """A copy of the pictures that may be spoilt."""
+    """A copy of the images that may be spoilt."""
     return Path(shutil.copytree(made / "images", tmp_path / "images"))
 
 
@@ -48,10 +48,10 @@ def answer(capsys: pytest.CaptureFixture[str]) -> dict:
 @pytest.mark.parametrize(
     "words", [("ur5",), ("eye_to_hand",), ("ur5", "--chessboard")], ids=["hand", "fixed", "chess"]
 )
-def test_rendered_pictures_give_the_truth_back(
+def test_rendered_images_give_the_truth_back(
     words: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
-    options = ("--pictures", 20, "--json", "--out", tmp_path)
+    options = ("--images", 20, "--json", "--out", tmp_path)
     assert call("--synthetic", *words, *options, monkeypatch=monkeypatch) == 0
     said = answer(capsys)
     estimates = {e["name"]: e for e in said["estimates"]}
@@ -87,7 +87,7 @@ def test_a_distorting_camera_is_found_as_it_was_rendered(
     text = text.replace("rate_hz", "distortion = [-0.9, 0.5, 2e-3, -1e-3]\nrate_hz", 1)
     text = text.replace('"plate', f'"{source}/plate')
     (tmp_path / "cell.toml").write_text(text)
-    words = ("--synthetic", tmp_path, "--pictures", 20, "--json", "--out", tmp_path / "out")
+    words = ("--synthetic", tmp_path, "--images", 20, "--json", "--out", tmp_path / "out")
     assert call(*words, "--lens", "k1k2p1p2", monkeypatch=monkeypatch) == 0
     said = answer(capsys)
     estimates = {e["name"]: e for e in said["estimates"]}
@@ -118,7 +118,7 @@ def test_what_is_written_a_cell_and_the_tracker_read(made: Path, tmp_path: Path)
     np.testing.assert_allclose(by_table.position_m, (0.0, 0.0, 0.05), atol=1e-3)
 
 
-def test_pictures_without_poses_give_the_lens_alone(
+def test_images_without_poses_give_the_lens_alone(
     images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     (images / "poses.csv").unlink()
@@ -130,7 +130,7 @@ def test_pictures_without_poses_give_the_lens_alone(
     assert "arm" not in (tmp_path / "o" / "camera.toml").read_text()
 
 
-def test_bad_pictures_and_poses_are_named(
+def test_bad_images_and_poses_are_named(
     images: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     cv2.imwrite(str(images / "003.png"), np.full((480, 640), 90, np.uint8))
@@ -232,7 +232,7 @@ def test_poses_come_back_from_every_kind_of_file(tmp_path: Path) -> None:
 def test_a_calibration_is_replaced_only_when_that_is_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
-    words = ("--synthetic", "eye_to_hand", "--projected", "--pictures", 8, "--out", tmp_path)
+    words = ("--synthetic", "eye_to_hand", "--projected", "--images", 8, "--out", tmp_path)
     assert call(*words, monkeypatch=monkeypatch) == 0
     before = (tmp_path / "camera.yaml").read_text()
     assert call(*words, "--seed", 3, monkeypatch=monkeypatch) == 2

@@ -1,4 +1,4 @@
-"""`vergence compare` and `vergence map`: tables, pages, pictures and data of many runs."""
+"""`vergence compare` and `vergence map`: tables, pages, images and data of many runs."""
 
 import csv
 import json
@@ -10,7 +10,7 @@ import cv2
 import pytest
 
 from vergence.app.main import main
-from vergence.experiments import Crew, Ledger, Trial, TrialResult, WorkersLostError
+from vergence.experiments import Executor, ResultsFile, Trial, TrialResult, WorkersLostError
 
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
@@ -79,19 +79,19 @@ def test_a_second_run_in_the_same_folder_goes_on_and_says_the_same(
 def test_what_is_done_is_kept_when_the_user_stops_it(
     command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    add, done = Ledger.add, []
+    add, done = ResultsFile.add, []
 
-    def stop_at_the_third(ledger: Ledger, result: TrialResult) -> None:
+    def stop_at_the_third(results_file: ResultsFile, result: TrialResult) -> None:
         if len(done) == 2:
             raise KeyboardInterrupt
         done.append(result.key)
-        add(ledger, result)
+        add(results_file, result)
 
-    monkeypatch.setattr(Ledger, "add", stop_at_the_third)
+    monkeypatch.setattr(ResultsFile, "add", stop_at_the_third)
     assert command(*COMPARE, "--out", "c") == 1
     assert "--out c goes on from here" in capsys.readouterr().err
     assert len(Path("c/results.jsonl").read_text().splitlines()) == 3
-    monkeypatch.setattr(Ledger, "add", add)
+    monkeypatch.setattr(ResultsFile, "add", add)
     assert command(*COMPARE, "--out", "c") == 0
     assert len(Path("c/results.jsonl").read_text().splitlines()) == 5
 
@@ -102,7 +102,7 @@ def test_workers_that_die_end_in_a_message(
     def lose(*_: object) -> None:
         raise WorkersLostError([Trial("own/3", {})], "something killed 4 workers")
 
-    monkeypatch.setattr(Crew, "run", lose)
+    monkeypatch.setattr(Executor, "run", lose)
     assert command(*COMPARE, "--out", "c") == 1
     said = capsys.readouterr().err
     assert "run own/3: something killed 4 workers; the same command" in said
@@ -116,7 +116,7 @@ def test_workers_that_die_end_in_a_message(
         ("headings", "0.1,0.2", {"heading_deg", "speed_m_s", "distance_m"}, 4),
     ],
 )
-def test_a_region_is_mapped_to_a_picture_and_a_table(
+def test_a_region_is_mapped_to_an_image_and_a_table(
     command: Command, capsys: object, over: str, speeds: str, columns: set[str], runs: int
 ) -> None:
     assert command(*MAP, "--over", over, "--speeds", speeds, "--json", "--out", "m") == 0
@@ -127,7 +127,7 @@ def test_a_region_is_mapped_to_a_picture_and_a_table(
     rows = rows_of(answer["data"])
     assert len(rows) == 2 * runs
     assert columns <= rows[0].keys()
-    assert cv2.imread(answer["picture"]) is not None
+    assert cv2.imread(answer["image"]) is not None
     assert "Where it works" in Path(answer["report"]).read_text(encoding="utf-8")
 
 

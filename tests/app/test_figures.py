@@ -75,7 +75,7 @@ def test_error_and_drift_are_drawn_in_pixels(recording: Recording) -> None:
     np.testing.assert_array_equal(drift.lines[3].get_ydata(), trace.drift_px[:, 3])
 
 
-def test_paths_lie_in_a_picture_with_v_downwards(recording: Recording) -> None:
+def test_paths_lie_in_an_image_with_v_downwards(recording: Recording) -> None:
     [axes] = figure("paths", recording).axes
     left, right = axes.get_xlim()
     bottom, top = axes.get_ylim()

@@ -15,7 +15,7 @@ RAMP = np.tile(np.arange(0, 256, dtype=np.uint16), (64, 1))
 
 
 def images(folder: Path) -> list[np.ndarray]:
-    return [picture.image for picture in open_footage(folder).pictures()]
+    return [frame.image for frame in open_footage(folder).frames()]
 
 
 def test_images_come_in_the_natural_order_of_their_names(tmp_path: Path) -> None:
@@ -127,18 +127,18 @@ def write_video(path: Path, stamps_ms: list[int]) -> None:
 def test_a_videos_own_time_stamps_count(tmp_path: Path) -> None:
     stamps = [0, 100, 150, 400, 420, 900, 1000, 1500]
     write_video(tmp_path / "video.mkv", stamps)
-    pictures = list(open_footage(tmp_path / "video.mkv").pictures())
-    np.testing.assert_allclose([p.time for p in pictures], np.array(stamps) / 1e3, atol=1e-9)
-    assert [round(p.image.mean() / 20) for p in pictures] == list(range(8))
+    frames = list(open_footage(tmp_path / "video.mkv").frames())
+    np.testing.assert_allclose([p.time for p in frames], np.array(stamps) / 1e3, atol=1e-9)
+    assert [round(p.image.mean() / 20) for p in frames] == list(range(8))
 
 
 def test_a_rate_that_is_given_replaces_a_videos_time_stamps(tmp_path: Path) -> None:
     write_video(tmp_path / "video.mkv", [0, 100, 150, 400])
-    pictures = open_footage(tmp_path / "video.mkv", rate_hz=50.0).pictures()
-    np.testing.assert_allclose([p.time for p in pictures], [0.0, 0.02, 0.04, 0.06], atol=1e-12)
+    frames = open_footage(tmp_path / "video.mkv", rate_hz=50.0).frames()
+    np.testing.assert_allclose([p.time for p in frames], [0.0, 0.02, 0.04, 0.06], atol=1e-12)
 
 
 def test_time_never_runs_backwards_in_a_video(tmp_path: Path) -> None:
     write_video(tmp_path / "video.mkv", [0, 100, 100, 300])
-    pictures = open_footage(tmp_path / "video.mkv").pictures()
-    assert np.diff([p.time for p in pictures]).min() > 0.0
+    frames = open_footage(tmp_path / "video.mkv").frames()
+    assert np.diff([p.time for p in frames]).min() > 0.0

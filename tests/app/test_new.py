@@ -50,7 +50,7 @@ def test_an_arm_the_project_has_never_seen_follows_a_board(command, capsys, join
     assert result.summary["max_error_px"] < 20
 
 
-def test_features_are_found_on_its_board_in_rendered_pictures(command) -> None:
+def test_features_are_found_on_its_board_in_rendered_images(command) -> None:
     assert command("new", ARMS[6][0], "--body", ARMS[6][1]) == 0
     result = run_cell(load_cell("puma560", {"duration_s": "1"}))
     assert result.outcome.succeeded

@@ -22,7 +22,7 @@ def marks(tracked: object = NOWHERE, found: bool = True, **others: object) -> Ma
 
 
 def drawn_centre(canvas: NDArray[np.uint8], width: int) -> object:
-    """Where the ink on grey lies on average, in pixels of the picture."""
+    """Where the ink on grey lies on average, in pixels of the image."""
     ink = np.abs(canvas.astype(float) - 128).sum(axis=2)
     v, u = np.indices(ink.shape)
     drawn = np.array([(u * ink).sum(), (v * ink).sum()]) / ink.sum()
@@ -80,7 +80,7 @@ def test_far_away_points_do_no_harm() -> None:
     assert (draw(GREY, marks([[1e9, -1e12]])) == 128).all()
 
 
-def test_the_picture_itself_is_left_alone() -> None:
+def test_the_image_itself_is_left_alone() -> None:
     image = GREY.copy()
     draw(image, marks([[20.0, 20.0]]))
     np.testing.assert_array_equal(image, GREY)

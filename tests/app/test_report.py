@@ -40,7 +40,7 @@ def test_the_page_tells_the_outcome_and_every_part(page: str) -> None:
     assert page.count("data:image/svg+xml") == 8
 
 
-def test_every_picture_says_what_it_shows(page: str) -> None:
+def test_every_image_says_what_it_shows(page: str) -> None:
     assert all(re.findall(r'alt="([^"]*)"', page))
     assert page.count("<img") == page.count("<figcaption>")
 

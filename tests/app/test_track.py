@@ -1,4 +1,4 @@
-"""`vergence track` follows an object through pictures, says when it is lost, answers mistakes."""
+"""`vergence track` follows an object through images, says when it is lost, answers mistakes."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ from vergence.arrays import FloatArray
 from vergence.geometry import quaternion_to_matrix, se3, so3_exp
 
 sys.path.append(str(Path(__file__).parents[1] / "vision_known"))
-from known_scene import CAMERA, OBJ, clutter, picture, pose, pose_error
+from known_scene import CAMERA, OBJ, clutter, drawn_image, pose, pose_error
 
 RATE_HZ = 25.0
 Track = Callable[..., int]
@@ -26,13 +26,13 @@ def write_footage(folder: Path, count: int, empty_from: int = 10**6) -> None:
     ground = clutter(rng)
     folder.mkdir()
     for k in range(count):
-        image = picture(pose(k / RATE_HZ), rng, ground) if k < empty_from else ground
+        image = drawn_image(pose(k / RATE_HZ), rng, ground) if k < empty_from else ground
         cv2.imwrite(str(folder / f"{k:04d}.png"), image)
 
 
 @pytest.fixture(scope="module")
 def footage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Thirty pictures, model, camera and start; not to be changed."""
+    """Thirty images, model, camera and start; not to be changed."""
     folder = tmp_path_factory.mktemp("footage")
     write_footage(folder / "images", 30)
     write_footage(folder / "gone", 40, empty_from=12)
@@ -98,7 +98,7 @@ def test_the_folder_holds_table_film_and_key_frames(track: Track, tmp_path: Path
     assert track(out="here") == 0
     with (tmp_path / "here" / "poses.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [row["picture"] for row in rows] == [f"{k:04d}.png" for k in range(30)]
+    assert [row["image"] for row in rows] == [f"{k:04d}.png" for k in range(30)]
     assert float(rows[-1]["z_m"]) == pytest.approx(pose(29 / RATE_HZ)[2, 3], abs=0.002)
     film = cv2.VideoCapture(str(tmp_path / "here" / "overlay.webm"))
     assert film.isOpened()
@@ -115,7 +115,7 @@ def test_json_is_one_object_and_nothing_else(track: Track, capsys: object) -> No
     assert track("--json", "--no-overlay", out="here") == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["command"] == "track"
-    assert (answer["pictures"], answer["seen"]) == (30, 30)
+    assert (answer["frames"], answer["seen"]) == (30, 30)
     assert answer["outcome"]["kind"] == "completed"
     assert answer["overlay"] is None
     assert answer["position_deviation_max_m"] < 0.005
@@ -156,7 +156,7 @@ def test_a_video_is_followed_like_a_folder(
     writer.release()
     assert track("--json", "--no-overlay", images=tmp_path / "film.avi", out="here") == 0
     answer = json.loads(capsys.readouterr().out)
-    assert (answer["pictures"], answer["seen"]) == (30, 30)
+    assert (answer["frames"], answer["seen"]) == (30, 30)
     assert answer["outcome"]["time"] == pytest.approx(29 / 20.0)
 
 

@@ -91,9 +91,9 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
         "(() => { const b = watch.scene.stage.getBoundingClientRect();"
         "return [b.left + 25, b.bottom - 25] })()"
     )
-    looks = [browser.picture("#stage")]
+    looks = [browser.image("#stage")]
     for _ in range(100):  # until the model has come
-        looks.append(browser.picture("#stage"))
+        looks.append(browser.image("#stage"))
         if looks[-1].std() > 20.0:
             break
     before = looks[-1].astype(float)
@@ -101,7 +101,7 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
     outline = browser.value("JSON.stringify(watch.scene.outline)")
     browser.drag(corner, (corner[0] + 80, corner[1] - 20))
     browser.wait("JSON.stringify(watch.scene.outline)", lambda text: text != outline)
-    changed = np.abs(browser.picture("#stage").astype(float) - before).max(axis=2) > 30
+    changed = np.abs(browser.image("#stage").astype(float) - before).max(axis=2) > 30
     assert changed.mean() > 0.02
 
 
@@ -124,7 +124,7 @@ def test_marks_are_drawn_where_the_points_are(browser: Browser) -> None:
     resume(browser)
 
 
-def test_a_click_pauses_and_a_step_goes_on_by_one_picture(browser: Browser) -> None:
+def test_a_click_pauses_and_a_step_goes_on_by_one_image(browser: Browser) -> None:
     browser.click("#pause")
     browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
     before = browser.value(TIME)
@@ -166,7 +166,7 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
     settled(browser)
 
 
-def test_the_arm_follows_the_target_that_the_mouse_drags_in_a_picture(
+def test_the_arm_follows_the_target_that_the_mouse_drags_in_an_image(
     browser: Browser,
 ) -> None:
     settled(browser)

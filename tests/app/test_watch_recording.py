@@ -53,7 +53,7 @@ def browser(puma_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Iter
 
 
 class TestPlayback:
-    def test_a_picture_is_shown_from_when_it_came_until_the_next_one(
+    def test_an_image_is_shown_from_when_it_came_until_the_next_one(
         self, puma_run: Recording
     ) -> None:
         playback = Playback(puma_run, None)
@@ -65,7 +65,7 @@ class TestPlayback:
             assert view.time == pytest.approx(min(taken, key=lambda t: abs(t - view.time)))
             assert playback.views(time)[0] is view
 
-    def test_marks_belong_to_the_picture_they_are_drawn_in(self, puma_run: Recording) -> None:
+    def test_marks_belong_to_the_image_they_are_drawn_in(self, puma_run: Recording) -> None:
         (view,) = Playback(puma_run, None).views(1.0)
         trace = puma_run.cameras["wrist"]
         row = int(np.argmin(np.abs(trace.time - view.time)))
@@ -125,7 +125,7 @@ def test_a_click_in_a_plot_goes_there(browser: Browser) -> None:
     browser.wait(TIME, lambda time: 1.2 < time < 1.8)
 
 
-def test_a_step_goes_to_the_next_picture(browser: Browser) -> None:
+def test_a_step_goes_to_the_next_image(browser: Browser) -> None:
     before = browser.value(TIME)
     browser.click("#step")
     after = browser.wait(TIME, lambda time: time != before)
@@ -145,7 +145,7 @@ def test_it_plays_to_its_end_and_begins_again(browser: Browser) -> None:
 
 def test_the_arm_is_shown_in_space(browser: Browser) -> None:
     for _ in range(100):
-        if browser.picture("#stage").std() > 20.0:
+        if browser.image("#stage").std() > 20.0:
             return
     pytest.fail("the view in space stays empty")
 

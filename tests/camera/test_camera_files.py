@@ -104,7 +104,7 @@ def test_a_fisheye_lens_is_refused(tmp_path: Path) -> None:
         read_camera(tmp_path / "info.yaml")
 
 
-def test_pictures_of_another_size_are_refused(tmp_path: Path) -> None:
+def test_images_of_another_size_are_refused(tmp_path: Path) -> None:
     write_camera(CAMERA, tmp_path / "camera.yaml")
     with pytest.raises(InputError, match="width: given 640; allowed: 320"):
         read_camera(tmp_path / "camera.yaml", 320, 240)

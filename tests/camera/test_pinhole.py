@@ -118,7 +118,7 @@ def test_the_rectangle_lies_in_view_and_touches_every_side(distortion: str) -> N
     np.testing.assert_allclose(sides, 4.5, atol=0.1)
 
 
-def test_what_a_barrel_lens_folds_back_into_the_picture_is_not_in_view() -> None:
+def test_what_a_barrel_lens_folds_back_into_the_image_is_not_in_view() -> None:
     camera = Camera(640, 480, 400.0, 400.0, 319.5, 239.5, np.array([-0.3, 0.0, 0.0, 0.0, 0.0]))
     assert camera.reach == pytest.approx(np.sqrt(1 / 0.9))
     folded = np.array([[1.8, 0.0, 1.0], [0.5, 0.1, 1.0], [0.5, 0.1, -1.0]])
@@ -126,7 +126,7 @@ def test_what_a_barrel_lens_folds_back_into_the_picture_is_not_in_view() -> None
     assert camera.in_view(folded).tolist() == [False, True, False]
 
 
-def test_a_picture_that_its_distortion_folds_is_refused() -> None:
+def test_an_image_that_its_distortion_folds_is_refused() -> None:
     with pytest.raises(InputError, match="one-to-one"):
         Camera(640, 480, 200.0, 200.0, 319.5, 239.5, np.array([-0.3, 0, 0, 0, 0])).undistorted()
 

@@ -165,7 +165,7 @@ def test_a_camera_that_does_not_see_the_target_at_the_start(folder: Path) -> Non
     features = "[[0.0, 0.0, 0.0]]"
     error = complaint(folder, target__position_m="[3.0, 3.0, 0.18]", target__features=features)
     assert error.key == "target"
-    assert "camera wrist does not see feature 0, which is out of its picture" in str(error.given)
+    assert "camera wrist does not see feature 0, which is out of its image" in str(error.given)
 
 
 def test_a_start_with_something_in_the_way_names_it(folder: Path) -> None:
@@ -173,7 +173,7 @@ def test_a_start_with_something_in_the_way_names_it(folder: Path) -> None:
     error = complaint(folder, **behind, target__features="[[0.0, 0.0, 0.0]]")
     assert "camera wrist does not see feature 0; in the way: puma/" in str(error.given)
     error = complaint(folder, **behind)
-    assert "does not fill the middle of camera wrist's picture: it is " in str(error.given)
+    assert "does not fill the middle of camera wrist's image: it is " in str(error.given)
 
 
 def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:

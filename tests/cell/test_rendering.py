@@ -1,4 +1,4 @@
-"""A rendered picture shows things where the camera says they project: pixel centres at integers."""
+"""A rendered image shows things where the camera says they project: pixel centres at integers."""
 
 from pathlib import Path
 
@@ -88,8 +88,8 @@ def spot_cell(folder: Path, geom: dict[str, str], **values: object) -> Cell:
     return load_cell(folder)
 
 
-def picture(cell: Cell) -> tuple[np.ndarray, np.ndarray]:
-    """The first picture as float, and where the spot's middle truly projects."""
+def first_image(cell: Cell) -> tuple[np.ndarray, np.ndarray]:
+    """The first image as float, and where the spot's middle truly projects."""
     driver = SimulatedDriver(cell)
     try:
         frame = driver.first_frame("eye")
@@ -114,16 +114,16 @@ def test_a_disc_is_drawn_around_the_place_it_projects_to(tmp_path: Path, lens: s
     gaps = []
     for x, y in rng.uniform(-0.1, 0.1, (5, 2)):
         cell = spot_cell(tmp_path, disc, turn=0.0, x=x, y=y, **LENSES[lens])
-        image, true_px = picture(cell)
+        image, true_px = first_image(cell)
         gaps.append(centroid(image) - true_px)
     assert np.abs(gaps).max() < 0.1
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, -135.0])
-def test_a_turned_camera_turns_the_picture_with_it(tmp_path: Path, turn: float) -> None:
+def test_a_turned_camera_turns_the_image_with_it(tmp_path: Path, turn: float) -> None:
     disc = {"kind": "cylinder", "size": "0.02 0.0001"}
     cell = spot_cell(tmp_path, disc, turn=turn, x=0.08, y=-0.05, **LENSES["off the middle"])
-    image, true_px = picture(cell)
+    image, true_px = first_image(cell)
     np.testing.assert_allclose(centroid(image), true_px, atol=0.1)
 
 
@@ -131,7 +131,7 @@ def test_edges_of_a_box_fall_between_the_right_pixels(tmp_path: Path) -> None:
     box = {"kind": "box", "size": "0.05 0.04 0.0001"}
     lens = LENSES["central"]
     cell = spot_cell(tmp_path, box, turn=0.0, x=0.0, y=0.0, **lens)
-    image, middle = picture(cell)
+    image, middle = first_image(cell)
     bright = image > image.max() / 2
     rows, columns = np.flatnonzero(bright.any(axis=1)), np.flatnonzero(bright.any(axis=0))
     half = np.array([0.05, 0.04]) * 700 / (1.0 - 0.0001)
@@ -142,10 +142,10 @@ def test_edges_of_a_box_fall_between_the_right_pixels(tmp_path: Path) -> None:
     assert rows[-1] == np.floor(middle[1] + half[1])
 
 
-def test_a_line_across_a_distorted_picture_bends_as_the_lens_bends_it(tmp_path: Path) -> None:
+def test_a_line_across_a_distorted_image_bends_as_the_lens_bends_it(tmp_path: Path) -> None:
     rod = {"kind": "box", "size": "0.005 2 0.0001"}
     cell = spot_cell(tmp_path, rod, turn=0.0, x=0.45, y=0.0, **LENSES["barrel"])
-    image, _ = picture(cell)
+    image, _ = first_image(cell)
     lens = intrinsics(cell.cameras["eye"])
     for y in np.linspace(-0.4, 0.4, 9):
         u, v = lens.project(np.array([[0.45, y, 1.0]]))[0]
@@ -155,15 +155,15 @@ def test_a_line_across_a_distorted_picture_bends_as_the_lens_bends_it(tmp_path: 
         assert (np.arange(640) * row).sum() / row.sum() == pytest.approx(near[0], abs=0.3)
 
 
-def test_points_in_a_distorted_picture_are_where_the_features_are_drawn(tmp_path: Path) -> None:
+def test_points_in_a_distorted_image_are_where_the_features_are_drawn(tmp_path: Path) -> None:
     disc = {"kind": "cylinder", "size": "0.012 0.0001"}
-    for x, y in ((0.6, 0.4), (-0.6, 0.4), (0.6, -0.4)):  # near the corners of the picture
+    for x, y in ((0.6, 0.4), (-0.6, 0.4), (0.6, -0.4)):  # near the corners of the image
         cell = spot_cell(tmp_path, disc, turn=0.0, x=x, y=y, **LENSES["barrel"])
-        image, true_px = picture(cell)
+        image, true_px = first_image(cell)
         assert np.abs(centroid(image) - true_px).max() < 0.1
 
 
-def test_a_lens_that_folds_the_picture_is_refused_with_its_key(tmp_path: Path) -> None:
+def test_a_lens_that_folds_the_image_is_refused_with_its_key(tmp_path: Path) -> None:
     disc = {"kind": "cylinder", "size": "0.02 0.0001"}
     lens = LENSES["barrel"] | {"distortion": [-2.0]}
     with pytest.raises(InputError, match=r"cameras\.eye\.distortion.*one-to-one"):

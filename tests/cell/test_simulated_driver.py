@@ -27,7 +27,7 @@ def test_the_first_read_delivers_what_was_exposed_one_latency_before_the_start()
 
 
 @pytest.mark.parametrize(("rate", "latency"), [(30, 0), (30, 2), (26, 3), (60, 1)])
-def test_pictures_are_exposed_at_the_cameras_rate_and_arrive_its_latency_later(
+def test_images_are_exposed_at_the_cameras_rate_and_arrive_its_latency_later(
     rate: int, latency: int
 ) -> None:
     driver = driver_with(
@@ -85,7 +85,7 @@ def test_servos_follow_a_steady_motion_closely_and_stay_when_told_to() -> None:
     np.testing.assert_allclose(state.velocity, 0.0, atol=1e-3)
 
 
-def test_each_picture_is_handed_out_once() -> None:
+def test_each_image_is_handed_out_once() -> None:
     driver = driver_with(cameras__wrist__latency_frames="0")
     assert len(driver.read().frames) == 1
     assert driver.read().frames == ()

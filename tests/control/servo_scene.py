@@ -67,16 +67,16 @@ def servo(
     ticks: int,
     velocity_m_s: np.ndarray | None = None,
 ):
-    """Let the law run; return every q (ticks + 1, n) and every picture (ticks + 1, M, 2)."""
+    """Let the law run; return every q (ticks + 1, n) and every image (ticks + 1, M, 2)."""
     points_world = points_world.copy()
-    path, pictures = [q], []
+    path, images = [q], []
     for _ in range(ticks):
         points_px, _ = seen(arm, path[-1], points_world)
-        pictures.append(points_px)
+        images.append(points_px)
         joints = JointState(0.0, path[-1], np.zeros(arm.joint_count))
         command = law.command(observed(points_px), Reference(0.0, desired_px), joints)
         path.append(path[-1] + PERIOD * command.velocity)
         if velocity_m_s is not None:
             points_world += PERIOD * velocity_m_s
-    pictures.append(seen(arm, path[-1], points_world)[0])
-    return np.array(path), np.array(pictures)
+    images.append(seen(arm, path[-1], points_world)[0])
+    return np.array(path), np.array(images)

@@ -56,7 +56,7 @@ def test_a_hand_that_is_asked_for_little_does_just_that(scene):
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_the_hand_stops_before_a_corner_leaves_the_picture(scene, direction):
+def test_the_hand_stops_before_a_corner_leaves_the_image(scene, direction):
     camera, T_world_camera = scene[1], scene[2]
     seen, _ = push(scene, 0.15 * direction * T_world_camera[:3, 1], 3.0)
     low, high = seen[..., 1].min(), seen[..., 1].max()

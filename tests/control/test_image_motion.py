@@ -13,7 +13,7 @@ NO_NOISE = np.zeros((4, 2, 2))
 
 
 def features_on_the_way(motion, believed, ticks=40, hidden=()):
-    """Bring the camera 0.3 m nearer and aside, two pictures late; return the last features."""
+    """Bring the camera 0.3 m nearer and aside, two images late; return the last features."""
     rates = np.linalg.solve(ARM.jacobian(START), [0.05, 0.02, 0.22, 0.0, 0.1, 0.2])
     q = [START + max(k - 2, 0) * PERIOD * rates for k in range(ticks)]
     for k in range(2, ticks):

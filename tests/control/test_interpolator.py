@@ -1,4 +1,4 @@
-"""The second-order filter between two pictures."""
+"""The second-order filter between two images."""
 
 import numpy as np
 import pytest

@@ -106,16 +106,16 @@ def lag_px(
     camera = mounting.camera
     points = transform_points(T_target, np.array(SQUARE))
 
-    def picture(time: float) -> tuple[FloatArray, FloatArray]:
+    def image(time: float) -> tuple[FloatArray, FloatArray]:
         T = mounting.T_camera_scene(arm.forward_kinematics(q))
         moved = transform_points(T, points + time * VELOCITY)
         return camera.project(moved), moved[:, 2]
 
-    desired, depth = picture(0.0)
+    desired, depth = image(0.0)
     servo, waiting = law(arm, mounting, depth), deque()
     reference = Reference(0.0, desired, np.zeros_like(desired), depth)
     for k in range(int(seconds / PERIOD)):
-        waiting.append((k * PERIOD, picture(k * PERIOD)[0]))
+        waiting.append((k * PERIOD, image(k * PERIOD)[0]))
         if len(waiting) <= LATENCY:
             continue
         time, seen = waiting.popleft()
@@ -124,7 +124,7 @@ def lag_px(
         )
         joints = JointState(k * PERIOD, q, np.zeros_like(q))
         q = q + PERIOD * servo.command(Observation(time, (view,)), reference, joints).velocity
-    last = picture((int(seconds / PERIOD)) * PERIOD)[0]
+    last = image((int(seconds / PERIOD)) * PERIOD)[0]
     return float(np.linalg.norm(last - desired, axis=1).max())
 
 

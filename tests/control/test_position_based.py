@@ -58,7 +58,7 @@ def follow(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return hand errors (K, 6) in the hand and joint positions (K, n), a row an outer tick.
 
-    Joints follow their set-points at once; pictures are late by one frame.
+    Joints follow their set-points at once; images are late by one frame.
     """
     T_target = se3_compose(arm.forward_kinematics(start), WANTED)
     target = MovingPose(T_target, twist)

@@ -26,11 +26,11 @@ def test_three_and_more_features_bring_the_camera_back_to_its_pose(count: int) -
     desired, depth = seen(ARM, START, world)
     for _ in range(3):
         start = START + rng.uniform(-0.03, 0.03, 6)
-        path, pictures = servo(ARM, six_axis_law(depth), start, world, desired, 250)
-        np.testing.assert_allclose(pictures[-1], desired, atol=0.05)
+        path, images = servo(ARM, six_axis_law(depth), start, world, desired, 250)
+        np.testing.assert_allclose(images[-1], desired, atol=0.05)
         gap = se3_distance(ARM.forward_kinematics(path[-1]), ARM.forward_kinematics(START), 1.0)
         assert gap < 2e-3
-        assert CAMERA.contains(pictures.reshape(-1, 2)).all()
+        assert CAMERA.contains(images.reshape(-1, 2)).all()
         assert (path > ARM.q_min).all()
         assert (path < ARM.q_max).all()
 
@@ -41,9 +41,9 @@ def test_one_feature_is_brought_home_along_the_controlled_axes(axes) -> None:
     desired, depth = seen(ARM, START, world)
     law = tracking_law(ARM, depth, axes=axes)
     world = world + (0.05, 0.03, 0.0)
-    path, pictures = servo(ARM, law, START, world, desired, 150)
-    assert np.linalg.norm(pictures[0] - desired) > 50
-    np.testing.assert_allclose(pictures[-1], desired, atol=0.01)
+    path, images = servo(ARM, law, START, world, desired, 150)
+    assert np.linalg.norm(images[0] - desired) > 50
+    np.testing.assert_allclose(images[-1], desired, atol=0.01)
     if axes == ("x", "y"):
         R0, R1 = (ARM.forward_kinematics(q)[:3, :3] for q in (START, path[-1]))
         np.testing.assert_allclose(R1, R0, atol=1e-2)
@@ -75,8 +75,8 @@ def test_a_steadily_moving_object_is_followed_with_a_steady_error() -> None:
     world = in_view(ARM, START, ONE)
     desired, depth = seen(ARM, START, world)
     law = tracking_law(ARM, depth, axes=("x", "y", "rx", "ry"))
-    _, pictures = servo(ARM, law, START, world, desired, 60, np.array([0.1, 0.0, 0.0]))
-    errors = np.linalg.norm(pictures[:, 0] - desired[0], axis=1)
+    _, images = servo(ARM, law, START, world, desired, 60, np.array([0.1, 0.0, 0.0]))
+    errors = np.linalg.norm(images[:, 0] - desired[0], axis=1)
     assert errors[-1] < 32
     assert np.ptp(errors[-20:]) < 1.0
 
@@ -93,10 +93,10 @@ def test_avoidance_keeps_the_measure_up_where_tracking_alone_lets_it_fall() -> N
             avoidance_axes=("x", "y") if S else (),
             S=S,
         )
-        path, pictures = servo(ARM, law, START, world, desired, 120, np.array([-0.15, 0.0, 0.0]))
+        path, images = servo(ARM, law, START, world, desired, 120, np.array([-0.15, 0.0, 0.0]))
         limits = (ARM.q_min, ARM.q_max, 1e5, False, 0.0)
         measures = [manipulability(ARM.chain, q, *limits).value for q in path]
         lowest[S] = min(measures) / measures[0]
-        assert np.linalg.norm(pictures[:, 0] - desired[0], axis=1).max() < 64
+        assert np.linalg.norm(images[:, 0] - desired[0], axis=1).max() < 64
     assert lowest[0.0] < 0.5
     assert lowest[1e-3] > 0.75

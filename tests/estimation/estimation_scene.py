@@ -38,7 +38,7 @@ def view(
     features=None,
     outliers=0.0,
 ) -> View:
-    """The picture a camera would give: normalized coordinates with noise, some of them wild."""
+    """The image a camera would give: normalized coordinates with noise, some of them wild."""
     features = np.arange(len(BOX)) if features is None else np.asarray(features)
     sigma = noise_px / CAMERA.fx
     measured = project(T_world_camera, T_world_target, BOX[features])

@@ -29,7 +29,7 @@ def test_honest_innovations_are_rarely_called_inconsistent():
     assert wrong < 0.005 * 4000
 
 
-def test_innovations_twice_too_large_are_noticed_within_ten_pictures_and_forgotten_after():
+def test_innovations_twice_too_large_are_noticed_within_ten_images_and_forgotten_after():
     rng = np.random.default_rng(2)
     sums = Consistency()
     for _ in range(10):

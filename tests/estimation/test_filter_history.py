@@ -5,7 +5,7 @@ from estimation_scene import HAND, WALL, moving, pose_error, view
 from vergence.estimation import FilterHistory, PoseFilter, Verdict
 
 
-def pictures(rng, seconds=1.0):
+def images(rng, seconds=1.0):
     """Two cameras of 26 and 40 Hz, not in step, with some wrong matches."""
     views = [view(rng, k / 26, moving(k / 26), WALL, "wall", outliers=0.1) for k in range(1, 27)]
     views += [
@@ -19,14 +19,14 @@ def fed(views, horizon=0.5):
     filter_ = PoseFilter()
     history = FilterHistory(filter_, filter_.start(0.0, moving(0.0)), horizon)
     verdicts = []
-    for picture in views:
-        history, update = history.add(picture)
+    for image in views:
+        history, update = history.add(image)
         verdicts.append(update.verdict)
     return history, verdicts
 
 
 def test_arrival_order_does_not_change_the_belief():
-    views = pictures(np.random.default_rng(1))
+    views = images(np.random.default_rng(1))
     ordered, _ = fed(views)
     late = sorted(views, key=lambda v: v.time + (0.15 if v.camera == "hand" else 0.02))
     assert [v.time for v in late] != [v.time for v in views]
@@ -41,24 +41,24 @@ def test_arrival_order_does_not_change_the_belief():
 
 def test_shuffled_arrival_gives_the_same_belief():
     rng = np.random.default_rng(2)
-    views = pictures(rng, seconds=0.4)[:20]
+    views = images(rng, seconds=0.4)[:20]
     ordered, _ = fed(views)
     for _ in range(3):
         shuffled, _ = fed([views[i] for i in rng.permutation(len(views))])
         np.testing.assert_array_equal(shuffled.belief.T_world_target, ordered.belief.T_world_target)
 
 
-def test_late_picture_counts_at_its_exposure():
+def test_late_image_counts_at_its_exposure():
     # Used at its arrival instead, 0.2 s of motion would be taken for noise.
     rng = np.random.default_rng(3)
     filter_ = PoseFilter()
     views = [view(rng, k / 26, moving(k / 26, 2.0), HAND, "hand") for k in range(40)]
     history = FilterHistory(filter_, filter_.start(-0.01, moving(0.0)))
     wrong = filter_.start(-0.01, moving(0.0))
-    for k, picture in enumerate(views):
-        history, _ = history.add(picture)
-        wrong = filter_.update(wrong, picture._replace(time=picture.time + 0.2)).belief
-        now = picture.time + 0.2
+    for k, image in enumerate(views):
+        history, _ = history.add(image)
+        wrong = filter_.update(wrong, image._replace(time=image.time + 0.2)).belief
+        now = image.time + 0.2
         if k > 20:
             truth = moving(now, 2.0)
             honest = pose_error(history.at(now).T_world_target, truth)
@@ -66,16 +66,16 @@ def test_late_picture_counts_at_its_exposure():
             assert np.linalg.norm(honest[:3]) < 0.5 * np.linalg.norm(late[:3])
 
 
-def test_same_picture_twice_counts_once():
-    views = pictures(np.random.default_rng(4))[:10]
+def test_same_image_twice_counts_once():
+    views = images(np.random.default_rng(4))[:10]
     once, _ = fed(views)
     twice, verdicts = fed([*views, views[-1], views[3]])
     assert verdicts[-2:] == [Verdict.REPEATED, Verdict.REPEATED]
     np.testing.assert_array_equal(twice.belief.covariance, once.belief.covariance)
 
 
-def test_picture_older_than_the_horizon_is_refused_and_harmless():
-    views = pictures(np.random.default_rng(5))
+def test_image_older_than_the_horizon_is_refused_and_harmless():
+    views = images(np.random.default_rng(5))
     history, _ = fed(views[1:], horizon=0.2)
     again, update = history.add(views[0])
     assert update.verdict is Verdict.TOO_LATE
@@ -83,8 +83,8 @@ def test_picture_older_than_the_horizon_is_refused_and_harmless():
     assert len(history.entries) < 0.2 * 70 + 3
 
 
-def test_past_is_asked_from_the_pictures_until_then():
-    views = pictures(np.random.default_rng(6))
+def test_past_is_asked_from_the_images_until_then():
+    views = images(np.random.default_rng(6))
     history, _ = fed(views)
     early, _ = fed([v for v in views if v.time <= 0.8])
     for time in (0.8, 0.805):
@@ -112,7 +112,7 @@ class Counting(PoseFilter):
         return super().update(belief, seen)
 
 
-def test_pictures_of_one_exposure_are_one_update():
+def test_images_of_one_exposure_are_one_update():
     views = in_step(np.random.default_rng(7), ticks=3)
     filter_ = Counting()
     filter_.sizes.clear()
@@ -154,11 +154,11 @@ def test_camera_that_contradicts_all_others_is_told_apart():
     )
 
 
-def test_picture_twice_at_once_counts_once():
-    picture = view(np.random.default_rng(10), 0.1, moving(0.1))
+def test_image_twice_at_once_counts_once():
+    image = view(np.random.default_rng(10), 0.1, moving(0.1))
     filter_ = PoseFilter()
     start = FilterHistory(filter_, filter_.start(0.0, moving(0.0)))
-    twice, updates = start.add_all([picture, picture])
-    once, _ = start.add(picture)
+    twice, updates = start.add_all([image, image])
+    once, _ = start.add(image)
     assert [u.verdict for u in updates] == [Verdict.USED, Verdict.REPEATED]
     np.testing.assert_array_equal(twice.belief.covariance, once.belief.covariance)

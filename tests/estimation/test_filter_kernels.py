@@ -159,6 +159,6 @@ def test_two_half_steps_are_one_step():
 
 def test_views_of_the_tests_are_exact_but_for_noise():
     rng = np.random.default_rng(0)
-    picture = view(rng, 0.0, moving(0.3), noise_px=0.3)
-    error = (picture.measured - project(WALL, moving(0.3))) * CAMERA.fx
+    image = view(rng, 0.0, moving(0.3), noise_px=0.3)
+    error = (image.measured - project(WALL, moving(0.3))) * CAMERA.fx
     assert 0.0 < np.abs(error).max() < 1.5

@@ -212,7 +212,7 @@ def test_lost_target_is_looked_for_where_it_was_seen_last():
     assert error(observation.target, stopping)[0] < 0.003
 
 
-def test_target_that_jumped_away_is_found_over_the_whole_picture():
+def test_target_that_jumped_away_is_found_over_the_whole_image():
     jump = np.array([0.25, -0.2, 0.1])
 
     def jumping(time):
@@ -281,7 +281,7 @@ def test_the_papers_filter_and_indexes_fit_the_same_circle():
     assert worst[1] < 3.0
 
 
-def test_pictures_of_unknown_cameras_do_not_concern_it():
+def test_images_of_unknown_cameras_do_not_concern_it():
     cell = Cell()
     perception = cell.perception(cameras={"wall": CAMERA})
     assert perception.observe((cell.frame("hand", 0.1),)) is None
@@ -289,14 +289,14 @@ def test_pictures_of_unknown_cameras_do_not_concern_it():
     assert perception.observe((cell.frame("wall", 0.1),)) is not None
 
 
-def test_picture_of_another_size_than_calibrated_is_refused():
+def test_image_of_another_size_than_calibrated_is_refused():
     cell = Cell()
     frame = replace(cell.frame("wall", 0.1), image=np.zeros((480, 640), np.uint8))
     with pytest.raises(InputError, match=r"640 x 480.*768 x 576"):
         cell.perception().observe((frame,))
 
 
-def test_repeated_picture_changes_nothing():
+def test_repeated_image_changes_nothing():
     cell = Cell()
     perception = cell.perception()
     frame = cell.frame("wall", 0.1)

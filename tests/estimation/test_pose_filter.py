@@ -85,7 +85,7 @@ def test_one_fifth_wrong_matches_do_no_harm():
     assert rejected > 0.1 * 10 * 26 * 2 * len(BOX)
 
 
-def test_bad_start_is_overruled_by_the_pictures():
+def test_bad_start_is_overruled_by_the_images():
     rng = np.random.default_rng(3)
     filter_ = PoseFilter()
     wrong = correct_pose(moving(0.0), np.array([0.1, -0.1, 0.05, 0.2, 0.3, -0.2] + 6 * [0.0]))
@@ -130,12 +130,12 @@ def test_sudden_motion_is_noticed_and_caught_up_with():
     assert belief.velocity[0] == pytest.approx(0.5, abs=0.05)
 
 
-def test_picture_of_another_thing_is_refused_and_doubted():
+def test_image_of_another_thing_is_refused_and_doubted():
     rng = np.random.default_rng(6)
     filter_ = PoseFilter()
     *_, (time, belief, _) = track(filter_, rng, 1.0)
-    picture = view(rng, time + 0.04, moving(time))
-    scrambled = picture._replace(measured=rng.uniform(-0.3, 0.3, picture.measured.shape))
+    image = view(rng, time + 0.04, moving(time))
+    scrambled = image._replace(measured=rng.uniform(-0.3, 0.3, image.measured.shape))
     update = filter_.update(belief, scrambled)
     assert update.verdict is Verdict.CONTRADICTED
     assert not update.kept.any()
@@ -151,15 +151,15 @@ def test_points_that_are_not_a_number_never_reach_the_pose():
     rng = np.random.default_rng(7)
     filter_ = PoseFilter()
     *_, (time, belief, _) = track(filter_, rng, 0.5)
-    picture = view(rng, time + 0.04, moving(time + 0.04))
-    picture.measured[2] = np.nan
-    update = filter_.update(belief, picture)
+    image = view(rng, time + 0.04, moving(time + 0.04))
+    image.measured[2] = np.nan
+    update = filter_.update(belief, image)
     assert not update.kept[2]
     assert np.isfinite(update.belief.T_world_target).all()
     assert np.isfinite(update.belief.covariance).all()
 
 
-def test_uncertainty_falls_with_every_picture_and_grows_between_them():
+def test_uncertainty_falls_with_every_image_and_grows_between_them():
     rng = np.random.default_rng(8)
     filter_ = PoseFilter()
     belief = filter_.start(0.0, moving(0.0))
@@ -175,10 +175,10 @@ def test_second_camera_halves_the_error_along_the_first_ones_sight():
     alone = both = filter_.start(0.0, moving(0.0))
     for k in range(1, 30):
         time = k / 26
-        picture = view(rng, time, moving(time))
-        alone = filter_.update(alone, picture).belief
+        image = view(rng, time, moving(time))
+        alone = filter_.update(alone, image).belief
         both = filter_.update(
-            filter_.update(both, picture).belief, view(rng, time, moving(time), HAND, "hand")
+            filter_.update(both, image).belief, view(rng, time, moving(time), HAND, "hand")
         ).belief
     sight = WALL[:3, 2]
     spread = [np.sqrt(sight @ b.covariance[:3, :3] @ sight) for b in (alone, both)]

@@ -14,14 +14,14 @@ from vergence.estimation.view import View
 from vergence.geometry import se3, so3_exp, transform_points
 
 
-def flat(picture: View) -> View:
+def flat(image: View) -> View:
     """The four upper corners only."""
     upper = np.flatnonzero(BOX[:, 2] > 0)
-    return picture._replace(
+    return image._replace(
         features=upper,
-        points=picture.points[upper],
-        measured=picture.measured[upper],
-        covariance=picture.covariance[upper],
+        points=image.points[upper],
+        measured=image.measured[upper],
+        covariance=image.covariance[upper],
     )
 
 
@@ -31,7 +31,7 @@ def nees(fit, truth):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_pose_is_found_from_one_picture_whatever_it_is(seed):
+def test_pose_is_found_from_one_image_whatever_it_is(seed):
     rng = np.random.default_rng(seed)
     truth = se3(so3_exp(rng.uniform(-2.0, 2.0, 3)), rng.uniform(-0.1, 0.1, 3))
     fit = pose_from_points([view(rng, 1.0, truth)])
@@ -43,9 +43,9 @@ def test_pose_is_found_from_one_picture_whatever_it_is(seed):
 def test_wrong_matches_are_left_out():
     rng = np.random.default_rng(7)
     for _ in range(10):
-        picture = view(rng, 0.0, moving(0.5))
-        picture.measured[[1, 6]] += rng.uniform(0.02, 0.06, (2, 2))
-        fit = pose_from_points([picture, view(rng, 0.0, moving(0.5), HAND, "hand")])
+        image = view(rng, 0.0, moving(0.5))
+        image.measured[[1, 6]] += rng.uniform(0.02, 0.06, (2, 2))
+        fit = pose_from_points([image, view(rng, 0.0, moving(0.5), HAND, "hand")])
         assert fit
         assert fit.inliers >= 2 * len(BOX) - 4
         assert nees(fit, moving(0.5)) < 30.0
@@ -54,8 +54,8 @@ def test_wrong_matches_are_left_out():
 def test_flat_target_far_away_in_one_camera_is_refused_as_ambiguous():
     rng = np.random.default_rng(8)
     far = look_at((6.0, 0.0, 4.0))
-    picture = flat(view(rng, 0.0, moving(0.5), far, noise_px=1.0))
-    fit = pose_from_points([picture])
+    image = flat(view(rng, 0.0, moving(0.5), far, noise_px=1.0))
+    fit = pose_from_points([image])
     assert not fit
     assert "two different poses" in fit.reason
     assert len(fit.alternatives) == 2
@@ -77,14 +77,14 @@ def test_failure_says_why():
     assert pose_from_points([]).reason == "no image"
     few = pose_from_points([view(rng, 0.0, moving(0.0), features=[0, 1, 2])])
     assert "3 points" in few.reason
-    picture = view(rng, 0.0, moving(0.0))
-    nonsense = picture._replace(measured=rng.uniform(-0.3, 0.3, picture.measured.shape))
+    image = view(rng, 0.0, moving(0.0))
+    nonsense = image._replace(measured=rng.uniform(-0.3, 0.3, image.measured.shape))
     assert not pose_from_points([nonsense])
 
 
 def test_same_points_give_the_same_pose():
-    picture = view(np.random.default_rng(11), 0.0, moving(0.3), WALL)
-    first, second = pose_from_points([picture]), pose_from_points([picture])
+    image = view(np.random.default_rng(11), 0.0, moving(0.3), WALL)
+    first, second = pose_from_points([image]), pose_from_points([image])
     np.testing.assert_array_equal(first.T_world_target, second.T_world_target)
 
 

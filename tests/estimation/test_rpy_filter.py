@@ -78,8 +78,8 @@ def test_follows_the_target_with_two_cameras_within_the_papers_centimetre():
     for k in range(1, 150):
         time = k / 26
         for name, pose in (("wall", WALL), ("hand", HAND)):
-            picture = view(rng, time, moving(time, 0.3), pose, name, noise_px=3.0)
-            belief = filter_.update(belief, picture).belief
+            image = view(rng, time, moving(time, 0.3), pose, name, noise_px=3.0)
+            belief = filter_.update(belief, image).belief
         error = pose_error(belief.T_world_target, moving(time, 0.3))
         if time > 1.0:
             assert np.linalg.norm(error[:3]) < 0.01
@@ -104,8 +104,8 @@ def worst_near_the_pole(filter_):
     for k in range(1, 105):
         time = k / 26
         for name, pose in (("wall", WALL), ("hand", HAND)):
-            picture = view(rng, time, passing_pitch(time), pose, name, noise_px=1.0)
-            belief = filter_.update(belief, picture).belief
+            image = view(rng, time, passing_pitch(time), pose, name, noise_px=1.0)
+            belief = filter_.update(belief, image).belief
         if time > 1.5:
             error = pose_error(belief.T_world_target, passing_pitch(time))
             worst = max(worst, np.degrees(np.linalg.norm(error[3:])))

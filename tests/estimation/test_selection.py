@@ -175,10 +175,8 @@ def test_four_features_chosen_by_information_hold_a_moving_target():
         )
         held = selection.choose(given, 4)
         for c, (name, pose) in enumerate((("wall", WALL), ("hand", HAND))):
-            picture = view(
-                rng, time, moving(time), pose, name, 1.0, features=np.flatnonzero(held[c])
-            )
-            belief = filter_.update(belief, picture).belief
+            image = view(rng, time, moving(time), pose, name, 1.0, features=np.flatnonzero(held[c]))
+            belief = filter_.update(belief, image).belief
         if time > 1.0:
             error = pose_error(belief.T_world_target, moving(time))
             assert np.linalg.norm(error[:3]) < 0.006

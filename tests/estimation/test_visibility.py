@@ -3,9 +3,15 @@ import pytest
 from estimation_scene import CAMERA, look_at
 
 from vergence.camera import Camera
+from vergence.camera.lens import is_one_to_one, pixel_of
 from vergence.errors import InputError
-from vergence.estimation import CameraRig, Sight, TargetShape, add_obstacles, predict_visibility
-from vergence.estimation.rig import lens_pixel
+from vergence.estimation import (
+    CameraRig,
+    TargetShape,
+    ViewStatus,
+    add_obstacles,
+    predict_visibility,
+)
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, transform_points
 
 RIG = CameraRig.of({"one": CAMERA}, 1.0)
@@ -39,7 +45,7 @@ def test_seven_corners_of_a_box_are_seen_from_a_corner_and_four_from_the_front()
     assert seen(BOX, look_at((0.8, 0.8, 0.8))).visible.sum() == 7
     front = seen(BOX, look_at((1.0, 0.0, 0.0)))
     assert front.visible.sum() == 4
-    assert set(front.sight[0][~front.visible[0]]) == {Sight.TURNED_AWAY}
+    assert set(front.status[0][~front.visible[0]]) == {ViewStatus.TURNED_AWAY}
 
 
 def test_visible_corners_of_a_box_agree_with_a_dense_search():
@@ -48,11 +54,11 @@ def test_visible_corners_of_a_box_agree_with_a_dense_search():
     for _ in range(40):
         eye = rng.standard_normal(3)
         eye *= rng.uniform(0.7, 1.5) / np.linalg.norm(eye)
-        sight = seen(BOX, look_at(eye), least_cosine=0.0).sight[0]
+        sight = seen(BOX, look_at(eye), least_cosine=0.0).status[0]
         for point, found in zip(BOX.points, sight, strict=True):
             along = eye + np.linspace(0.0, 1.0, 4000)[:, None] * (point - eye)
             inside = (np.abs(along) < 0.1 - 1e-6).all(axis=1).any()
-            assert (found == Sight.VISIBLE) != inside
+            assert (found == ViewStatus.VISIBLE) != inside
 
 
 def test_predicted_places_are_the_cameras_own_projection():
@@ -66,23 +72,22 @@ def test_predicted_places_are_the_cameras_own_projection():
     np.testing.assert_allclose(predicted.depth[0], depth, atol=1e-15)
 
 
-def test_points_beyond_the_bend_of_the_distortion_are_not_folded_into_the_picture():
+def test_points_beyond_the_bend_of_the_distortion_are_not_folded_into_the_image():
     camera = Camera(640, 480, 400.0, 400.0, 320.0, 240.0, np.array([-0.3, 0.0, 0.0, 0.0, 0.0]))
     lens = CameraRig.of({"bent": camera}, 0.5).lenses[0]
-    u, v, one_to_one = lens_pixel(lens, 1.8, 0.0)
-    assert camera.contains(np.array([[u, v]]))[0]
-    assert not one_to_one
+    assert camera.contains(np.array([pixel_of(lens, 1.8, 0.0)]))[0]
+    assert not is_one_to_one(lens, 1.8, 0.0)
 
 
 def test_features_outside_behind_or_near_the_border_are_named_so():
     away = look_at((1.0, 0.0, 0.0), (2.0, 0.0, 0.0))
-    assert set(seen(BOX, away).sight[0]) == {Sight.BEHIND}
+    assert set(seen(BOX, away).status[0]) == {ViewStatus.BEHIND}
     aside = look_at((1.0, 0.0, 0.0), (0.0, 5.0, 0.0))
-    assert set(seen(BOX, aside).sight[0]) == {Sight.OUTSIDE}
+    assert set(seen(BOX, aside).status[0]) == {ViewStatus.OUTSIDE}
     bare = TargetShape.from_points([[0.0, 0.0, 0.0]])
     centred = look_at((1.0, 0.0, 0.0))
-    assert seen(bare, centred, margin_px=280.0).sight[0, 0] == Sight.VISIBLE
-    assert seen(bare, centred, margin_px=290.0).sight[0, 0] == Sight.OUTSIDE
+    assert seen(bare, centred, margin_px=280.0).status[0, 0] == ViewStatus.VISIBLE
+    assert seen(bare, centred, margin_px=290.0).status[0, 0] == ViewStatus.OUTSIDE
 
 
 def test_bare_points_are_seen_from_all_sides():
@@ -94,7 +99,7 @@ def test_bare_points_are_seen_from_all_sides():
 def test_concave_target_hides_its_own_corners():
     shape = el_shape()
     behind_wall = seen(shape, look_at((1.0, 0.0, 0.15)))
-    hidden = behind_wall.sight[0] == Sight.HIDDEN
+    hidden = behind_wall.status[0] == ViewStatus.HIDDEN
     # the far upper corners of the slab face upwards, yet the wall stands before them
     far_upper = (shape.points[:, 0] < 0.0) & (shape.points[:, 2] > 0.02)
     assert far_upper.sum() == 2
@@ -108,7 +113,7 @@ def test_visibility_does_not_depend_on_where_the_world_is():
     eye = look_at((0.7, -0.6, 0.5))
     shape = el_shape()
     here, there = seen(shape, eye), seen(shape, T @ eye, T)
-    np.testing.assert_array_equal(here.sight, there.sight)
+    np.testing.assert_array_equal(here.status, there.status)
     np.testing.assert_allclose(here.points_px, there.points_px, atol=1e-8)
 
 
@@ -120,11 +125,11 @@ def test_obstacles_are_asked_about_visible_features_only():
         return points[:, 2] > 0.0
 
     eye = look_at((0.8, 0.8, 0.8))
-    sight = seen(BOX, eye).sight[0]
+    sight = seen(BOX, eye).status[0]
     add_obstacles(sight, blocked, eye[:3, 3], BOX.points)
     assert asked == [7]
-    assert set(sight[BOX.points[:, 2] > 0.0]) == {Sight.BLOCKED}
-    assert (sight[BOX.points[:, 2] < 0.0] == Sight.VISIBLE).sum() == 3
+    assert set(sight[BOX.points[:, 2] > 0.0]) == {ViewStatus.BLOCKED}
+    assert (sight[BOX.points[:, 2] < 0.0] == ViewStatus.VISIBLE).sum() == 3
 
 
 def test_targets_without_features_and_torn_meshes_are_refused():

@@ -8,7 +8,7 @@ from hypothesis import given
 from untrusted import ends_well, mutants
 
 from vergence.errors import InputError
-from vergence.experiments import Ending, Ledger, TrialResult
+from vergence.experiments import Ending, ResultsFile, TrialResult
 from vergence.experiments.results_file import RESULTS
 
 CAMPAIGN = {"cell": "puma560", "tolerance_px": 2.0}
@@ -40,22 +40,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_what_was_written_is_read(folder: Path) -> None:
     (folder / RESULTS).write_bytes(GOOD)
-    assert Ledger(folder, CAMPAIGN).results["own 1"] == RESULT
+    assert ResultsFile(folder, CAMPAIGN).results["own 1"] == RESULT
     assert (folder / RESULTS).read_bytes() == GOOD
 
 
 @given(mutants(GOOD))
 def test_of_damaged_results_the_readable_ones_are_kept(folder: Path, data: bytes) -> None:
     (folder / RESULTS).write_bytes(data)
-    ledger = ends_well(lambda: Ledger(folder, CAMPAIGN))
-    if ledger is not None:
-        assert all(isinstance(result.time_s, float) for result in ledger.results.values())
-        assert Ledger(folder, CAMPAIGN).results == ledger.results
+    results_file = ends_well(lambda: ResultsFile(folder, CAMPAIGN))
+    if results_file is not None:
+        assert all(isinstance(result.time_s, float) for result in results_file.results.values())
+        assert ResultsFile(folder, CAMPAIGN).results == results_file.results
 
 
 @pytest.mark.parametrize("data", [b"1\n", b"[]", b"x", b"[" * 100_000, b"\0" * 3_000_000])
 def test_what_is_no_results_file_is_refused_and_left(folder: Path, data: bytes) -> None:
     (folder / RESULTS).write_bytes(data)
     with pytest.raises(InputError, match="results of a campaign"):
-        Ledger(folder, CAMPAIGN)
+        ResultsFile(folder, CAMPAIGN)
     assert (folder / RESULTS).read_bytes() == data

@@ -1,4 +1,4 @@
-"""A driver that needs no physics: joints go where they are told, pictures come as scripted."""
+"""A driver that needs no physics: joints go where they are told, images come as scripted."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ def flat_arm(n: int = 2, reach: float = 1.0) -> Arm:
 
 @dataclass
 class ScriptedDriver:
-    """Its cameras expose at their rate; `lose` says which pictures never arrive."""
+    """Its cameras expose at their rate; `lose` says which images never arrive."""
 
     inner_rate_hz: float = 500.0
     camera_rate_hz: float = 30.0
@@ -72,7 +72,7 @@ class ScriptedDriver:
         return Sample(self.time, still, tuple(frames))
 
     def _exposure(self) -> float:
-        """When the next picture is exposed: at an inner tick, as in simulation."""
+        """When the next image is exposed: at an inner tick, as in simulation."""
         return int(self.delivered * self.inner_rate_hz / self.camera_rate_hz) / self.inner_rate_hz
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
@@ -120,7 +120,7 @@ class ScriptedEyes:
 
 @dataclass
 class ScriptedLaw:
-    """Asks for the same rates at every picture; notes when, and what it saw."""
+    """Asks for the same rates at every image; notes when, and what it saw."""
 
     rates: FloatArray
     fault: Callable[[int], object] = lambda count: None

@@ -15,12 +15,12 @@ from vergence.control import (
     Servo,
     Situation,
 )
-from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
+from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
 from vergence.geometry import se3, so3_exp
 from vergence.runtime import Run
 from vergence.signals import OutcomeKind
-from vergence.simulation import IdealCell, IdealDriver
-from vergence.simulation.ideal_driver import CAMERA as CAMERA_NAME
+from vergence.simulation import KinematicCell, KinematicDriver
+from vergence.simulation.kinematic_driver import CAMERA as CAMERA_NAME
 from vergence.studies.guarantees_runs import arms
 
 CAMERA = Camera(640, 480, 600.0, 580.0, 319.5, 239.5)
@@ -28,7 +28,7 @@ ARMS = arms()  # six turning joints, seven with a track, three sliding and three
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def drawn_run(seed: int) -> IdealRun:
+def drawn_run(seed: int) -> KinematicRun:
     """Draw a run: any arm, start, motion, delay, noise and belief; some of them hopeless."""
     rng = np.random.default_rng([seed, 7])
     arm = ARMS[seed % len(ARMS)]
@@ -46,7 +46,7 @@ def drawn_run(seed: int) -> IdealRun:
         return poses
 
     count = int(rng.integers(1, 5))
-    cell = IdealCell(
+    cell = KinematicCell(
         arm,
         CAMERA,
         start,
@@ -58,7 +58,7 @@ def drawn_run(seed: int) -> IdealRun:
         dropped=float(rng.choice([0.0, 0.3, 0.99], p=[0.6, 0.3, 0.1])),
         seed=seed,
     )
-    truth = IdealDriver(cell).frame().truth
+    truth = KinematicDriver(cell).frame().truth
     assert truth is not None
     axes = tuple(str(a) for a in rng.choice(AXES, rng.integers(2, 7), replace=False))
     depth_factor = float(np.exp(rng.uniform(-0.7, 0.7)))
@@ -79,7 +79,7 @@ def drawn_run(seed: int) -> IdealRun:
         situation=Situation(1.0 / cell.rate_hz, MotionSettings(False, False)),
     )
     wanted = truth.points_px + rng.normal(0, 30, 2)
-    return IdealRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
+    return KinematicRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
 
 
 def check_same(trace: BatchTrace, run: Run) -> None:
@@ -136,4 +136,4 @@ def test_a_law_that_the_kernel_does_not_know_is_left_to_the_loop() -> None:
         situation=Situation(motion=MotionSettings(False, False)),
     )  # fmt: skip
     assert covers(run)
-    assert not covers(IdealRun(run.cell, plain, run.wanted_px, 1.0))
+    assert not covers(KinematicRun(run.cell, plain, run.wanted_px, 1.0))

@@ -17,11 +17,11 @@ from vergence.experiments import (
     OWN,
     PRESETS,
     RESULTS,
-    Aim,
     CellSource,
-    Crew,
-    Draws,
     Ending,
+    Executor,
+    Goal,
+    Sampling,
     Trial,
     TrialResult,
     WorkersLostError,
@@ -34,13 +34,13 @@ from vergence.experiments import (
     scores,
     start_trials,
 )
-from vergence.experiments.batch import IdealRun
+from vergence.experiments.batch import KinematicRun
 from vergence.parts import kind_of
 from vergence.runtime import Run, RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
 QUICK = {"duration_s": "1.0", "task.feature_count": "4", "target.motion": "{ kind = 'stationary' }"}
-ALONE = Crew(workers=1)
+ALONE = Executor(workers=1)
 RUN_TRIAL = "vergence.experiments.run_trial"
 
 
@@ -52,14 +52,14 @@ def source():
 @pytest.fixture(scope="module")
 def trials(source):
     return start_trials(
-        source.load(), ["image_based", "constrained"], 6, seed=3, draws=Draws(spread=0.1)
+        source.load(), ["image_based", "constrained"], 6, seed=3, sampling=Sampling(spread=0.1)
     )
 
 
 @pytest.fixture(scope="module")
 def results(source, trials, tmp_path_factory):
     """What the trials come to in this process."""
-    return run_campaign(source, trials, tmp_path_factory.mktemp("alone"), crew=ALONE)
+    return run_campaign(source, trials, tmp_path_factory.mktemp("alone"), executor=ALONE)
 
 
 def test_every_trial_has_a_result_in_the_order_of_the_trials(trials, results):
@@ -78,7 +78,7 @@ def quick_trials(source):
     """Trials of the cell's own law, which the batch kernel knows."""
     cell = source.load()
     near, far = place_trials(cell, 0.3, 3, 0.2), heading_trials(cell, 3.0, 3, (1.0, 3.0))
-    return [*near, *far, *start_trials(cell, [OWN], 5, seed=3, draws=Draws(spread=0.3))]
+    return [*near, *far, *start_trials(cell, [OWN], 5, seed=3, sampling=Sampling(spread=0.3))]
 
 
 @pytest.fixture(scope="module")
@@ -121,20 +121,20 @@ def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
         assert plain.changes["arms"] == constrained.changes["arms"]
         assert plain.changes["law"] != constrained.changes["law"]
     cell = source.load()
-    fewer = Draws(spread=0.1).changes(cell, Aim.of(cell), 2, seed=3)
+    fewer = Sampling(spread=0.1).changes(cell, Goal.of(cell), 2, seed=3)
     assert fewer[1]["arms"] == trials[1].changes["arms"]
 
 
 def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_path):
     whole = tmp_path / "whole"
-    run_campaign(source, trials, whole, crew=ALONE)
+    run_campaign(source, trials, whole, executor=ALONE)
     lines = (whole / RESULTS).read_text().splitlines(keepends=True)
     part = tmp_path / "part"
     part.mkdir()
     (part / RESULTS).write_text("".join(lines[:4]) + lines[4][:40])  # header, three, and a half
     seen = []
     again = run_campaign(
-        source, trials, part, crew=ALONE, progress=lambda done, total: seen.append(done)
+        source, trials, part, executor=ALONE, progress=lambda done, total: seen.append(done)
     )
     assert seen == list(range(3, len(trials) + 1))
     assert again == results
@@ -142,11 +142,11 @@ def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_pa
 
 
 def test_results_of_another_campaign_are_not_gone_on_with(source, trials, tmp_path):
-    run_campaign(source, trials[:1], tmp_path, crew=ALONE)
+    run_campaign(source, trials[:1], tmp_path, executor=ALONE)
     with pytest.raises(InputError, match="trials differ"):
-        run_campaign(source, trials[:2], tmp_path, crew=ALONE)
+        run_campaign(source, trials[:2], tmp_path, executor=ALONE)
     with pytest.raises(InputError, match="tolerance_px differ"):
-        run_campaign(source, trials[:1], tmp_path, crew=ALONE, tolerance_px=1.0)
+        run_campaign(source, trials[:1], tmp_path, executor=ALONE, tolerance_px=1.0)
 
 
 def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
@@ -161,7 +161,7 @@ def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
     stopped = Run(RunInfo("puma560"), {}, {}, None, (), outcome, {})
     module = sys.modules[RUN_TRIAL]
     monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
-    monkeypatch.setattr(IdealRun, "in_loop", lambda *_: stopped)
+    monkeypatch.setattr(KinematicRun, "in_loop", lambda *_: stopped)
     for physics in (True, False):
         with pytest.raises(KeyboardInterrupt):
             run_trial(source, trials[0], 2.0, physics=physics)
@@ -221,16 +221,16 @@ def test_laws_are_found_by_name(tmp_path):
 def test_a_campaign_holds_the_pose_a_cell_follows_fast(name, seconds):
     changed = {"duration_s": seconds, "target.motion": "{ kind = 'stationary' }"}
     cell, source = load_cell(name, changed), CellSource.of(name, changed, None)
-    aim = Aim.of(cell)
-    again = Aim.of(cell.replace(**aim.tables))
-    np.testing.assert_allclose(again.desired_px, aim.desired_px, atol=1e-3)
-    (result,) = run_trials(source, [Trial("own", aim.tables)], 5.0)
+    goal = Goal.of(cell)
+    again = Goal.of(cell.replace(**goal.tables))
+    np.testing.assert_allclose(again.desired_px, goal.desired_px, atol=1e-3)
+    (result,) = run_trials(source, [Trial("own", goal.tables)], 5.0)
     assert result.ending is Ending.CONVERGED, result
 
 
 def test_a_reach_is_tried_from_random_starts_before_random_targets():
     cell = load_cell("gantry")
-    drawn = start_trials(cell, [OWN], 2, 0, Draws(("starts", "targets"), 0.05))
+    drawn = start_trials(cell, [OWN], 2, 0, Sampling(("starts", "targets"), 0.05))
     results = run_trials(CellSource.of("gantry", {}, None), drawn, 2.0)
     assert {result.ending for result in results} == {Ending.CONVERGED}
     assert len({result.start_m for result in results}) == 2
@@ -243,10 +243,10 @@ def test_a_reach_is_tried_from_random_starts_before_random_targets():
 
 def test_targets_and_motions_are_drawn_by_seed_and_refused_where_they_cannot_be():
     cell = load_cell("puma560")
-    draws = Draws(("targets", "motions"), 0.1, 0.2)
-    aim = Aim.of(cell)
-    first, second = draws.changes(cell, aim, 2, seed=1)
-    assert draws.changes(cell, aim, 1, seed=1) == [first]
+    sampling = Sampling(("targets", "motions"), 0.1, 0.2)
+    goal = Goal.of(cell)
+    first, second = sampling.changes(cell, goal, 2, seed=1)
+    assert sampling.changes(cell, goal, 1, seed=1) == [first]
     assert first["target"]["position_m"] != second["target"]["position_m"]
     speeds = np.linalg.norm(
         [d["target"]["motion"]["velocity_m_s"] for d in (first, second)], axis=1
@@ -254,15 +254,15 @@ def test_targets_and_motions_are_drawn_by_seed_and_refused_where_they_cannot_be(
     assert (speeds <= 0.2).all()
     assert "arms" not in first
     held = load_cell("eye_to_hand_pose")
-    with pytest.raises(InputError, match="in the hand"):
-        draws.changes(held, Aim.of(held), 1, seed=1)
+    with pytest.raises(InputError, match="is held by"):
+        sampling.changes(held, Goal.of(held), 1, seed=1)
     with pytest.raises(InputError, match="did you mean targets"):
-        Draws(("target",))
+        Sampling(("target",))
 
 
 def test_an_address_without_a_scheduler_is_refused(source, trials, tmp_path):
     with pytest.raises(InputError, match="address of a Dask scheduler"):
-        run_campaign(source, trials, tmp_path, crew=Crew(scheduler="nonsense://here"))
+        run_campaign(source, trials, tmp_path, executor=Executor(scheduler="nonsense://here"))
 
 
 class Cluster:
@@ -313,7 +313,7 @@ def test_a_worker_killed_midway_loses_nothing_and_changes_nothing(
             source,
             trials,
             tmp_path / "run",
-            crew=Crew(scheduler=cluster.address),
+            executor=Executor(scheduler=cluster.address),
             progress=kill_one,
         )
     finally:
@@ -331,15 +331,15 @@ def cluster_wait(cluster: Cluster) -> None:
 
 
 def test_processes_of_this_machine_find_the_same(source, trials, results, tmp_path):
-    assert run_campaign(source, trials[:4], tmp_path, crew=Crew(workers=2)) == results[:4]
+    assert run_campaign(source, trials[:4], tmp_path, executor=Executor(workers=2)) == results[:4]
 
 
 def test_a_cluster_runs_batches_too(source, quick_trials, quick_results, tmp_path):
     cluster = Cluster(tmp_path)
     try:
         cluster_wait(cluster)
-        crew = Crew(scheduler=cluster.address)
-        found = run_campaign(source, quick_trials, tmp_path / "run", crew=crew)
+        executor = Executor(scheduler=cluster.address)
+        found = run_campaign(source, quick_trials, tmp_path / "run", executor=executor)
     finally:
         cluster.close()
     assert list(found) == quick_results
@@ -361,7 +361,25 @@ def test_a_run_that_nobody_survives_ends_in_a_clear_message(source, trials, tmp_
         killing = Timer(1.0, lambda: [process.kill() for process in cluster.processes[whom]])
         killing.start()
         with pytest.raises(WorkersLostError, match=f"run endless: {said}"):
-            list(Crew(scheduler=cluster.address).run(source, [endless], 2.0))
+            list(Executor(scheduler=cluster.address).run(source, [endless], 2.0))
         killing.join()
     finally:
         cluster.close()
+
+
+def test_without_dask_one_process_runs_all_unless_several_are_asked_for(
+    source, trials, results, monkeypatch
+):
+    from vergence import optional_package
+    from vergence.experiments import executor
+
+    def missing(module):
+        raise ImportError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr(executor, "is_installed", lambda _: False)
+    monkeypatch.setattr(optional_package, "import_module", missing)
+    alone = list(Executor().run(source, trials[:2], 2.0))
+    assert [result.key for result in alone] == [result.key for result in results[:2]]
+    for asked in (Executor(workers=2), Executor(scheduler="tcp://127.0.0.1:1")):
+        with pytest.raises(InputError, match=r"pip install 'vergence\[cluster\]'"):
+            list(asked.run(source, trials[:2], 2.0))

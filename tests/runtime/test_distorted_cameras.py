@@ -14,7 +14,7 @@ from vergence.places import CELLS
 from vergence.simulation.build import intrinsics
 
 BARREL = (-0.28, 0.09, 1e-3, -1.5e-3, 0.0)
-STRONG_BARREL = (-1.1, 0.9, 5e-3, -4e-3, 0.0)  # for a long lens: the picture reaches less far
+STRONG_BARREL = (-1.1, 0.9, 5e-3, -4e-3, 0.0)  # for a long lens: the image reaches less far
 STRONG_CUSHION = (1.0, 2.0)
 
 
@@ -24,7 +24,7 @@ def seen_through(cell: Cell, distortion: tuple[float, ...]) -> Cell:
 
 
 @pytest.mark.parametrize("distortion", [STRONG_BARREL, STRONG_CUSHION], ids=["barrel", "cushion"])
-def test_points_reach_where_they_are_wanted_in_the_distorted_picture(
+def test_points_reach_where_they_are_wanted_in_the_distorted_image(
     distortion: tuple[float, ...],
 ) -> None:
     ideal = load_cell("eye_to_hand")

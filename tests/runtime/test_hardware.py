@@ -17,7 +17,7 @@ from vergence.signals import Frame, JointState, OutcomeKind, Sample
 
 @pytest.fixture
 def video(tmp_path: Path) -> Path:
-    """Twelve pictures at 50 Hz, each of one grey."""
+    """Twelve images at 50 Hz, each of one grey."""
     path = tmp_path / "greys.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
     for level in range(12):
@@ -40,7 +40,7 @@ def all_frames(camera: VideoCamera) -> list[Frame]:
     return frames
 
 
-def test_every_picture_of_a_file_becomes_a_frame(video: Path) -> None:
+def test_every_image_of_a_file_becomes_a_frame(video: Path) -> None:
     frames = all_frames(VideoCamera("eye", str(video), time.monotonic, latency_s=0.2, keep=100))
     assert [round(float(frame.image.mean()) / 20) for frame in frames] == list(range(12))
     assert all(frame.image.shape == (48, 64) for frame in frames)
@@ -56,7 +56,7 @@ def test_frames_carry_the_time_of_exposure_and_the_joints_then(video: Path) -> N
     np.testing.assert_allclose([frame.joints["left"][0] for frame in frames], np.arange(12) - 0.25)
 
 
-def test_pictures_nobody_fetches_do_not_pile_up(video: Path) -> None:
+def test_images_nobody_fetches_do_not_pile_up(video: Path) -> None:
     camera = VideoCamera("eye", str(video), time.monotonic, keep=3)
     while not camera.ended:
         time.sleep(0.01)
@@ -67,7 +67,7 @@ def test_pictures_nobody_fetches_do_not_pile_up(video: Path) -> None:
 
 
 class Filmed(ScriptedDriver):
-    """Its pictures come from a video camera, and its clock is on the wall."""
+    """Its images come from a video camera, and its clock is on the wall."""
 
     def __init__(self, source: Path) -> None:
         super().__init__(inner_rate_hz=100.0)
@@ -115,7 +115,7 @@ def test_a_device_is_read_as_fast_as_it_delivers(monkeypatch: pytest.MonkeyPatch
 
 
 class Unplugged:
-    """A device that delivers three pictures and is gone."""
+    """A device that delivers three images and is gone."""
 
     def __init__(self, source: int) -> None:
         self.left = 3

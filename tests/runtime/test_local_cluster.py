@@ -5,7 +5,7 @@ import ssl
 
 import psutil
 
-from vergence.experiments import Crew
+from vergence.experiments import Executor
 
 WEB = b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
@@ -45,7 +45,7 @@ def is_refused(port: int, *, encrypted: bool) -> bool:
 
 def test_workers_hear_nobody_without_their_certificate_and_show_no_pages() -> None:
     before = listening()
-    with Crew(workers=2)._client(2) as client:
+    with Executor(workers=2)._client(2) as client:
         assert client.submit(sum, (1, 2)).result() == 3
         assert client.scheduler.address.startswith("tls://127.0.0.1:")
         opened = listening() - before

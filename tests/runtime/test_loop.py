@@ -83,7 +83,7 @@ def test_the_other_arms_hold_their_place() -> None:
 
 
 @pytest.mark.parametrize("frames", [0, 1, 2, 5])
-def test_the_law_sees_every_picture_once_as_late_as_it_came(frames: int) -> None:
+def test_the_law_sees_every_image_once_as_late_as_it_came(frames: int) -> None:
     driver = ScriptedDriver(camera_rate_hz=25, latency_s=frames / 25)
     law, notes = ScriptedLaw(np.zeros(2)), Notes()
     looped(driver, law=law, rate_hz=25, listeners=[notes]).run(2.0)
@@ -98,7 +98,7 @@ def test_the_law_sees_every_picture_once_as_late_as_it_came(frames: int) -> None
     assert len(notes.ticks) == 50
 
 
-def test_without_pictures_it_keeps_on_for_its_patience_and_then_ends() -> None:
+def test_without_images_it_keeps_on_for_its_patience_and_then_ends() -> None:
     driver = ScriptedDriver(lose=lambda exposed: exposed > 0.5)
     outcome = looped(driver, timeouts=Timeouts(image_s=0.3)).run(5.0)
     assert outcome.kind is OutcomeKind.IMAGE_LATE
@@ -115,7 +115,7 @@ def test_a_camera_that_never_delivers_never_moves_the_arm() -> None:
     np.testing.assert_array_equal(driver.positions(), 0.0)
 
 
-def test_single_dropped_pictures_do_not_end_a_run() -> None:
+def test_single_dropped_images_do_not_end_a_run() -> None:
     rng = np.random.default_rng(34)
     driver = ScriptedDriver(lose=lambda exposed: rng.random() < 0.3)
     assert looped(driver).run(3.0).kind is OutcomeKind.COMPLETED
@@ -271,7 +271,7 @@ def test_a_driver_that_falls_silent_ends_the_run_by_name(tick: int) -> None:
     assert notes.events[-1][1] == "driver silent"
 
 
-def test_another_law_takes_over_with_the_next_picture() -> None:
+def test_another_law_takes_over_with_the_next_image() -> None:
     driver = ScriptedDriver()
     first, second = ScriptedLaw(np.array([0.3, 0.0])), ScriptedLaw(np.array([0.0, 0.2]))
     loop = looped(driver, law=first)

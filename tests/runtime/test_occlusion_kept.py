@@ -19,15 +19,15 @@ BEAM = (
 
 
 class Hidden:
-    """Listens to how many pictures show less than the whole target."""
+    """Listens to how many images show less than the whole target."""
 
     def __init__(self):
-        self.pictures, self.named = 0, set()
+        self.images, self.named = 0, set()
 
     def begin(self, info): ...
 
     def tick(self, record):
-        self.pictures += sum(not frame.truth.visible.all() for frame in record.sample.frames)
+        self.images += sum(not frame.truth.visible.all() for frame in record.sample.frames)
         self.named |= {name for command in record.commands.values() for name in command.active}
 
     def event(self, time, name, text): ...
@@ -60,8 +60,8 @@ def test_a_beam_hides_the_target_only_where_sight_lines_are_not_kept(cell):
         [given_away],
         False,
     )
-    assert given_away.pictures > 20
-    assert kept.pictures == 0
+    assert given_away.images > 20
+    assert kept.images == 0
     assert "occlusion" in kept.named
     assert result.outcome.succeeded
     assert result.summary["final_error_px"] < 15.0

@@ -25,6 +25,6 @@ def test_picked_features_are_far_apart():
 
 
 def test_picked_features_keep_their_windows_off_the_targets_edge():
-    _, places = picked("[0.24, -0.65, 0.18]")  # its edge crosses the picture
+    _, places = picked("[0.24, -0.65, 0.18]")  # its edge crosses the image
     half_window_m = 0.008  # 16 px at a metre, with this lens
     assert (np.abs(places[:, :2]) < 0.25 - half_window_m).all()

@@ -1,4 +1,4 @@
-"""Reaching a picture taken beforehand: planned and tracked, or refused before anything moves."""
+"""Reaching an image taken beforehand: planned and tracked, or refused before anything moves."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from vergence.errors import InputError
 from vergence.signals import OutcomeKind
 
 
-def test_the_gantry_gets_where_the_picture_was_taken_and_keeps_the_marks_in_view():
+def test_the_gantry_gets_where_the_image_was_taken_and_keeps_the_marks_in_view():
     result = run_cell(load_cell("gantry"), images=False)
     assert result.outcome.succeeded
     assert result.summary["final_error_px"] < 0.05
@@ -43,7 +43,7 @@ def test_the_same_seed_gives_the_same_run():
     np.testing.assert_array_equal(first.T_world_camera, second.T_world_camera)
 
 
-def test_no_translation_between_the_pictures_is_an_outcome_not_a_run():
+def test_no_translation_between_the_images_is_an_outcome_not_a_run():
     start = load_cell("gantry").arms["gantry"].start_deg
     cell = load_cell("gantry").replace(task={"goal_deg": start})
     result = run_cell(cell, images=False)

@@ -49,7 +49,7 @@ def record_at(time: float, rng: np.random.Generator) -> TickRecord:
         rng.uniform(0, 48, (2, 2)),
         rng.normal(size=(2, 2, 2)),
         np.array([True, False]),
-        ("", "left the picture"),
+        ("", "left the image"),
         SearchWindows(np.array([[1.0, 2.0], [np.nan] * 2]), np.array([[8.0, 9.0], [np.nan] * 2])),
     )
     target = TargetState(time, pose, rng.normal(size=6), rng.normal(size=(12, 12)), True)
@@ -85,7 +85,7 @@ def recorder_with(folder: Path, records: list[TickRecord]) -> Recorder:
 
 def whole(folder: Path, records: list[TickRecord]) -> Recording:
     recorder = recorder_with(folder, records)
-    recorder.event(2.5, "feature lost", "point 1 of wrist left the picture")
+    recorder.event(2.5, "feature lost", "point 1 of wrist left the image")
     recorder.close(DONE, {"max error": 3.5, "note": "fine", "drift": float("nan")})
     return Recording.open(folder)
 
@@ -115,7 +115,7 @@ def test_points_of_a_camera_read_back_exactly(tmp_path: Path, records: list[Tick
     np.testing.assert_array_equal(camera.covariance_px, [view.covariance_px for view in views])
     np.testing.assert_array_equal(camera.true_px, [truth.points_px for truth in truths])
     np.testing.assert_array_equal(camera.T_world_target, [truth.T_world_target for truth in truths])
-    assert set(camera.reasons) == {("", "left the picture")}
+    assert set(camera.reasons) == {("", "left the image")}
     np.testing.assert_array_equal(camera.found, [view.found for view in views])
     np.testing.assert_array_equal(camera.asked, [view.asked for view in views])
     np.testing.assert_array_equal(camera.window_center_px, [view.windows[0] for view in views])
@@ -141,7 +141,7 @@ def test_the_filters_target_reads_back_exactly(tmp_path: Path, records: list[Tic
     assert target.consistent.all()
 
 
-def test_every_second_picture_is_kept_at_its_exposure(
+def test_every_second_image_is_kept_at_its_exposure(
     tmp_path: Path, records: list[TickRecord]
 ) -> None:
     kept = list(whole(tmp_path, records).images("wrist"))
@@ -151,7 +151,7 @@ def test_every_second_picture_is_kept_at_its_exposure(
         assert image.shape == frame.image.shape
 
 
-def test_some_pictures_can_be_read_alone(tmp_path: Path, records: list[TickRecord]) -> None:
+def test_some_images_can_be_read_alone(tmp_path: Path, records: list[TickRecord]) -> None:
     recording = whole(tmp_path, records)
     times = recording.image_times("wrist")
     some = [time for time, _ in recording.images("wrist", only={0, 3, 99})]
@@ -160,7 +160,7 @@ def test_some_pictures_can_be_read_alone(tmp_path: Path, records: list[TickRecor
     assert len(recording.image_times("wall")) == 0
 
 
-def test_a_smooth_picture_survives_compression(tmp_path: Path, records: list[TickRecord]) -> None:
+def test_a_smooth_image_survives_compression(tmp_path: Path, records: list[TickRecord]) -> None:
     smooth = np.add.outer(np.arange(48), np.arange(64)).astype(np.uint8)
     sample = Sample(0.0, {}, (Frame("wall", 0.0, smooth, {}),))
     whole(tmp_path, [TickRecord(0.0, sample, None, None, {})])

@@ -116,8 +116,8 @@ def test_the_summary_of_a_pose_is_what_the_ticks_say(followed: tuple[Run, TickBy
         camera.append((np.linalg.norm((T - desired)[:3, 3]), np.degrees(np.linalg.norm(turn))))
     assert run.summary["final_target_error_m"] == pytest.approx(target[-1])
     assert run.summary["max_target_error_m"] == pytest.approx(max(target))
-    assert run.summary["final_hand_error_m"] == pytest.approx(camera[-1][0])
-    assert run.summary["max_hand_error_deg"] == pytest.approx(max(deg for _, deg in camera))
+    assert run.summary["final_pose_error_m"] == pytest.approx(camera[-1][0])
+    assert run.summary["max_pose_error_deg"] == pytest.approx(max(deg for _, deg in camera))
     assert "final_error_px" not in run.summary  # no points are desired
     trace = run.cameras[run.info.task_camera]
     assert np.isfinite(trace.error_px).any()  # but where they would be at the pose is known

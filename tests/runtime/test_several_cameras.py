@@ -11,7 +11,7 @@ from vergence.signals import ImagePoints, JointState, Observation
 from vergence.simulation import SimulatedDriver
 
 PERIOD = 1 / 30
-GOAL = np.deg2rad([-125.6, 42.7, -172.7, 0.0, -50.0, 0.0])  # where the desired pictures were taken
+GOAL = np.deg2rad([-125.6, 42.7, -172.7, 0.0, -50.0, 0.0])  # where the desired images were taken
 
 
 class Ends:
@@ -64,21 +64,21 @@ def off_goal(driver, q):
     return se3_distance(arm.forward_kinematics(q), arm.forward_kinematics(GOAL), 1.0)
 
 
-def test_together_they_bring_the_arm_to_the_one_place_that_shows_both_pictures(driver):
+def test_together_they_bring_the_arm_to_the_one_place_that_shows_both_images(driver):
     q, error_px = settle(driver, ("wrist", "wall"))
     assert max(error_px.values()) < 0.05
     assert off_goal(driver, q) < 1e-3
 
 
 @pytest.mark.parametrize(("alone", "other"), [("wrist", "wall"), ("wall", "wrist")])
-def test_alone_each_is_content_while_the_other_picture_is_wrong(driver, alone, other):
+def test_alone_each_is_content_while_the_other_image_is_wrong(driver, alone, other):
     q, error_px = settle(driver, (alone,))
     assert error_px[alone] < 0.05
     assert error_px[other] > 5.0
     assert off_goal(driver, q) > 0.02
 
 
-def test_through_rendered_images_both_pictures_come_out_as_wanted():
+def test_through_rendered_images_both_images_come_out_as_wanted():
     ends = Ends()
     result = run_cell(load_cell("wrist_and_wall").replace(duration_s=5.0), [ends])
     assert result.outcome.succeeded

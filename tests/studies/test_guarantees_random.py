@@ -14,7 +14,7 @@ def gantry():
     return arms()[2]
 
 
-@pytest.mark.parametrize("index", [0, 1, 231])  # the last along the border of the picture
+@pytest.mark.parametrize("index", [0, 1, 231])  # the last along the border of the image
 def test_planned_and_constrained_brings_the_points_home(gantry, index):
     assert servo(draw_pair(gantry, 5, index), PLANNED, "") is Ending.ARRIVED
 

@@ -52,12 +52,12 @@ def test_on_rendered_images_pose_and_hand_stay_within_a_few_millimetres(short: C
     trial = run(short.replace(duration_s=3.0), images=True)
     assert trial.outcome.succeeded
     assert trial.position().max() < 0.002
-    assert trial.hand_m().max() < 0.01
+    assert trial.pose_m().max() < 0.01
 
 
 def test_feed_forward_and_prediction_take_the_lag_away(short: Cell) -> None:
     ours, paper = run(short, images=False), run(short.replace(law=PAPER["law"]), images=False)
-    assert ours.hand_m().max() < 0.5 * paper.hand_m().max()
+    assert ours.pose_m().max() < 0.5 * paper.pose_m().max()
 
 
 def test_both_cameras_know_more_than_the_fixed_one(short: Cell) -> None:

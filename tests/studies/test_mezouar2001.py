@@ -17,7 +17,7 @@ from vergence.studies.mezouar2001_methods import (
     METHODS,
     Belief,
     Method,
-    plan_between_pictures,
+    plan_between_images,
     position_based,
     position_based_on_object,
     servo,
@@ -160,9 +160,9 @@ def test_a_joint_is_too_close_before_it_is_at_its_limit(scene: Scene) -> None:
     assert not too_close(scene.arm, q)(q)
 
 
-def test_plan_between_pictures_ends_where_the_desired_one_was_taken(scene: Scene) -> None:
+def test_plan_between_images_ends_where_the_desired_one_was_taken(scene: Scene) -> None:
     belief = Belief(scene.camera)
-    path = plan_between_pictures(scene, "optimised", belief, np.random.default_rng(0))
+    path = plan_between_images(scene, "optimised", belief, np.random.default_rng(0))
     assert isinstance(path, PlannedPath)
     np.testing.assert_allclose(path.T_world_camera[-1], scene.T_world_goal, atol=1e-4)
     np.testing.assert_allclose(path.points_px[-1], scene.goal_px, atol=0.05)
@@ -214,9 +214,7 @@ def test_a_turn_about_the_optical_axis_alone_is_refused_with_the_reason(scene: S
     roll = se3(so3_exp(np.array([0.0, 0.0, 0.5])), np.zeros(3))
     goal = scene.arm.forward_kinematics(scene.q_start) @ roll
     turned = replace(scene, T_world_goal=goal)
-    plan = plan_between_pictures(
-        turned, "optimised", Belief(scene.camera), np.random.default_rng(0)
-    )
+    plan = plan_between_images(turned, "optimised", Belief(scene.camera), np.random.default_rng(0))
     assert isinstance(plan, str)
     assert "translation" in plan
 

@@ -1,4 +1,4 @@
-"""The reconstruction of an unknown object from two pictures."""
+"""The reconstruction of an unknown object from two images."""
 
 from dataclasses import replace
 
@@ -146,7 +146,7 @@ def test_turn_without_translation_is_refused_with_the_rotation() -> None:
     np.testing.assert_allclose(failure.rotation, R.T, atol=1e-8)
 
 
-def test_same_picture_twice_is_no_translation() -> None:
+def test_same_image_twice_is_no_translation() -> None:
     random = np.random.default_rng(31)
     px = CAMERA.project(transform_points(pose_facing(random), shape(random)))
     assert refusal(px, px).problem is TwoViewProblem.NO_TRANSLATION

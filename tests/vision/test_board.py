@@ -25,9 +25,9 @@ def photograph(board: Board, T: np.ndarray, rng: np.random.Generator) -> np.ndar
     from_board = se3_inverse(T)
     rays, eye = rays @ from_board[:3, :3].T, from_board[:3, 3]
     met = eye[:2] - eye[2] / rays[:, 2:] * rays[:, :2]
-    on_picture = (met / board.square_m * SQUARE_PX + 1.5 * SQUARE_PX - 0.5).astype(np.float32)
-    maps = on_picture.reshape(480 * FINER, -1, 2)
-    seen = cv2.remap(board.picture(SQUARE_PX), maps, None, cv2.INTER_LINEAR, borderValue=90)
+    on_image = (met / board.square_m * SQUARE_PX + 1.5 * SQUARE_PX - 0.5).astype(np.float32)
+    maps = on_image.reshape(480 * FINER, -1, 2)
+    seen = cv2.remap(board.image(SQUARE_PX), maps, None, cv2.INTER_LINEAR, borderValue=90)
     small = cv2.resize(seen, (640, 480), interpolation=cv2.INTER_AREA)
     noisy = 0.8 * small + 20 + rng.normal(0, 1.5, small.shape)
     return np.clip(noisy, 0, 255).astype(np.uint8)
@@ -120,7 +120,7 @@ BARE = Board(7, 4, 0.033)
 def test_a_whole_sharp_board_is_found_on_any_background(grey: int) -> None:
     """Boards without a white margin, blurred a little, as a webcam shows them."""
     rng = np.random.default_rng(4)
-    squares = BARE.picture(40)[20:-20, 20:-20]
+    squares = BARE.image(40)[20:-20, 20:-20]
     corners = np.array([[0, 0], [320, 0], [320, 200], [0, 200]], dtype=np.float32)
     for _ in range(6):
         size = rng.uniform(0.6, 1.1)
@@ -193,7 +193,7 @@ def test_charuco_boards_of_both_layouts_are_found(rows: int, old: bool) -> None:
     assert np.abs(seen.points_px - expected).max() < 0.2
 
 
-CHESS_IMAGE, CHARUCO_IMAGE = CHESSBOARD.picture(36), CHARUCO.picture(36)
+CHESS_IMAGE, CHARUCO_IMAGE = CHESSBOARD.image(36), CHARUCO.image(36)
 
 
 @pytest.mark.parametrize(

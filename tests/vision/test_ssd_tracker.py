@@ -6,7 +6,7 @@ from vergence.errors import ShapeError
 from vergence.vision import SsdTracker
 
 
-def picture(rng: np.random.Generator, height: int = 240, width: int = 320) -> NDArray[np.uint8]:
+def drawn_image(rng: np.random.Generator, height: int = 240, width: int = 320) -> NDArray[np.uint8]:
     """Random texture with detail at every level of the pyramid."""
     import cv2
 
@@ -31,7 +31,7 @@ POINTS = np.array([[100.3, 90.7], [160.0, 120.0], [220.5, 60.25]])
 
 @pytest.fixture
 def image() -> NDArray[np.uint8]:
-    return picture(np.random.default_rng(1))
+    return drawn_image(np.random.default_rng(1))
 
 
 def test_points_in_the_same_image_stay_where_they_are(image: NDArray[np.uint8]) -> None:

@@ -1,4 +1,4 @@
-"""The tracker over whole sequences: rendered ones with known truth, and real pictures."""
+"""The tracker over whole sequences: rendered ones with known truth, and real images."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench_vision import PACKAGE, PICTURES, evaluate
+from bench_vision import IMAGES, PACKAGE, evaluate
 from vergence.vision import SsdTracker, pick_features
 
 SIZE = 900  # texture, px
@@ -119,16 +119,16 @@ def test_point_that_leaves_the_image_says_so() -> None:
 
 
 @pytest.mark.parametrize(("name", "last"), [("cube", 69), ("mire-2", 490)])
-def test_real_pictures_are_tracked_as_lucas_kanade_does(name: str, last: int) -> None:
-    assert (PICTURES / name).is_dir(), f"pictures missing: install the Debian package {PACKAGE}"
+def test_real_images_are_tracked_as_lucas_kanade_does(name: str, last: int) -> None:
+    assert (IMAGES / name).is_dir(), f"images missing: install the Debian package {PACKAGE}"
     ours, _ = evaluate(name, range(0, last, 6), (1,))
     assert ours >= 99.0
 
 
 @pytest.mark.parametrize(("name", "last"), [("cube", 69), ("mire-2", 490)])
-def test_real_pictures_are_tracked_over_gaps(name: str, last: int) -> None:
+def test_real_images_are_tracked_over_gaps(name: str, last: int) -> None:
     """One-step Lucas-Kanade is right a little more often; the benchmark tells both figures."""
-    assert (PICTURES / name).is_dir(), f"pictures missing: install the Debian package {PACKAGE}"
+    assert (IMAGES / name).is_dir(), f"images missing: install the Debian package {PACKAGE}"
     ours, _ = evaluate(name, range(5, last, 20), (2, 5, 10))
     assert ours >= 97.0
 

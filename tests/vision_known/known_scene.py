@@ -1,4 +1,4 @@
-"""Pictures of a box under a known pose: flat faces, smooth edges, over clutter."""
+"""Images of a box under a known pose: flat faces, smooth edges, over clutter."""
 
 import cv2
 import numpy as np
@@ -48,7 +48,7 @@ def clutter(rng: np.random.Generator) -> ImageArray:
     return np.clip(image * light, 0, 255).astype(np.uint8)
 
 
-def picture(
+def drawn_image(
     T: FloatArray,
     rng: np.random.Generator,
     background: ImageArray | None = None,

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from known_scene import CAMERA, box_model, clutter, off, picture, pose
+from known_scene import CAMERA, box_model, clutter, drawn_image, off, pose
 
 from vergence.camera import Camera
+from vergence.camera.lens import pack_lens, pixel_of
 from vergence.errors import InputError
 from vergence.geometry import transform_points
-from vergence.vision.known_object import CornerExtractor, ObjectModel, lens_of
+from vergence.vision.known_object import CornerExtractor, ObjectModel
 from vergence.vision.known_object.projection import (
     face_table,
     hidden,
     in_camera,
-    pixel_of,
     pixel_rows,
 )
 
@@ -32,7 +32,7 @@ def test_corners_are_measured_to_a_fraction_of_a_pixel_over_clutter() -> None:
     errors = []
     for t in np.linspace(0.0, 6.0, 25):
         T = pose(t)
-        image = picture(T, rng, clutter(rng))
+        image = drawn_image(T, rng, clutter(rng))
         found = CornerExtractor(MODEL).measure(
             image, CAMERA, off(T, rng, 0.001, 0.01), ALL, WINDOWS
         )
@@ -49,7 +49,7 @@ def test_the_covariance_tells_the_error() -> None:
     for t in np.linspace(0.0, 6.0, 25):
         T = pose(t)
         found = CornerExtractor(MODEL).measure(
-            picture(T, rng, noise=4.0), CAMERA, off(T, rng, 0.0005, 0.005), ALL, WINDOWS
+            drawn_image(T, rng, noise=4.0), CAMERA, off(T, rng, 0.0005, 0.005), ALL, WINDOWS
         )
         truth = CAMERA.project(transform_points(T, MODEL.corners))
         for n in np.flatnonzero(found.found & seen(T)):
@@ -62,7 +62,7 @@ def test_the_covariance_tells_the_error() -> None:
 def test_blurred_edges_stay_in_the_middle_of_their_blur() -> None:
     rng = np.random.default_rng(3)
     T = pose()
-    image = picture(T, rng, blur=(7, 7), noise=0.5)
+    image = drawn_image(T, rng, blur=(7, 7), noise=0.5)
     found = CornerExtractor(MODEL).measure(image, CAMERA, T, ALL, WINDOWS)
     truth = CAMERA.project(transform_points(T, MODEL.corners))
     assert found.found[seen(T)].sum() >= 5
@@ -78,7 +78,7 @@ def test_what_is_not_there_is_not_found() -> None:
     assert set(np.array(found.reasons)[seen(pose())]) == {"no contrast"}
     away = pose().copy()
     away[0, 3] += 5.0
-    found = extractor.measure(picture(pose(), rng), CAMERA, away, ALL, WINDOWS)
+    found = extractor.measure(drawn_image(pose(), rng), CAMERA, away, ALL, WINDOWS)
     assert set(found.reasons) <= {"outside the image", "fewer than two edges seen"}
     behind = pose().copy()
     behind[2, 3] = -1.0
@@ -88,7 +88,7 @@ def test_what_is_not_there_is_not_found() -> None:
 def test_windows_are_all_that_is_looked_at() -> None:
     """Grey levels outside the windows, and the few pixels that filters need, change nothing."""
     rng = np.random.default_rng(5)
-    image = picture(pose(), rng)
+    image = drawn_image(pose(), rng)
     corner = np.flatnonzero(seen(pose()))[:1]
     windows = np.full((1, 2), 12.0)
     before = CornerExtractor(MODEL).measure(image, CAMERA, pose(), corner, windows)
@@ -112,7 +112,7 @@ def test_an_image_of_the_wrong_size_or_kind_is_refused() -> None:
 @pytest.mark.parametrize("distortion", [np.zeros(5), np.array([-0.2, 0.05, 0.001, -0.002, 0.01])])
 def test_pixels_and_their_slopes_agree_with_the_camera(distortion: np.ndarray) -> None:
     camera = Camera(320, 240, 330.0, 325.0, 158.0, 121.0, distortion)
-    lens, T = lens_of(camera), pose(0.7)
+    lens, T = pack_lens(camera), pose(0.7)
     rows = np.empty((2, 6))
     for X in MODEL.corners:
         place = transform_points(T, X[None])

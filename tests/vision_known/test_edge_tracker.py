@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from known_scene import CAMERA, box_model, clutter, off, picture, pose, pose_error
+from known_scene import CAMERA, box_model, clutter, drawn_image, off, pose, pose_error
 
+from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
-from vergence.vision.known_object import EdgeTracker, ObjectModel, lens_of
+from vergence.vision.known_object import EdgeTracker, ObjectModel
 from vergence.vision.known_object.edge_samples import sample_edges
 from vergence.vision.known_object.profiles import find_steps
 
@@ -41,17 +42,17 @@ def test_a_blurred_step_is_found_in_the_middle_of_its_ramp(length: float) -> Non
 def test_only_edges_that_are_seen_are_expected() -> None:
     places = np.full(12, 10)
     samples = sample_edges(
-        pose(), lens_of(CAMERA), MODEL.edges, MODEL.edge_normals, MODEL.surface, places
+        pose(), pack_lens(CAMERA), MODEL.edges, MODEL.edge_normals, MODEL.surface, places
     )
     assert len(np.unique(samples.edge)) == 9  # of a box that shows three faces
 
 
 @pytest.mark.parametrize("light", [0.35, 1.0])
-def test_one_picture_gives_the_pose_from_a_rough_one(light: float) -> None:
+def test_one_image_gives_the_pose_from_a_rough_one(light: float) -> None:
     rng = np.random.default_rng(1)
     tracker = EdgeTracker(MODEL)
     for t in np.linspace(0.0, 6.0, 12):
-        image = picture(pose(t), rng, clutter(rng), light=light)
+        image = drawn_image(pose(t), rng, clutter(rng), light=light)
         seen = tracker.measure(
             image, CAMERA, off(pose(t), rng, 0.002, 0.02), LOOSE, tracker.blank()
         )
@@ -64,7 +65,7 @@ def test_one_picture_gives_the_pose_from_a_rough_one(light: float) -> None:
 def test_the_edges_are_handed_on_as_points_known_across_the_edge_only() -> None:
     rng = np.random.default_rng(2)
     tracker = EdgeTracker(MODEL)
-    seen = tracker.measure(picture(pose(), rng), CAMERA, pose(), LOOSE, tracker.blank())
+    seen = tracker.measure(drawn_image(pose(), rng), CAMERA, pose(), LOOSE, tracker.blank())
     truth = CAMERA.project(seen.points @ pose()[:3, :3].T + pose()[:3, 3])
     error = seen.points_px - truth
     squares = np.einsum("ni,nij,nj->n", error, np.linalg.inv(seen.covariance_px), error)
@@ -79,14 +80,14 @@ def test_an_object_that_is_not_there_leaves_few_edges() -> None:
     tracker = EdgeTracker(MODEL)
     memory = tracker.blank()
     for t in (0.0, 0.04):
-        seen = tracker.measure(picture(pose(t), rng), CAMERA, pose(t), LOOSE, memory)
+        seen = tracker.measure(drawn_image(pose(t), rng), CAMERA, pose(t), LOOSE, memory)
         memory = tracker.remember(memory, seen)
     assert tracker.measure(clutter(rng), CAMERA, pose(), LOOSE, memory).share < 0.45
     flat = np.full((CAMERA.height, CAMERA.width), 128, np.uint8)
     assert tracker.measure(flat, CAMERA, pose(), LOOSE, memory).share == 0.0
 
 
-def test_out_of_the_picture_nothing_is_expected() -> None:
+def test_out_of_the_image_nothing_is_expected() -> None:
     tracker = EdgeTracker(MODEL)
     away = pose().copy()
     away[0, 3] += 3.0

@@ -35,8 +35,8 @@ def bent() -> ImageArray:
     return image
 
 
-def circle_picture(centre: FloatArray, normal: FloatArray, radius: float) -> FloatArray:
-    """Centroid of the picture of a circle, by sampling its disc's rim."""
+def circle_image(centre: FloatArray, normal: FloatArray, radius: float) -> FloatArray:
+    """Centroid of the image of a circle, by sampling its disc's rim."""
     n = normal / np.linalg.norm(normal)
     a = np.cross(n, [0.0, 1.0, 0.0])
     a /= np.linalg.norm(a)
@@ -92,7 +92,7 @@ def test_a_mark_outside_the_image_is_told() -> None:
 def test_the_bias_of_a_slanted_circle_is_known() -> None:
     centre, normal = np.array([0.05, -0.03, 0.4]), np.array([0.6, 0.3, -1.0])
     true_centre = CAMERA.project(centre[None])[0]
-    bias = circle_picture(centre, normal, 0.03) - true_centre
+    bias = circle_image(centre, normal, 0.03) - true_centre
     assert np.linalg.norm(bias) > 0.3
     np.testing.assert_allclose(circle_centre_bias(CAMERA, centre, normal, 0.03), bias, atol=1e-3)
 
@@ -102,7 +102,7 @@ def test_a_circle_that_faces_the_camera_has_no_bias() -> None:
     np.testing.assert_allclose(bias, 0.0, atol=1e-9)
 
 
-def marker_picture(number: int, quad: FloatArray) -> ImageArray:
+def marker_image(number: int, quad: FloatArray) -> ImageArray:
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
     side = 400
     tag = np.full((side + 200, side + 200), 255, np.uint8)
@@ -119,14 +119,14 @@ QUAD = np.array([[110.3, 60.2], [201.7, 72.4], [195.1, 160.8], [104.6, 151.3]])
 
 
 def test_a_marker_is_found_with_its_number_and_corners() -> None:
-    found = MarkerDetector("apriltag_36h11").detect(marker_picture(7, QUAD))
+    found = MarkerDetector("apriltag_36h11").detect(marker_image(7, QUAD))
     assert found.ids.tolist() == [7]
     assert np.linalg.norm(found.corners_px[0] - QUAD, axis=1).max() < 0.5
     assert found.covariance_px.shape == (1, 4, 2, 2)
 
 
-def test_a_window_keeps_the_pixels_of_the_picture() -> None:
-    detector, image = MarkerDetector("apriltag_36h11"), marker_picture(7, QUAD)
+def test_a_window_keeps_the_pixels_of_the_image() -> None:
+    detector, image = MarkerDetector("apriltag_36h11"), marker_image(7, QUAD)
     whole, part = detector.detect(image), detector.detect(image, (80, 40, 230, 190))
     np.testing.assert_allclose(part.corners_px, whole.corners_px, atol=0.05)
     assert len(detector.detect(image, (300, 40, 300, 190)).ids) == 0
@@ -135,11 +135,11 @@ def test_a_window_keeps_the_pixels_of_the_picture() -> None:
 
 def test_corners_of_markers_are_followed_by_their_numbers() -> None:
     moved = QUAD + (30.0, 20.0)
-    tracker = TagTracking().start(marker_picture(7, QUAD), QUAD[[2, 0]] + 3.0)
-    tracks = tracker.track(marker_picture(7, moved))
+    tracker = TagTracking().start(marker_image(7, QUAD), QUAD[[2, 0]] + 3.0)
+    tracks = tracker.track(marker_image(7, moved))
     assert tracks.found.all()
     np.testing.assert_allclose(tracks.points_px, moved[[2, 0]], atol=0.5)
-    other = tracker.track(marker_picture(8, moved))  # another marker in the same place
+    other = tracker.track(marker_image(8, moved))  # another marker in the same place
     assert not other.found.any()
     assert other.reasons == ("marker 7 is not seen",) * 2
     np.testing.assert_array_equal(other.points_px, tracks.points_px)  # where they were last
@@ -147,7 +147,7 @@ def test_corners_of_markers_are_followed_by_their_numbers() -> None:
 
 def test_points_without_a_marker_are_refused() -> None:
     with pytest.raises(InputError, match=r"no corner of a marker within 10 px of \(20, 30\)"):
-        TagTracking().start(marker_picture(7, QUAD), np.array([[20.0, 30.0]]))
+        TagTracking().start(marker_image(7, QUAD), np.array([[20.0, 30.0]]))
     with pytest.raises(InputError, match="did you mean apriltag_36h11"):
         TagTracking(dictionary="apriltag36h11")
 

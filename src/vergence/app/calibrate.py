@@ -40,7 +40,7 @@ class Request(NamedTuple):
     synthetic: str | None  # a cell
     watch: str | None  # which of its cameras
     chessboard: bool
-    pictures: int
+    image_count: int
     projected: bool
     noise_px: float
 
@@ -175,11 +175,11 @@ def _data(request: Request, folder: Path, seed: int) -> "tuple[Dataset, Truth | 
         charuco = not request.chessboard
         studio = Studio(request.synthetic, request.watch, charuco, Path(models), seed)
         if request.projected:
-            return make_data(studio, request.pictures, None, request.noise_px)
-        pictures = folder / "images"
-        pictures.mkdir(exist_ok=True)
-        _, truth = make_data(studio, request.pictures, pictures, request.noise_px)
-        return read_dataset(pictures, None, None), truth
+            return make_data(studio, request.image_count, None, request.noise_px)
+        image_folder = folder / "images"
+        image_folder.mkdir(exist_ok=True)
+        _, truth = make_data(studio, request.image_count, image_folder, request.noise_px)
+        return read_dataset(image_folder, None, None), truth
 
 
 def _calibrated(

@@ -74,7 +74,7 @@ def calibrate(
     chessboard: Annotated[
         bool, typer.Option("--chessboard", help="Make a chessboard instead of ChArUco.")
     ] = False,
-    pictures: Annotated[int, typer.Option(min=1, help="How many images to make.")] = 30,
+    image_count: Annotated[int, typer.Option("--images", min=1, help="How many to make.")] = 30,
     projected: Annotated[
         bool, typer.Option("--projected", help="Project corners instead of rendering images.")
     ] = False,
@@ -110,7 +110,7 @@ def calibrate(
         synthetic,
         watch,
         chessboard,
-        pictures,
+        image_count,
         projected,
         noise_px,
     )

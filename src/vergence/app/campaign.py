@@ -63,7 +63,7 @@ def prepare(
 
 def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
     """Run a campaign with a progress bar; Ctrl-C keeps what is done."""
-    from vergence.experiments import Crew, WorkersLostError, run_campaign
+    from vergence.experiments import Executor, WorkersLostError, run_campaign
 
     with bar("{task.completed} of {task.total} runs") as progress:
         task = progress.add_task("runs", total=len(trials))
@@ -76,7 +76,7 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
                 source,
                 trials,
                 how.folder,
-                crew=Crew(how.workers, how.scheduler),
+                executor=Executor(how.workers, how.scheduler),
                 tolerance_px=how.tolerance_px,
                 physics=how.physics,
                 progress=show,

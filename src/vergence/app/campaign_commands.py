@@ -81,11 +81,11 @@ def register(app: typer.Typer) -> None:
         source, how = prepare(
             "compare", cell, settings or (), out, tolerance_px, workers, scheduler, physics
         )
-        from vergence.experiments import Draws
+        from vergence.experiments import Sampling
 
         named = () if laws is None else _names("--laws", laws)
-        draws = Draws(_names("--vary", vary), spread, speed)
-        raise typer.Exit(command(source, named, starts, seed, draws, how, as_json))
+        sampling = Sampling(_names("--vary", vary), spread, speed)
+        raise typer.Exit(command(source, named, starts, seed, sampling, how, as_json))
 
     @app.command(
         name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2"

@@ -18,7 +18,7 @@ from vergence.app.output import SUCCESS, emit, say
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.experiments import CellSource, Comparison, Draws, Score
+    from vergence.experiments import CellSource, Comparison, Sampling, Score
 
 _REMARK = (
     "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
@@ -31,7 +31,7 @@ def compare(
     laws: Sequence[str],
     starts: int,
     seed: int,
-    draws: "Draws",
+    sampling: "Sampling",
     how: Running,
     as_json: bool,
 ) -> int:
@@ -42,17 +42,17 @@ def compare(
         laws: their names; those that suit the cell if there are none.
         starts: how many each.
         seed: of the draws.
-        draws: what is drawn for each.
+        sampling: what is drawn for each.
         how: to run it.
         as_json: whether to answer with one JSON object.
     """
     from vergence.experiments import Comparison, start_trials, usual_laws
 
     cell = source.load()
-    trials = start_trials(cell, laws or usual_laws(cell), starts, seed, draws)
+    trials = start_trials(cell, laws or usual_laws(cell), starts, seed, sampling)
     found = Comparison(run(source, trials, how))
     data = write_table(how.folder / "compare.csv", found.runs)
-    remark = _REMARK.format(drawn=", ".join(draws.vary), motion=how.motion)
+    remark = _REMARK.format(drawn=", ".join(sampling.vary), motion=how.motion)
     report = _write_page(source, found, how, remark)
     if as_json:
         answer = {"command": "compare", "cell": cell.name, "starts": starts, "seed": seed}
@@ -86,12 +86,12 @@ def _write_page(
     remark: str,
 ) -> "Path":
     from vergence.app.figures.endings import scores_figure, starts_figure
-    from vergence.experiments import Aim
+    from vergence.experiments import Goal
 
     cell = source.load()
-    aim = Aim.of(cell)
-    count = len(aim.desired_px)
-    middle = tuple(sum(row[axis] for row in aim.desired_px) / count for axis in (0, 1))
+    goal = Goal.of(cell)
+    count = len(goal.desired_px)
+    middle = tuple(sum(row[axis] for row in goal.desired_px) / count for axis in (0, 1))
     size = cell.cameras[cell.task.camera].resolution
     tables = html_table(found.headings, [found.row(score) for score in found.scores])
     parts = [
@@ -108,7 +108,7 @@ def _write_page(
                 starts_figure(found.runs, (middle[0], middle[1]), size),
                 "Each mark is a start, its colour how the run from there ended; the line leads to "
                 "where it ended. Left the camera's place seen from above, right the features' "
-                "middle in the picture, the cross where it should be.",
+                "middle in the image, the cross where it should be.",
             ),
         ),
         markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),

@@ -28,7 +28,7 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
 
   vergence run puma560                    an arm follows a moving board; ends with a report to open
   vergence watch puma560                  the same in your browser, as it happens
-  vergence run puma560 --no-images        without pictures, much faster
+  vergence run puma560 --no-images        without images, much faster
   vergence cells                          the cells that come with vergence
   vergence new ARM.urdf --body LAST_LINK  a first cell for an arm of yours
   vergence compare panda                  several laws from the same random starts

@@ -41,17 +41,17 @@ def map_region(source: "CellSource", region: Region, how: Running, as_json: bool
     cell = source.load()
     results = run(source, _trials(cell, region), how)
     data = write_table(how.folder / "map.csv", results)
-    report, picture = _write_page(cell, region, results, how)
+    report, image = _write_page(cell, region, results, how)
     found = scores(results)
     if as_json:
         answer = {"command": "map", "cell": cell.name, "over": region.over}
-        files = {"run": how.folder, "data": data, "picture": picture, "report": report}
+        files = {"run": how.folder, "data": data, "image": image, "report": report}
         emit({**answer, "laws": [_as_json(score) for score in found], **files})
         return SUCCESS
     for score in found:
         say(f"{cell.name}, law {score.law}: {_in_words(score)}")
     say(f"  report   {report}")
-    say(f"  picture  {picture}")
+    say(f"  image  {image}")
     say(f"  data     {data}")
     return SUCCESS
 
@@ -91,9 +91,9 @@ def _write_page(
     from vergence.drawing import save
     from vergence.experiments import OWN, scores
 
-    panels, caption, name = _picture(cell, region, results)
-    picture = how.folder / "map.png"
-    save(panels.figure, picture)
+    panels, caption, name = _image(cell, region, results)
+    image = how.folder / "map.png"
+    save(panels.figure, image)
     rows = [[score.law, _in_words(score)] for score in scores(results)]
     parts = [
         markup.section("Where it works", markup.figure(panels, caption)),
@@ -107,10 +107,10 @@ def _write_page(
         f"{len(results)} runs on exact projections; {how.motion}; converged: every feature within "
         f"{how.tolerance_px:g} px at the end."
     )
-    return write_page(how.folder, "vergence map", title, remark, parts), picture
+    return write_page(how.folder, "vergence map", title, remark, parts), image
 
 
-def _picture(
+def _image(
     cell: "Cell", region: Region, results: "Sequence[TrialResult]"
 ) -> "tuple[Panels, str, str]":
     """Return the image, what it shows, and what a run is called."""

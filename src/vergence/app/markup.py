@@ -31,10 +31,10 @@ def data_url(data: bytes, kind: str) -> str:
 
 def figure(panels: Panels | None, caption: str) -> str:
     """Return a figure with its caption; empty without a figure."""
-    return picture(svg(panels.figure), "image/svg+xml", caption) if panels else ""
+    return image(svg(panels.figure), "image/svg+xml", caption) if panels else ""
 
 
-def picture(data: bytes, kind: str, caption: str) -> str:
+def image(data: bytes, kind: str, caption: str) -> str:
     """Return an image with its caption."""
     text = escape(caption)
     return (

@@ -53,7 +53,7 @@ position_m = {camera_m}  # in the last body: z looks ahead, x right, y down
 rotation_rpy_deg = {camera_rpy}
 {lens}
 rate_hz = 30.0
-latency_frames = 1  # from exposure until the picture arrives
+latency_frames = 1  # from exposure until the image arrives
 
 [target]
 model = "board.xml"
@@ -70,7 +70,7 @@ start_s = 1.0
 kind = "track"
 arm = "arm"
 camera = "wrist"
-feature_count = 4  # picked in the first picture
+feature_count = 4  # picked in the first image
 
 [law]
 kind = "image_based"  # joint limits, view and singularities are kept by the default solver

@@ -20,7 +20,7 @@ Images = Annotated[
     bool, typer.Option("--images/--no-images", help="Look at rendered images, or project.")
 ]
 ImageEvery = Annotated[
-    int, typer.Option(min=0, help="Record every n-th picture of a camera; 0 records none.")
+    int, typer.Option(min=0, help="Record every n-th image of a camera; 0 records none.")
 ]
 Settings = Annotated[
     list[str] | None,

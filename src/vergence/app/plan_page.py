@@ -75,7 +75,7 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
     for name, (drawing, caption) in drawn.items():
         file = folder / f"{name}.svg"
         save(drawing, file)
-        figures.append(markup.picture(file.read_bytes(), "image/svg+xml", caption))
+        figures.append(markup.image(file.read_bytes(), "image/svg+xml", caption))
     return figures
 
 

@@ -20,7 +20,7 @@ from vergence.app.figures import (
     twist_figure,
 )
 from vergence.app.marks_legend import marks_legend
-from vergence.app.pictures import film, key_frames
+from vergence.app.recorded_images import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.places import RECORDING
 from vergence.runtime.recording import Recording
@@ -120,7 +120,7 @@ def _images(run: Run, camera: str) -> str:
     if not (isinstance(run, Recording) and frames):
         return ""
     stills = "".join(
-        markup.picture(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
+        markup.image(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
     )
     player = markup.film(film(run, camera), poster=frames[0].jpeg)
     return f'{player}{marks_legend(run.cameras[camera])}<div class="frames">{stills}</div>'
@@ -151,7 +151,9 @@ def _is_stationary(trace: CameraTrace | None) -> bool:
 def _arm(run: Run, name: str) -> str:
     arm, trace = run.info.arms[name], run.arms[name]
     fixed = _is_stationary(run.cameras.get(run.info.task_camera))
-    camera = "the fixed camera as seen from the hand" if fixed else "the camera in its own frame"
+    camera = (
+        "the fixed camera as seen from the end effector" if fixed else "the camera in its own frame"
+    )
     return markup.section(
         f"Arm {name}",
         _figure(

@@ -114,10 +114,10 @@ def _answer(name: str, result: "Run", folder: Path, report: Path) -> Mapping[str
 def _tell(result: "Run", folder: Path, report: Path) -> None:
     summary = result.summary
     say(str(result.outcome))
-    off_mm = 1e3 * summary.get("final_hand_error_m", 0.0)
-    off_deg = summary.get("final_hand_error_deg", 0.0)
+    off_mm = 1e3 * summary.get("final_pose_error_m", 0.0)
+    off_deg = summary.get("final_pose_error_deg", 0.0)
     words = [
-        (f"off the desired pose {off_mm:.2f} mm, {off_deg:.2f}°", "final_hand_error_m"),
+        (f"off the desired pose {off_mm:.2f} mm, {off_deg:.2f}°", "final_pose_error_m"),
         (f"final error {summary.get('final_error_px', 0.0):.2f} px", "final_error_px"),
         (f"largest {summary.get('max_error_px', 0.0):.2f} px", "max_error_px"),
         (f"drift {summary.get('max_drift_px', 0.0):.2f} px", "max_drift_px"),

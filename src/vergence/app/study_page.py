@@ -39,4 +39,4 @@ def _header(result: StudyResult, remark: str) -> str:
 
 
 def _figure(figure: Figure) -> str:
-    return markup.picture(figure.path.read_bytes(), _KINDS[figure.path.suffix], figure.caption)
+    return markup.image(figure.path.read_bytes(), _KINDS[figure.path.suffix], figure.caption)

@@ -36,7 +36,7 @@ def run_rows(run: Run) -> list[Row]:
 
 def camera_rows(trace: CameraTrace) -> list[Row]:
     """Return how well a camera's points were followed."""
-    rows = [Row("pictures", str(len(trace.time)))]
+    rows = [Row("images", str(len(trace.time)))]
     if asked := np.count_nonzero(trace.asked):
         share = np.count_nonzero(trace.found & trace.asked) / asked
         note = "" if trace.asked.all() else "of those looked for"
@@ -45,13 +45,13 @@ def camera_rows(trace: CameraTrace) -> list[Row]:
         rows.insert(1, Row("looked into", str(looked), "", "of the others no corner was chosen"))
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
-        rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last picture"))
+        rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last image"))
         rows.append(Row("largest error", f"{error.max():.2f}", "px"))
     if len(drift):
         rows.append(Row("largest drift", f"{drift.max():.2f}", "px", "tracked against true"))
     if len(trace.time):
         late = 1e3 * float(np.median(trace.received - trace.time))
-        rows.append(Row("age of a picture", f"{late:.0f}", "ms", "median, when the loop had it"))
+        rows.append(Row("age of an image", f"{late:.0f}", "ms", "median, when the loop had it"))
     return rows
 
 

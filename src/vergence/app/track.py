@@ -13,7 +13,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from vergence.app.tracking.follower import ObjectFollower, Step
-    from vergence.app.tracking.footage import Footage, Picture
+    from vergence.app.tracking.footage import Footage, FootageFrame
     from vergence.camera import Camera
     from vergence.vision.known_object import ObjectModel
 
@@ -46,7 +46,7 @@ class Tracked(NamedTuple):
     """How it went."""
 
     outcome: Outcome
-    pictures: int
+    frames: int
     seen: int
     last: "Step"
     deviation_max_m: float  # largest standard deviation of the position while seen
@@ -61,14 +61,14 @@ def track(request: Request, out: Path | None, as_json: bool) -> int:
 
     model = load_object_model(request.model, request.scale)
     footage = open_footage(request.images, request.rate_hz)
-    pictures = footage.pictures()
-    first = next(pictures)
+    frames = footage.frames()
+    first = next(frames)
     camera = _camera(request, first)
     follower = _follower(request, model, camera, footage)
     folder = out or new_folder(f"track-{Path(request.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
     run = _Run(folder, footage, model, camera, follower, request.overlay)
-    tracked = run.through(first, pictures)
+    tracked = run.through(first, frames)
     files = run.files()
     if as_json:
         emit(_answer(request, tracked, files, folder))
@@ -77,7 +77,7 @@ def track(request: Request, out: Path | None, as_json: bool) -> int:
     return SUCCESS if tracked.outcome.succeeded else FAILURE
 
 
-def _camera(request: Request, first: "Picture") -> "Camera":
+def _camera(request: Request, first: "FootageFrame") -> "Camera":
     from vergence.app.tracking.intrinsics import camera_of_options
     from vergence.camera import read_camera
     from vergence.errors import InputError
@@ -148,7 +148,7 @@ class _Run:
             "key_frames": self._key_frames,
         }
 
-    def through(self, first: "Picture", rest: Any) -> Tracked:
+    def through(self, first: "FootageFrame", rest: Any) -> Tracked:
         """Follow the object to the end of the footage, or until it is lost."""
         from itertools import chain
 
@@ -160,30 +160,32 @@ class _Run:
         progress = bar("{task.completed} / {task.total}")
         task = progress.add_task("prepare", total=self._footage.count or None)
         with progress, self._poses as poses, self._film:
-            for number, picture in enumerate(chain((first,), rest)):
+            for number, frame in enumerate(chain((first,), rest)):
                 began = perf_counter()
-                step = self._follower.follow(picture.image, picture.time)
+                step = self._follower.follow(frame.image, frame.time)
                 took.append(perf_counter() - began)
-                poses.add(Path(picture.name).name, step)
-                self._draw(number, picture, step, steps[-1] if steps else None)
+                poses.add(Path(frame.name).name, step)
+                self._draw(number, frame, step, steps[-1] if steps else None)
                 steps.append(replace(step, **_NO_SAMPLES))  # a long film must fit in memory
                 progress.update(task, completed=number + 1, description="track")
                 if step.sighting is Sighting.LOST:
                     break
-            self._key_frame(len(steps) - 1, picture, step)
+            self._key_frame(len(steps) - 1, frame, step)
         return _summary(steps, took)
 
-    def _draw(self, number: int, picture: "Picture", step: "Step", before: "Step | None") -> None:
+    def _draw(
+        self, number: int, frame: "FootageFrame", step: "Step", before: "Step | None"
+    ) -> None:
         from vergence.app.tracking.drawing import draw_step
 
         if self._overlay:
-            self._film.add(draw_step(picture.image, step, self._model, self._camera))
+            self._film.add(draw_step(frame.image, step, self._model, self._camera))
         spacing = max(1, (self._footage.count or 600) // _KEY_FRAMES)
         changed = before is not None and before.sighting is not step.sighting
         if number % spacing == 0 or changed:
-            self._key_frame(number, picture, step)
+            self._key_frame(number, frame, step)
 
-    def _key_frame(self, number: int, picture: "Picture", step: "Step") -> None:
+    def _key_frame(self, number: int, frame: "FootageFrame", step: "Step") -> None:
         import cv2
 
         from vergence.app.tracking.drawing import draw_step
@@ -192,7 +194,7 @@ class _Run:
         if not self._overlay or path in self._key_frames:
             return
         if len(self._key_frames) < _MOST_KEY_FRAMES:
-            canvas = draw_step(picture.image, step, self._model, self._camera)
+            canvas = draw_step(frame.image, step, self._model, self._camera)
             path.write_bytes(bytes(cv2.imencode(".jpg", canvas)[1]))
             self._key_frames.append(path)
 
@@ -221,7 +223,7 @@ def _outcome(steps: "list[Step]") -> Outcome:
     last = steps[-1]
     if last.sighting is Sighting.SEEN:
         held = sum(step.sighting is Sighting.SEEN for step in steps)
-        reason = f"the object was seen in {held} of {len(steps)} pictures, the last among them"
+        reason = f"the object was seen in {held} of {len(steps)} images, the last among them"
         return Outcome(OutcomeKind.COMPLETED, reason, last.time)
     reason = f"not seen at the end: {last.reason}"
     if last.sighting is Sighting.LOST:
@@ -246,7 +248,7 @@ def _answer(
             "reason": outcome.reason,
             "time": outcome.time,
         },
-        "pictures": tracked.pictures,
+        "frames": tracked.frames,
         "seen": tracked.seen,
         "position_deviation_max_m": tracked.deviation_max_m,
         "rotation_deviation_max_deg": float(np.rad2deg(tracked.deviation_max_rad)),
@@ -260,9 +262,9 @@ def _answer(
 def _tell(tracked: Tracked, files: Mapping[str, Any], folder: Path) -> None:
     say(str(tracked.outcome))
     say(
-        f"  seen in {tracked.seen} of {tracked.pictures} pictures · standard deviation up to "
+        f"  seen in {tracked.seen} of {tracked.frames} images · standard deviation up to "
         f"{1e3 * tracked.deviation_max_m:.2g} mm, {np.rad2deg(tracked.deviation_max_rad):.2g}° · "
-        f"{tracked.median_ms:.1f} ms a picture"
+        f"{tracked.median_ms:.1f} ms an image"
     )
     say(f"  poses    {files['poses']}  (with covariances: {files['poses_with_covariance'].name})")
     if files["overlay"]:

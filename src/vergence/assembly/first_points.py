@@ -65,7 +65,7 @@ def _exact_points(
         missing = np.flatnonzero(~view.found)
         if _are_known(context, camera):
             raise _out_of_sight(context, key, camera, missing)
-        given = f"at the start it does not fill the middle of camera {camera}'s picture: "
+        given = f"at the start it does not fill the middle of camera {camera}'s image: "
         given += _whereabouts(context, camera)
         source = str(context.cell.path)
         raise InputError(source, "target", given, "features, or a start before it")
@@ -141,7 +141,7 @@ def _reason(context: LawContext, camera: str, missing: IntArray) -> str:
     points = context.features_in_camera(camera)[missing]
     points = points[(points[:, 2] > 1e-3) & context.cameras[camera].in_view(points)]
     if not len(points):
-        return ", which is out of its picture"
+        return ", which is out of its image"
     in_world = transform_points(context.model.camera_pose(camera), points)
     return f"; in the way: {', '.join(context.model.in_the_way(camera, in_world))}"
 
@@ -156,7 +156,7 @@ def _pick(context: LawContext, camera: str, image: ImageArray) -> FloatArray:
             str(context.cell.path),
             "task.feature_count",
             task.feature_count,
-            f"at most {len(points)}: no more good features of the target are in the first picture",
+            f"at most {len(points)}: no more good features of the target are in the first image",
         )
     return points[: task.feature_count]
 

@@ -13,7 +13,6 @@ from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
-    HandPose,
     HeldTarget,
     IndexSelection,
     InformationSelection,
@@ -23,8 +22,9 @@ from vergence.estimation import (
     PosePerception,
     TargetFilter,
     TargetShape,
-    blocked_from_hand,
-    seen_from_hand,
+    TipPose,
+    blocked_from_tip,
+    seen_from_tip,
 )
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.loading import asking
@@ -100,8 +100,8 @@ def follow_pose(
         start,
         **parts,
     )
-    hand_pose = surroundings.hand_pose
-    return perception if hand_pose is None else HeldTarget(perception, hand_pose)
+    tip_pose = surroundings.tip_pose
+    return perception if tip_pose is None else HeldTarget(perception, tip_pose)
 
 
 def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure:
@@ -126,26 +126,26 @@ class Surroundings(NamedTuple):
     camera_pose: CameraPose
     blocked_at: Callable[[Joints], Blocked]
     start: FloatArray  # (4, 4) the target's pose as well as it is known
-    hand_pose: HandPose | None  # where that frame is in the world, if it is the arm's hand
+    tip_pose: TipPose | None  # where that frame is in the world, if it is the arm's tip
 
 
 def _surroundings(context: LawContext) -> Surroundings:
-    """Return the cell around the target: in the hand's frame if the task's arm holds it."""
+    """Return the cell around the target: in the tip's frame if the task's arm holds it."""
     camera_pose, blocked_at = camera_poses(context), _blocked_at(context)
     start, arm = context.model.target_pose(), context.cell.task.arm
     if context.cell.target.carried_by != arm:
         return Surroundings(camera_pose, blocked_at, start, None)
     chain = context.arm_to_target.chain
 
-    def hand_pose(joints: Joints) -> FloatArray:
-        T_world_hand: FloatArray = forward_kinematics(chain, joints[arm])
-        return T_world_hand
+    def tip_pose(joints: Joints) -> FloatArray:
+        T_world_tip: FloatArray = forward_kinematics(chain, joints[arm])
+        return T_world_tip
 
     return Surroundings(
-        seen_from_hand(camera_pose, hand_pose),
-        blocked_from_hand(blocked_at, hand_pose),
-        se3_compose(se3_inverse(hand_pose(context.joints)), start),
-        hand_pose,
+        seen_from_tip(camera_pose, tip_pose),
+        blocked_from_tip(blocked_at, tip_pose),
+        se3_compose(se3_inverse(tip_pose(context.joints)), start),
+        tip_pose,
     )
 
 

@@ -176,7 +176,7 @@ class Camera:
             return self
         border = np.concatenate(self._sides(0.0))
         if not self._is_one_to_one(border):
-            allowed = "coefficients that map the picture one-to-one"
+            allowed = "coefficients that map the image one-to-one"
             raise InputError("Camera", "distortion", self.distortion.tolist(), allowed)
         low = np.floor(border.min(axis=0) * self.focal_px) - 1.0
         high = np.ceil(border.max(axis=0) * self.focal_px) + 1.0

@@ -266,7 +266,7 @@ def _check_names(cell: Cell) -> None:
 
 
 def _check_tool(cell: Cell, tool: ToolTable) -> None:
-    """Refuse a tool that is not seen as it should be: by a fixed camera, beside one in the hand."""
+    """Refuse a tool that is not seen as it should be: by a fixed camera, beside one on the arm."""
 
     def refuse(key: str, given: str, allowed: str) -> None:
         raise InputError(str(cell.path), key, given, allowed)

@@ -9,7 +9,7 @@ from vergence.drivers.arm_link import ArmLink, ArmReading
 from vergence.drivers.camera_source import CameraSource, OpenCamera
 from vergence.drivers.equipment import Equipment
 from vergence.drivers.local_cameras import LocalCameras
-from vergence.drivers.optional_package import optional_package
+from vergence.optional_package import optional_package
 
 __all__ = [
     "ArmDriver",

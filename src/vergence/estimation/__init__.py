@@ -5,10 +5,10 @@ from vergence.estimation.consistency import Consistency
 from vergence.estimation.corner_view import CornerView
 from vergence.estimation.fit_pose import fit_pose
 from vergence.estimation.held_target import (
-    HandPose,
     HeldTarget,
-    blocked_from_hand,
-    seen_from_hand,
+    TipPose,
+    blocked_from_tip,
+    seen_from_tip,
 )
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
@@ -27,7 +27,7 @@ from vergence.estimation.tracked_points import TrackedPoints
 from vergence.estimation.view import Exposure, Seen, View, view_of
 from vergence.estimation.visibility import (
     Blocked,
-    Sight,
+    ViewStatus,
     Visibility,
     add_obstacles,
     predict_visibility,
@@ -45,7 +45,7 @@ __all__ = [
     "Exposure",
     "FilterHistory",
     "Find",
-    "HandPose",
+    "TipPose",
     "HeldTarget",
     "IndexSelection",
     "InformationSelection",
@@ -60,7 +60,7 @@ __all__ = [
     "RpyPoseFilter",
     "Seen",
     "Selection",
-    "Sight",
+    "ViewStatus",
     "TargetBelief",
     "TargetFilter",
     "TargetShape",
@@ -71,10 +71,10 @@ __all__ = [
     "Visibility",
     "WindowRule",
     "add_obstacles",
-    "blocked_from_hand",
+    "blocked_from_tip",
     "fit_pose",
     "pose_from_points",
     "predict_visibility",
-    "seen_from_hand",
+    "seen_from_tip",
     "view_of",
 ]

@@ -1,4 +1,4 @@
-"""A target in an arm's hand, followed in the hand's frame: there it stands still."""
+"""A target that an arm holds, followed in the frame of the arm's tip, where it hardly moves."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,23 +13,23 @@ from vergence.estimation.visibility import Blocked
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, Observation, TargetState
 
-HandPose: TypeAlias = Callable[[Joints], FloatArray]  # joints to T_world_hand (4, 4)
+TipPose: TypeAlias = Callable[[Joints], FloatArray]  # joints to T_world_tip (4, 4)
 
 
 class HeldTarget:
     """Follows a target that an arm holds, with cameras that do not move with it.
 
-    The filter works in the frame of the hand, in which the target hardly moves and the cameras do,
+    The filter works in the frame of the tip, in which the target hardly moves and the cameras do,
     as the joints tell: what the arm does is known and need not be estimated. What is handed on is
-    the target in the world again, with the pose of the hand.
+    the target in the world again, with the pose of the tip.
 
     Args:
-        perception: set up in the hand's frame, see `seen_from_hand` and `blocked_from_hand`.
-        hand_pose: gives T_world_hand (4, 4) from the joints at the exposure.
+        perception: set up in the tip's frame, see `seen_from_tip` and `blocked_from_tip`.
+        tip_pose: gives T_world_tip (4, 4) from the joints at the exposure.
     """
 
-    def __init__(self, perception: PosePerception[Any], hand_pose: HandPose) -> None:
-        self._perception, self._hand_pose = perception, hand_pose
+    def __init__(self, perception: PosePerception[Any], tip_pose: TipPose) -> None:
+        self._perception, self._tip_pose = perception, tip_pose
 
     @property
     def lost(self) -> str:
@@ -43,28 +43,28 @@ class HeldTarget:
             return observation
         newest = max(frames, key=lambda frame: frame.time)
         held = replace(observation.target, time=newest.time)
-        return replace(observation, target=_in_world(held, self._hand_pose(newest.joints)))
+        return replace(observation, target=_in_world(held, self._tip_pose(newest.joints)))
 
 
-def seen_from_hand(camera_pose: CameraPose, hand_pose: HandPose) -> CameraPose:
+def seen_from_tip(camera_pose: CameraPose, tip_pose: TipPose) -> CameraPose:
     """Return the function that gives T_hand_camera (4, 4) where the other gives T_world_camera."""
 
     def pose(camera: str, joints: Joints) -> FloatArray:
         T_hand_camera: FloatArray = se3_compose(
-            se3_inverse(hand_pose(joints)), camera_pose(camera, joints)
+            se3_inverse(tip_pose(joints)), camera_pose(camera, joints)
         )
         return T_hand_camera
 
     return pose
 
 
-def blocked_from_hand(
-    blocked_at: Callable[[Joints], Blocked], hand_pose: HandPose
+def blocked_from_tip(
+    blocked_at: Callable[[Joints], Blocked], tip_pose: TipPose
 ) -> Callable[[Joints], Blocked]:
-    """Return what tells, of an eye and points in the hand's frame, which points are hidden."""
+    """Return what tells, of an eye and points in the tip's frame, which points are hidden."""
 
     def at(joints: Joints) -> Blocked:
-        T, blocked = hand_pose(joints), blocked_at(joints)
+        T, blocked = tip_pose(joints), blocked_at(joints)
 
         def hidden(eye: FloatArray, points: FloatArray) -> BoolArray:
             return blocked(T[:3, :3] @ eye + T[:3, 3], transform_points(T, points))
@@ -74,14 +74,14 @@ def blocked_from_hand(
     return at
 
 
-def _in_world(held: TargetState, T_world_hand: FloatArray) -> TargetState:
-    """Turn what is known in the hand's frame into world axes."""
-    turn = np.kron(np.eye(4), T_world_hand[:3, :3])
+def _in_world(held: TargetState, T_world_tip: FloatArray) -> TargetState:
+    """Turn what is known in the tip's frame into world axes."""
+    turn = np.kron(np.eye(4), T_world_tip[:3, :3])
     return TargetState(
         held.time,
-        se3_compose(T_world_hand, held.T_world_target),
+        se3_compose(T_world_tip, held.T_world_target),
         turn[:6, :6] @ held.velocity,
         turn @ held.covariance @ turn.T,
         held.consistent,
-        T_world_hand,
+        T_world_tip,
     )

@@ -10,7 +10,7 @@ from vergence.estimation.target_filter import (
     TargetFilter,
     Update,
     Verdict,
-    of_each_picture,
+    of_each_image,
     unused,
 )
 from vergence.estimation.view import Seen, View, together
@@ -103,7 +103,7 @@ class FilterHistory(Generic[B]):
             update = self.filter.update(belief, seen)
             belief = update.belief
             entries.append(_Entry(time, there, seen, belief))
-            for view, part in zip(there, of_each_picture(update, there), strict=True):
+            for view, part in zip(there, of_each_image(update, there), strict=True):
                 made[time, view.camera] = part
         return self._pruned(entries), made
 

@@ -16,7 +16,7 @@ class Expected(NamedTuple):
     certain: bool  # whether the filter is consistent
 
 
-class Picture(NamedTuple):
+class PredictedFrame(NamedTuple):
     """An image with what is expected of it."""
 
     frame: Frame

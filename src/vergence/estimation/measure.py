@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.estimation.looks import Look
-from vergence.estimation.visibility import SightArray
+from vergence.estimation.visibility import StatusArray
 from vergence.signals import Frame, ImagePoints, SearchWindows
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
@@ -17,10 +17,10 @@ CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
 # find(frame) -> all features of the target wherever they are in the image, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
-UNSEEN = (  # a reason for each `Sight`
+UNSEEN = (  # a reason for each `ViewStatus`
     "not chosen",
     "behind the camera",
-    "outside the picture",
+    "outside the image",
     "turned away",
     "hidden by the target itself",
     "something in the way",
@@ -51,7 +51,7 @@ class Measure(Protocol):
 
 
 def nothing_measured(
-    camera: str, time: float, expected_px: FloatArray, sight: SightArray, widest_px: float
+    camera: str, time: float, expected_px: FloatArray, status: StatusArray, widest_px: float
 ) -> ImagePoints:
     """Return image points of all M features of an image that was not looked at.
 
@@ -59,10 +59,10 @@ def nothing_measured(
         camera: whose image.
         time: of its exposure, s.
         expected_px: predicted places, (M, 2).
-        sight: a `Sight` each, (M,).
+        status: a `ViewStatus` each, (M,).
         widest_px: half the widest window.
     """
-    reasons = tuple([UNSEEN[value] for value in sight.tolist()])
+    reasons = tuple([UNSEEN[value] for value in status.tolist()])
     none = np.zeros(len(reasons), dtype=np.bool_)
     covariance = np.zeros((len(reasons), 2, 2))
     covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
@@ -75,7 +75,7 @@ def spread_out(
     look: Look,
     kept: IntArray,
     expected_px: FloatArray,
-    sight: SightArray,
+    status: StatusArray,
     widest_px: float,
 ) -> ImagePoints:
     """Return image points of all M features from those K that were measured.
@@ -87,14 +87,14 @@ def spread_out(
         look: what was measured, K points.
         kept: numbers of the features that agree with the pose.
         expected_px: predicted places, (M, 2).
-        sight: a `Sight` each, (M,).
+        status: a `ViewStatus` each, (M,).
         widest_px: half the widest window.
     """
     found, features = look.found, look.features
     places = expected_px.copy()
     covariance = np.zeros((len(places), 2, 2))
     covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
-    reasons = [UNSEEN[value] for value in sight.tolist()]
+    reasons = [UNSEEN[value] for value in status.tolist()]
     seen = np.zeros(len(places), dtype=np.bool_)
     seen[kept] = True
     agreeing = seen[features]

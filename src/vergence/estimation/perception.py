@@ -6,9 +6,10 @@ from typing import Generic
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.camera.lens import HEIGHT, WIDTH
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
-from vergence.estimation.looks import Expected, Look, Picture
+from vergence.estimation.looks import Expected, Look, PredictedFrame
 from vergence.estimation.measure import (
     CameraPose,
     Find,
@@ -20,7 +21,7 @@ from vergence.estimation.measure import (
 )
 from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
-from vergence.estimation.rig import HEIGHT, WIDTH, CameraRig, normalized_noise
+from vergence.estimation.rig import CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.target_filter import B, TargetFilter, Verdict
 from vergence.estimation.target_shape import TargetShape
@@ -120,20 +121,22 @@ class PosePerception(Generic[B]):
         if not known:
             return None
         beliefs = {time: self._expected(time) for time in {frame.time for frame in known}}
-        pictures = [
+        predictions = [
             self._expect(frame, beliefs[frame.time])
             for frame in sorted(known, key=lambda f: (f.time, f.camera))
         ]
-        visibility = self._see(pictures)
-        chosen = self._choose(pictures, visibility)
+        visibility = self._see(predictions)
+        chosen = self._choose(predictions, visibility)
         looks = [
-            self._look(pictures[n], n, chosen[n], visibility.points_px[n])
+            self._look(predictions[n], n, chosen[n], visibility.points_px[n])
             for n in np.flatnonzero(chosen.any(axis=1)).tolist()  # no other is even touched
         ]
         agreeing = self._correct(looks)
-        time = pictures[-1].frame.time
-        self._judge(time, [look.view for look in looks], [picture.frame for picture in pictures])
-        points = self._points(pictures, visibility, looks, agreeing)
+        time = predictions[-1].frame.time
+        self._judge(
+            time, [look.view for look in looks], [prediction.frame for prediction in predictions]
+        )
+        points = self._points(predictions, visibility, looks, agreeing)
         return Observation(time, points, None if self._lost else self.belief.state())
 
     def _expected(self, time: float) -> Expected:
@@ -142,66 +145,68 @@ class PosePerception(Generic[B]):
         certain = belief.consistency.holds and doubt < DOUBT
         return Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
 
-    def _expect(self, frame: Frame, expected: Expected) -> Picture:
+    def _expect(self, frame: Frame, expected: Expected) -> PredictedFrame:
         require_size(frame, self._rig)
         number = self._rig.numbers[frame.camera]
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
-        return Picture(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
+        return PredictedFrame(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
 
-    def _see(self, pictures: list[Picture]) -> Visibility:
+    def _see(self, predictions: list[PredictedFrame]) -> Visibility:
         T_camera_target = np.array(
-            [se3_compose(p.T_camera_world, p.T_world_target) for p in pictures]
+            [se3_compose(p.T_camera_world, p.T_world_target) for p in predictions]
         )
         visibility = predict_visibility(
             self._shape,
             T_camera_target,
-            self._rig.lenses[[p.number for p in pictures]],
+            self._rig.lenses[[p.number for p in predictions]],
             margin_px=self._settings.margin_px,
             least_cosine=self._settings.least_cosine,
         )
         if self._blocked_at is not None:
-            for sight, p in zip(visibility.sight, pictures, strict=True):
+            for status, p in zip(visibility.status, predictions, strict=True):
                 blocked = self._blocked_at(p.frame.joints)
                 world = transform_points(p.T_world_target, self._shape.points)
-                add_obstacles(sight, blocked, p.T_world_camera[:3, 3], world)
+                add_obstacles(status, blocked, p.T_world_camera[:3, 3], world)
         return visibility
 
-    def _choose(self, pictures: list[Picture], visibility: Visibility) -> BoolArray:
+    def _choose(self, predictions: list[PredictedFrame], visibility: Visibility) -> BoolArray:
         if self._lost:
             return visibility.visible
         none = np.zeros(len(self._shape.points), dtype=np.bool_)
-        numbers = [p.number for p in pictures]
+        numbers = [p.number for p in predictions]
         chosen = self._selection.choose(
             Candidates(
                 visibility.visible,
                 visibility.points_px,
                 self._shape.points,
-                np.array([p.T_world_target for p in pictures]),
-                np.array([p.T_camera_world for p in pictures]),
+                np.array([p.T_world_target for p in predictions]),
+                np.array([p.T_camera_world for p in predictions]),
                 self._noise[numbers],
                 self._diagonal[numbers],
-                np.ascontiguousarray(pictures[-1].covariance[:6, :6]),
-                np.array([self._held.get(p.frame.camera, none) for p in pictures]),
+                np.ascontiguousarray(predictions[-1].covariance[:6, :6]),
+                np.array([self._held.get(p.frame.camera, none) for p in predictions]),
             ),
-            self._settings.budget if pictures[-1].certain else self._settings.budget_in_doubt,
+            self._settings.budget if predictions[-1].certain else self._settings.budget_in_doubt,
         )
-        for picture, mask in zip(pictures, chosen, strict=True):
-            self._held[picture.frame.camera] = mask
+        for prediction, mask in zip(predictions, chosen, strict=True):
+            self._held[prediction.frame.camera] = mask
         return chosen
 
-    def _look(self, picture: Picture, n: int, chosen: BoolArray, expected: FloatArray) -> Look:
+    def _look(
+        self, prediction: PredictedFrame, n: int, chosen: BoolArray, expected: FloatArray
+    ) -> Look:
         """Measure the features chosen inside windows."""
         features = np.flatnonzero(chosen)
-        half_px = self._half_sizes(picture, features)
+        half_px = self._half_sizes(prediction, features)
         found = self._measure(
-            picture.frame,
+            prediction.frame,
             features,
             expected[features],
             half_px,
-            se3_compose(picture.T_camera_world, picture.T_world_target),
+            se3_compose(prediction.T_camera_world, prediction.T_world_target),
         )
-        camera = self._rig.cameras[picture.number]
-        view = view_of(found, camera, picture.T_world_camera, self._shape.points, features)
+        camera = self._rig.cameras[prediction.number]
+        view = view_of(found, camera, prediction.T_world_camera, self._shape.points, features)
         return Look(n, features, half_px, found, view)
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
@@ -216,37 +221,37 @@ class PosePerception(Generic[B]):
 
     def _points(
         self,
-        pictures: list[Picture],
+        predictions: list[PredictedFrame],
         visibility: Visibility,
         looks: list[Look],
         agreeing: list[IntArray],
     ) -> tuple[ImagePoints, ...]:
         """Say what became of every feature; of a target that is lost, none is found."""
-        expected, sight, widest = visibility.points_px, visibility.sight, self._windows.most_px
+        expected, status, widest = visibility.points_px, visibility.status, self._windows.most_px
         points = {
-            look.number: spread_out(look, kept, expected[look.number], sight[look.number], widest)
+            look.number: spread_out(look, kept, expected[look.number], status[look.number], widest)
             for look, kept in zip(looks, agreeing, strict=True)
         }
-        for n, picture in enumerate(pictures):
+        for n, prediction in enumerate(predictions):
             if n not in points:
-                frame = picture.frame
+                frame = prediction.frame
                 points[n] = nothing_measured(
-                    frame.camera, frame.time, expected[n], sight[n], widest
+                    frame.camera, frame.time, expected[n], status[n], widest
                 )
-        every = (points[n] for n in range(len(pictures)))
+        every = (points[n] for n in range(len(predictions)))
         return tuple(nothing_found(p, self._lost) for p in every) if self._lost else tuple(every)
 
-    def _half_sizes(self, picture: Picture, features: IntArray) -> FloatArray:
+    def _half_sizes(self, prediction: PredictedFrame, features: IntArray) -> FloatArray:
         if self._lost:
             return np.full((len(features), 2), self._windows.most_px)
         spread = innovation_spread(
-            picture.T_world_target,
-            picture.T_camera_world,
+            prediction.T_world_target,
+            prediction.T_camera_world,
             self._shape.points[features],
-            picture.covariance,
+            prediction.covariance,
         )
-        camera, noise = self._rig.cameras[picture.number], self._rig.noise_px[picture.number]
-        scale = 1.0 + self._settings.doubt_widens * picture.doubt
+        camera, noise = self._rig.cameras[prediction.number], self._rig.noise_px[prediction.number]
+        scale = 1.0 + self._settings.doubt_widens * prediction.doubt
         return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
 
     def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:
@@ -257,7 +262,7 @@ class PosePerception(Generic[B]):
                 self._last_seen = belief
             unseen = time - max(belief.seen, self._patience_from)
             if belief.doubts >= self._settings.lost_doubts:
-                self._lost = f"{belief.doubts} pictures in a row contradict the prediction"
+                self._lost = f"{belief.doubts} images in a row contradict the prediction"
             elif unseen > self._settings.lost_after:
                 self._lost = f"not seen for {unseen:.2f} s"
         if self._lost:
@@ -293,4 +298,4 @@ def require_size(frame: Frame, rig: CameraRig) -> None:
     height, width = frame.image.shape[:2]
     if (width, height) != (camera.width, camera.height):
         given, allowed = f"{width} x {height}", f"{camera.width} x {camera.height}, as calibrated"
-        raise InputError(f"camera {frame.camera}", "picture", given, allowed)
+        raise InputError(f"camera {frame.camera}", "image", given, allowed)

@@ -252,7 +252,7 @@ class PoseFilter:
             found.T_world_target,
             found.velocity,
             found.covariance,
-            belief.consistency.add(square, freedom, self.fading**seen.pictures),
+            belief.consistency.add(square, freedom, self.fading**seen.images),
             seen=seen.time,
             disagreeing=disagreeing,
         )
@@ -271,6 +271,6 @@ class PoseFilter:
                 return update._replace(squares=first.squares)
         if belief.disagreeing > 0.5:
             belief = replace(belief, covariance=GROWTH * belief.covariance)
-        doubting = replace(belief, doubts=belief.doubts + seen.pictures)
+        doubting = replace(belief, doubts=belief.doubts + seen.images)
         refused = unused(doubting, seen.size, Verdict.CONTRADICTED)
         return refused._replace(squares=first.squares)

@@ -145,12 +145,12 @@ class RpyPoseFilter:
         disagreeing = fading_share(belief.disagreeing, count, seen.size)
         belief = replace(belief, disagreeing=disagreeing)
         if not count:
-            doubting = replace(belief, doubts=belief.doubts + seen.pictures)
+            doubting = replace(belief, doubts=belief.doubts + seen.images)
             return unused(doubting, seen.size, Verdict.CONTRADICTED)._replace(squares=squares)
         rows = keep_rows(rows, kept)
         rest = compress(rows)
         correction, P, square = joseph_update(P, rows)
-        fading = self.fading**seen.pictures
+        fading = self.fading**seen.images
         consistency = belief.consistency.add(square + rest, 2 * count, fading)
         after = RpyBelief(seen.time, w + correction, P, consistency, seen.time, 0, disagreeing)
         return Update(after, Verdict.USED, kept, squares)

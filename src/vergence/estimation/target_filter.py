@@ -20,7 +20,7 @@ class Verdict(StrEnum):
     RECOVERED = "used after enlarging the covariance"
     CONTRADICTED = "contradicts the prediction"
     EMPTY = "no usable point"
-    REPEATED = "repeats a picture already used"
+    REPEATED = "repeats an image already used"
     TOO_LATE = "older than the history kept"
 
 
@@ -106,7 +106,7 @@ def unused(belief: TargetBelief, size: int, verdict: Verdict) -> Update:
     return Update(belief, verdict, np.zeros(size, np.bool_), np.full(size, np.nan))
 
 
-def of_each_picture(update: Update, views: Sequence[View]) -> list[Update]:
+def of_each_image(update: Update, views: Sequence[View]) -> list[Update]:
     """Return what an update by several images made of each.
 
     An image without a point contributed nothing; one of whose points none was kept, while others

@@ -29,7 +29,7 @@ class View(NamedTuple):
         return len(self.points)
 
     @property
-    def pictures(self) -> int:
+    def images(self) -> int:
         """How many images have points: this one or none."""
         return 1 if len(self.points) else 0
 
@@ -43,7 +43,7 @@ class Exposure(NamedTuple):
     """The points of all images taken at one time, one after the other."""
 
     time: float  # s
-    pictures: int  # how many of them have points
+    images: int  # how many of them have points
     poses: FloatArray  # (M, 4, 4) T_camera_world of each point's camera
     points: FloatArray  # (M, 3) in the target's frame, m
     measured: FloatArray  # (M, 2) normalized coordinates
@@ -83,7 +83,7 @@ def chosen_points(seen: Seen, kept: BoolArray) -> Exposure:
     """
     return Exposure(
         seen.time,
-        seen.pictures,
+        seen.images,
         np.ascontiguousarray(seen.poses[kept]),
         np.ascontiguousarray(seen.points[kept]),
         np.ascontiguousarray(seen.measured[kept]),

@@ -14,16 +14,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.estimation.rig import in_picture, lens_pixel
+from vergence.camera.lens import in_image, is_one_to_one, pixel_of
 from vergence.estimation.target_shape import TargetShape
 from vergence.geometry import se3_inverse, transform_points
 
-SightArray: TypeAlias = NDArray[np.uint8]  # a `Sight` each
+StatusArray: TypeAlias = NDArray[np.uint8]  # a `ViewStatus` each
 # blocked(origin (3,), points (N, 3)) -> (N,): whether something stands between, world frame, m.
 Blocked: TypeAlias = Callable[[FloatArray, FloatArray], BoolArray]
 
 
-class Sight(IntEnum):
+class ViewStatus(IntEnum):
     """Why a feature is or is not seen."""
 
     VISIBLE = 0
@@ -34,20 +34,22 @@ class Sight(IntEnum):
     BLOCKED = 5  # behind something else
 
 
-VISIBLE, BEHIND, OUTSIDE, TURNED_AWAY, HIDDEN = (int(s) for s in list(Sight)[:5])  # for kernels
+VISIBLE, BEHIND, OUTSIDE, TURNED_AWAY, HIDDEN = (
+    int(s) for s in list(ViewStatus)[:5]
+)  # for kernels
 
 
 class Visibility(NamedTuple):
     """What every camera is expected to see of every feature."""
 
-    sight: SightArray  # (C, M)
+    status: StatusArray  # (C, M)
     points_px: FloatArray  # (C, M, 2) predicted places, px
     depth: FloatArray  # (C, M) along the optical axis, m
 
     @property
     def visible(self) -> BoolArray:
         """The features that are seen, (C, M)."""
-        seen: BoolArray = self.sight == Sight.VISIBLE
+        seen: BoolArray = self.status == ViewStatus.VISIBLE
         return seen
 
 
@@ -106,8 +108,8 @@ def see(
     touching: float,
     margin_px: float,
     least_cosine: float,
-) -> tuple[SightArray, FloatArray, FloatArray]:
-    """Return sight (C, M), places (C, M, 2) and depth (C, M) without what else is in the way.
+) -> tuple[StatusArray, FloatArray, FloatArray]:
+    """Return status (C, M), places (C, M, 2) and depth (C, M) without what else is in the way.
 
     Args:
         T_camera_target: predicted pose of the target in each camera, (C, 4, 4).
@@ -121,7 +123,7 @@ def see(
         least_cosine: of the angle between a face's normal and the line of sight.
     """
     cameras, features = len(T_camera_target), len(points)
-    sight = np.empty((cameras, features), dtype=np.uint8)
+    status = np.empty((cameras, features), dtype=np.uint8)
     places = np.empty((cameras, features, 2))
     depth = np.empty((cameras, features))
     heights = plane_heights(triangles, points)
@@ -134,19 +136,20 @@ def see(
             depth[c, m] = z
             if not z > 0.0:
                 places[c, m] = np.nan
-                sight[c, m] = BEHIND
+                status[c, m] = BEHIND
                 continue
-            u, v, one_to_one = lens_pixel(lenses[c], seen[m, 0] / z, seen[m, 1] / z)
+            x, y = seen[m, 0] / z, seen[m, 1] / z
+            u, v = pixel_of(lenses[c], x, y)
             places[c, m, 0], places[c, m, 1] = u, v
-            if not (one_to_one and in_picture(lenses[c], u, v, margin_px)):
-                sight[c, m] = OUTSIDE
+            if not (is_one_to_one(lenses[c], x, y) and in_image(lenses[c], u, v, margin_px)):
+                status[c, m] = OUTSIDE
             elif not faces_camera(eye, points[m], normals[m], face_counts[m], least_cosine):
-                sight[c, m] = TURNED_AWAY
+                status[c, m] = TURNED_AWAY
             elif _hidden(eye, points[m], triangles, eye_heights, heights[m], touching):
-                sight[c, m] = HIDDEN
+                status[c, m] = HIDDEN
             else:
-                sight[c, m] = VISIBLE
-    return sight, places, depth
+                status[c, m] = VISIBLE
+    return status, places, depth
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -218,17 +221,17 @@ def predict_visibility(
 
 
 def add_obstacles(
-    sight: SightArray, blocked: Blocked, eye: FloatArray, points_world: FloatArray
+    status: StatusArray, blocked: Blocked, eye: FloatArray, points_world: FloatArray
 ) -> None:
     """Mark the features of one camera, (M,), that something else hides; asks only for visible ones.
 
     Args:
-        sight: of that camera, (M,); changed.
+        status: of that camera, (M,); changed.
         blocked: tells what stands between the eye and points.
         eye: position of the camera, (3,), m.
         points_world: the features, (M, 3), m.
     """
-    visible = np.flatnonzero(sight == Sight.VISIBLE)
+    visible = np.flatnonzero(status == ViewStatus.VISIBLE)
     if len(visible):
         hidden = np.asarray(blocked(eye, points_world[visible]), dtype=np.bool_)
-        sight[visible[hidden]] = Sight.BLOCKED
+        status[visible[hidden]] = ViewStatus.BLOCKED

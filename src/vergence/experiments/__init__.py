@@ -2,26 +2,26 @@
 
 from vergence.experiments.campaign import run_campaign
 from vergence.experiments.comparison import Comparison, compare
-from vergence.experiments.executor import Crew, WorkersLostError
-from vergence.experiments.goal import Aim
+from vergence.experiments.executor import Executor, WorkersLostError
+from vergence.experiments.goal import Goal
 from vergence.experiments.presets import OWN, PRESETS, law_table, usual_laws
 from vergence.experiments.region import heading_trials, place_trials
-from vergence.experiments.results_file import RESULTS, Ledger
+from vergence.experiments.results_file import RESULTS, ResultsFile
 from vergence.experiments.run_trial import run_trial, run_trials
-from vergence.experiments.sampling import Draws
+from vergence.experiments.sampling import Sampling
 from vergence.experiments.score import Score, scores
 from vergence.experiments.source import CellSource
 from vergence.experiments.starts import start_trials
 from vergence.experiments.trial import Ending, Trial, TrialResult
 
 __all__ = [
-    "Aim",
+    "Goal",
     "CellSource",
     "Comparison",
-    "Crew",
-    "Draws",
+    "Executor",
+    "Sampling",
     "Ending",
-    "Ledger",
+    "ResultsFile",
     "OWN",
     "PRESETS",
     "RESULTS",

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from vergence.experiments.executor import Crew
-from vergence.experiments.results_file import Ledger
+from vergence.experiments.executor import Executor
+from vergence.experiments.results_file import ResultsFile
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
 
@@ -17,7 +17,7 @@ def run_campaign(
     trials: Sequence[Trial],
     folder: Path,
     *,
-    crew: Crew | None = None,
+    executor: Executor | None = None,
     tolerance_px: float = 2.0,
     physics: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -28,7 +28,7 @@ def run_campaign(
         source: of the cell.
         trials: what to run.
         folder: where results are written down as they come; a rerun goes on from there.
-        crew: who runs them; every core of this machine if None.
+        executor: runs them; every core of this machine if None.
         tolerance_px: up to which error of the farthest feature a run has converged.
         physics: whether to simulate physics also where the arm can move exactly as it is told.
         progress: told how many of how many trials are done.
@@ -45,14 +45,14 @@ def run_campaign(
         "tolerance_px": tolerance_px,
         "physics": physics,
     }
-    ledger = Ledger(folder, campaign)
+    results_file = ResultsFile(folder, campaign)
     tell = progress or _keep_quiet
-    tell(len(ledger.results), len(trials))
-    missing = [trial for trial in trials if trial.key not in ledger.results]
-    for result in (crew or Crew()).run(source, missing, tolerance_px, physics):
-        ledger.add(result)
-        tell(len(ledger.results), len(trials))
-    return tuple(ledger.results[trial.key] for trial in trials)
+    tell(len(results_file.results), len(trials))
+    missing = [trial for trial in trials if trial.key not in results_file.results]
+    for result in (executor or Executor()).run(source, missing, tolerance_px, physics):
+        results_file.add(result)
+        tell(len(results_file.results), len(trials))
+    return tuple(results_file.results[trial.key] for trial in trials)
 
 
 def _keep_quiet(done: int, total: int) -> None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from vergence.arrays import pandas_or_error
 from vergence.cell import Cell
 from vergence.experiments.campaign import run_campaign
-from vergence.experiments.executor import Crew
+from vergence.experiments.executor import Executor
 from vergence.experiments.presets import usual_laws
-from vergence.experiments.sampling import Draws
+from vergence.experiments.sampling import Sampling
 from vergence.experiments.score import Score, scores
 from vergence.experiments.source import CellSource
 from vergence.experiments.starts import start_trials
@@ -118,12 +118,12 @@ def compare(
     """
     source = CellSource.changed(cell, changes)
     loaded = source.load()
-    draws = Draws(tuple(vary), spread)
-    trials = start_trials(loaded, laws or usual_laws(loaded), starts, seed, draws)
-    crew = Crew(workers)
+    sampling = Sampling(tuple(vary), spread)
+    trials = start_trials(loaded, laws or usual_laws(loaded), starts, seed, sampling)
+    executor = Executor(workers)
     if folder is not None:
         return Comparison(
-            run_campaign(source, trials, Path(folder), crew=crew, tolerance_px=tolerance_px)
+            run_campaign(source, trials, Path(folder), executor=executor, tolerance_px=tolerance_px)
         )
-    results = {result.key: result for result in crew.run(source, trials, tolerance_px)}
+    results = {result.key: result for result in executor.run(source, trials, tolerance_px)}
     return Comparison(tuple(results[trial.key] for trial in trials))

@@ -14,7 +14,9 @@ from vergence.experiments.kinematic import is_quick
 from vergence.experiments.run_trial import run_trials
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
+from vergence.optional_package import is_installed, optional_package
 
+_LOG = logging.getLogger(__name__)
 _CONNECT_S = 10
 _CHUNK = 256  # quick trials handed out at once: about a second of one core
 _NO_PAGES: dict[str, list[str]] = {
@@ -33,7 +35,7 @@ class WorkersLostError(VergenceError):
 
 
 @dataclass(frozen=True, slots=True)
-class Crew:
+class Executor:
     """How many processes of this machine, or which scheduler's workers."""
 
     workers: int | None = None  # every core's if None; 1 is this process
@@ -52,7 +54,7 @@ class Crew:
         this process, on as many cores: a thousand of them take less than processes to start.
 
         Raises:
-            InputError: if there is no scheduler at the address.
+            InputError: if there is no scheduler at the address, or Dask is not installed.
             WorkersLostError: if every worker dies that is given the same trials.
         """
         count = self.workers or os.cpu_count() or 1
@@ -62,6 +64,9 @@ class Crew:
                 yield from run_trials(source, some, tolerance_px, physics, count)
             quick = []
         tasks = [*quick, *slow]
+        if self.scheduler is None and self.workers is None and not is_installed("distributed"):
+            _LOG.info("one process runs all: pip install 'vergence[cluster]' for one a core")
+            count = 1
         if self.scheduler is None and min(count, len(tasks)) <= 1:
             for some in tasks:
                 yield from run_trials(source, some, tolerance_px, physics)
@@ -76,7 +81,7 @@ class Crew:
         physics: bool,
         count: int,
     ) -> Iterator[TrialResult]:
-        distributed: Any = import_module("distributed")
+        distributed = _distributed(self)
         with self._client(min(count, len(tasks))) as client:
             given = {
                 client.submit(run_trials, source, task, tolerance_px, physics, pure=False): task
@@ -94,7 +99,7 @@ class Crew:
 
     @contextmanager
     def _client(self, count: int) -> Iterator[Any]:
-        distributed: Any = import_module("distributed")
+        distributed = _distributed(self)
         if self.scheduler is not None:
             try:
                 client = distributed.Client(self.scheduler, timeout=_CONNECT_S)
@@ -120,6 +125,13 @@ class Crew:
             distributed.Client(cluster) as client,
         ):
             yield client
+
+
+def _distributed(executor: Executor) -> Any:
+    if executor.scheduler is None:
+        given = f"{executor.workers} processes"
+        return optional_package(given, "distributed", "cluster", "--workers")
+    return optional_package("a Dask scheduler", "distributed", "cluster", "--scheduler")
 
 
 def _by_pace(

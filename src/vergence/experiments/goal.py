@@ -19,7 +19,7 @@ _DIGITS = 9  # kept of what goes into a trial, so that its text is the same ever
 
 
 @dataclass(frozen=True, slots=True)
-class Aim:
+class Goal:
     """The features of the target, and how the task's camera should see it."""
 
     features: tuple[tuple[float, ...], ...]  # (M, 3) m, in the target
@@ -27,7 +27,7 @@ class Aim:
     tables: Mapping[str, Any]  # of a cell, that hold the aim fast
 
     @classmethod
-    def of(cls, cell: Cell) -> "Aim":
+    def of(cls, cell: Cell) -> "Goal":
         """Return what a cell aims at from its own start.
 
         Raises:
@@ -36,7 +36,7 @@ class Aim:
         driver = SimulatedDriver(cell, images=False)
         try:
             if isinstance(cell.task, ReachTable):
-                return cls._of_picture(cell, cell.task, driver)
+                return cls._of_image(cell, cell.task, driver)
             parts = assemble_parts(cell, driver, images=False)
             assert not isinstance(parts, Outcome)
             reference = parts.planner.reference(0.0)
@@ -53,14 +53,14 @@ class Aim:
             driver.close()
 
     @classmethod
-    def _of_pose(cls, cell: Cell, driver: SimulatedDriver, T_camera_target: FloatArray) -> "Aim":
+    def _of_pose(cls, cell: Cell, driver: SimulatedDriver, T_camera_target: FloatArray) -> "Goal":
         points = transform_points(T_camera_target.copy(), driver.features)
         desired = driver.cameras[cell.task.camera].project(points)
         held = {"task": {"desired": placed(T_camera_target)}}
         return cls(_rows(driver.features), _rows(desired), held)
 
     @classmethod
-    def _of_picture(cls, cell: Cell, task: ReachTable, driver: SimulatedDriver) -> "Aim":
+    def _of_image(cls, cell: Cell, task: ReachTable, driver: SimulatedDriver) -> "Goal":
         arm = driver.arms[task.arm]
         goal = goal_positions(cell, arm)
         truth = driver.frame_at(task.camera, task.arm, goal).truth

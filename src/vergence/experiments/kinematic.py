@@ -9,14 +9,14 @@ from vergence.assembly import assemble_parts
 from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
 from vergence.control import OptimalTracking, PseudoInverse, ServoSettings
-from vergence.experiments.batch import IdealRun
+from vergence.experiments.batch import KinematicRun
 from vergence.geometry import transform_points
 from vergence.runtime.timeouts import Timeouts
 from vergence.signals import Outcome
-from vergence.simulation import IdealCell, SimulatedDriver, target_poses
+from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 from vergence.simulation.as_built import as_built
 from vergence.simulation.cell_model import CellModel
-from vergence.simulation.ideal_driver import Sees
+from vergence.simulation.kinematic_driver import Sees
 
 
 def is_ideal(cell: Cell) -> bool:
@@ -44,14 +44,14 @@ def is_quick(cell: Cell) -> bool:
     return is_ideal(cell) and tracking and as_it_is and len(law.objectives) == 1
 
 
-class IdealBench:
+class KinematicRuns:
     """Makes ideal runs of cells; those with the same models share one compiled world."""
 
     def __init__(self) -> None:
         self._key = ""
         self._made: tuple[SimulatedDriver, CellModel] | None = None
 
-    def run_of(self, cell: Cell) -> IdealRun:
+    def run_of(self, cell: Cell) -> KinematicRun:
         """Return the run of a cell that `is_ideal`.
 
         Raises:
@@ -70,7 +70,7 @@ class IdealBench:
         wanted = parts.planner.reference(0.0).points_px
         assert wanted is not None
         table = cell.cameras[camera]
-        ideal = IdealCell(
+        ideal = KinematicCell(
             driver.world.arm_to_camera(camera),
             driver.cameras[camera],
             start,
@@ -83,7 +83,7 @@ class IdealBench:
             sees=_eyesight(driver, arm, camera),
         )
         timeouts = Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s)
-        return IdealRun(ideal, parts.law, wanted, cell.duration_s, timeouts=timeouts)
+        return KinematicRun(ideal, parts.law, wanted, cell.duration_s, timeouts=timeouts)
 
     def _driver_of(self, cell: Cell) -> tuple[SimulatedDriver, CellModel]:
         key = as_built(cell).model_dump_json(exclude=_apart_from(cell))

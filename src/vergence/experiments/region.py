@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.cell import Cell
 from vergence.errors import InputError
-from vergence.experiments.goal import Aim, listed, merged
+from vergence.experiments.goal import Goal, listed, merged
 from vergence.experiments.presets import OWN, law_table
 from vergence.experiments.trial import Trial
 
@@ -80,7 +80,7 @@ def heading_trials(
 
 
 def _fixed(cell: Cell, law: str) -> dict[str, Any]:
-    return merged(dict(Aim.of(cell).tables), {"law": law_table(cell, law)})
+    return merged(dict(Goal.of(cell).tables), {"law": law_table(cell, law)})
 
 
 def _standing(cell: Cell, x: float, y: float) -> dict[str, Any]:

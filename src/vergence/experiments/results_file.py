@@ -16,7 +16,7 @@ _MOST_RESULTS = 1_000_000
 _RESULT = TypeAdapter(TrialResult)
 
 
-class Ledger:
+class ResultsFile:
     """A file with one line a result, the first line saying of what campaign.
 
     Args:

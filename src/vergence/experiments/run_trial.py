@@ -5,17 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from vergence.assembly.run_cell import run_cell
-from vergence.camera import picture_times
+from vergence.camera import image_times
 from vergence.cell import Cell
 from vergence.errors import InputError
-from vergence.experiments.batch import BatchTrace, IdealRun, covers, run_batch
+from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
 from vergence.experiments.evaluation import TrueTracks, trial_result
-from vergence.experiments.kinematic import IdealBench, is_ideal
+from vergence.experiments.kinematic import KinematicRuns, is_ideal
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Ending, Trial, TrialResult
 from vergence.runtime import Run
 from vergence.signals import OutcomeKind
-from vergence.simulation.ideal_driver import CAMERA
+from vergence.simulation.kinematic_driver import CAMERA
 
 
 def run_trials(
@@ -40,9 +40,9 @@ def run_trials(
     Raises:
         KeyboardInterrupt: if the user stopped it.
     """
-    cell, bench = source.load(), IdealBench()
+    cell, bench = source.load(), KinematicRuns()
     results: dict[str, TrialResult] = {}
-    waiting: list[tuple[Trial, IdealRun]] = []
+    waiting: list[tuple[Trial, KinematicRun]] = []
     for trial in trials:
         try:
             changed = cell.replace(**trial.changes)
@@ -75,7 +75,7 @@ def _in_physics(cell: Cell, trial: Trial, tolerance_px: float) -> TrialResult:
     return _result(run_cell(cell, images=False), trial, cell.task.camera, tolerance_px)
 
 
-def _in_loop(run: IdealRun, trial: Trial, tolerance_px: float) -> TrialResult:
+def _in_loop(run: KinematicRun, trial: Trial, tolerance_px: float) -> TrialResult:
     return _result(run.in_loop(), trial, CAMERA, tolerance_px)
 
 
@@ -86,7 +86,9 @@ def _result(run: Run, trial: Trial, camera: str, tolerance_px: float) -> TrialRe
     return trial_result(trial, run.outcome, tracks, run.info.cameras[camera], tolerance_px)
 
 
-def _of_batch(run: IdealRun, trace: BatchTrace, trial: Trial, tolerance_px: float) -> TrialResult:
+def _of_batch(
+    run: KinematicRun, trace: BatchTrace, trial: Trial, tolerance_px: float
+) -> TrialResult:
     camera, count = run.cell.camera, len(trace.times)
     inside = camera.contains(trace.points_px.reshape(-1, 2))
     tracks = TrueTracks(
@@ -100,7 +102,7 @@ def _of_batch(run: IdealRun, trace: BatchTrace, trial: Trial, tolerance_px: floa
     return trial_result(trial, trace.outcome, tracks, camera, tolerance_px)
 
 
-def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
+def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
     """Tell whether on the way something hid a feature for as long as the loop is patient.
 
     The kernel knows of no surfaces; such a run is made again, in the loop.
@@ -108,7 +110,7 @@ def _hidden(run: IdealRun, trace: BatchTrace) -> bool:
     cell = run.cell
     assert cell.sees is not None
     step = max(1, int(run.timeouts.target_s * cell.rate_hz))
-    times = picture_times(len(trace.position), cell.inner_rate_hz, cell.rate_hz)
+    times = image_times(len(trace.position), cell.inner_rate_hz, cell.rate_hz)
     poses = cell.target(times[::step])
     return any(
         not cell.sees(q, T).all() for q, T in zip(trace.position[::step], poses, strict=True)

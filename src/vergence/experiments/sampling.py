@@ -12,7 +12,7 @@ from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError, nearest
-from vergence.experiments.goal import Aim, listed, merged, placed
+from vergence.experiments.goal import Goal, listed, merged, placed
 from vergence.geometry import so3_exp
 from vergence.signals import FrameTruth
 from vergence.simulation import SimulatedDriver, placement_pose
@@ -23,7 +23,7 @@ _SETTLE_S = 2.0  # after the target has stopped
 
 
 @dataclass(frozen=True, slots=True)
-class Draws:
+class Sampling:
     """What is drawn, and from how wide a range.
 
     Raises:
@@ -39,7 +39,7 @@ class Draws:
             if name not in get_args(Drawn):
                 raise InputError("vary", "", name, nearest(name, get_args(Drawn)))
 
-    def changes(self, cell: Cell, aim: Aim, count: int, seed: int) -> list[dict[str, Any]]:
+    def changes(self, cell: Cell, goal: Goal, count: int, seed: int) -> list[dict[str, Any]]:
         """Return tables of the cell to replace, one set a trial.
 
         Joints are drawn evenly from a share of their ranges around the cell's own start, half a
@@ -51,7 +51,7 @@ class Draws:
 
         Args:
             cell: the cell.
-            aim: its features.
+            goal: its features.
             count: how many.
             seed: of the draws.
 
@@ -59,9 +59,9 @@ class Draws:
             InputError: if the target cannot be moved, or no draw is found that is in view.
         """
         _refuse(self.vary, cell)
-        driver = SimulatedDriver(cell.replace(**aim.tables), images=False)
+        driver = SimulatedDriver(cell.replace(**goal.tables), images=False)
         try:
-            driver.look_for(np.array(aim.features))
+            driver.look_for(np.array(goal.features))
             return [
                 self._one(cell, driver, np.random.default_rng([seed, number]))
                 for number in range(count)
@@ -88,7 +88,7 @@ class Draws:
             if isinstance(cell.task, ReachTable):
                 seen_from.append(goal_positions(cell, arm))
             truths = [driver.frame_at(camera, name, place).truth for place in seen_from]
-            if all(t is not None and _in_picture(t, driver.cameras[camera], cell) for t in truths):
+            if all(t is not None and _in_image(t, driver.cameras[camera], cell) for t in truths):
                 break
         else:
             given = f"{self.spread:g}: {_MOST_TRIES} draws, and none of them sees the target"
@@ -116,7 +116,7 @@ class Draws:
 
 def _refuse(vary: Sequence[str], cell: Cell) -> None:
     if cell.target.carried_by is not None and {"targets", "motions"} & set(vary):
-        given = f"{', '.join(vary)}, but the target is in the hand of {cell.target.carried_by}"
+        given = f"{', '.join(vary)}, but the target is held by {cell.target.carried_by}"
         raise InputError("vary", "", given, "starts")
     if isinstance(cell.task, ReachTable) and "motions" in vary:
         raise InputError("vary", "", "motions, but the task is to reach", "starts, targets")
@@ -129,7 +129,7 @@ def _moved(T: FloatArray, spread: float, away: float, rng: np.random.Generator) 
     return moved
 
 
-def _in_picture(truth: FrameTruth, camera: Camera, cell: Cell) -> bool:
+def _in_image(truth: FrameTruth, camera: Camera, cell: Cell) -> bool:
     """Tell whether all features are in the image; of an object some may be on its far side."""
     if cell.task.kind != "follow":
         return bool(truth.visible.all())

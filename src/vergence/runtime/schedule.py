@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from vergence.camera import picture_tick
+from vergence.camera import image_tick
 
 
 @njit(cache=True)
@@ -42,7 +42,7 @@ class Schedule:
         if self.period_over:
             self._last_due = tick
             self._periods += 1
-            self._due = picture_tick(self._periods, *self._rates_hz)
+            self._due = image_tick(self._periods, *self._rates_hz)
         if images:
             self._last_image = tick
         return images or (self.period_over and overdue)

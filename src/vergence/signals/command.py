@@ -13,7 +13,7 @@ class JointCommand:
 
     velocity: FloatArray  # (n,) rad/s or m/s
     # (6,) the camera twist these rates were made from, m/s and rad/s; of a fixed camera that looks
-    # at the hand, its twist as seen from there.
+    # at what the arm holds, its twist as seen from there.
     v_camera: FloatArray
     manipulability: float = float("nan")  # w'(q) of [Nelson1995] eq. (26), SI units
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)

@@ -44,8 +44,8 @@ class TargetState:
     velocity: FloatArray  # (6,) v and ω of the target's origin along world axes, m/s and rad/s
     covariance: FloatArray  # (12, 12) of (position, rotation, v, ω), world axes, SI
     consistent: bool  # whether the innovations agree with the covariance
-    # (4, 4) of the hand that holds the target, if one does; the velocity is then relative to it.
-    T_world_hand: FloatArray | None = None
+    # (4, 4) of the arm that holds the target, if one does, at its tip; velocity is relative to it.
+    T_world_tip: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from vergence.simulation.exact_corners import ExactCorners
 from vergence.simulation.exact_points import ExactPoints
-from vergence.simulation.ideal_driver import IdealCell, IdealDriver
+from vergence.simulation.kinematic_driver import KinematicCell, KinematicDriver
 from vergence.simulation.motion import placement_pose, target_pose, target_poses
 from vergence.simulation.motions import Motion, TargetPose, TargetPoses
 from vergence.simulation.renderer import CameraRenderer, choose_renderer
@@ -12,8 +12,8 @@ __all__ = [
     "CameraRenderer",
     "ExactCorners",
     "ExactPoints",
-    "IdealCell",
-    "IdealDriver",
+    "KinematicCell",
+    "KinematicDriver",
     "Motion",
     "SimulatedDriver",
     "TargetPose",

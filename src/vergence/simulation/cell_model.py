@@ -89,7 +89,7 @@ class CellModel:
     def move_target(self, T_world_target: FloatArray) -> None:
         """Put the target somewhere; it takes effect with the next step or `update`.
 
-        A target that an arm carries stays in its hand.
+        A target that an arm carries stays with it.
         """
         if not self.target_is_free:
             return

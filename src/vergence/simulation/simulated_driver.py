@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera, picture_tick
+from vergence.camera import Camera, image_tick
 from vergence.cell.cell import Cell
 from vergence.cell.schema import FollowTable, TrackTable
 from vergence.geometry import se3_inverse, transform_points
@@ -191,8 +191,8 @@ class SimulatedDriver:
             self._exposed[name] += 1
             self._queue.append((arrival, self._frame(name)))
 
-    def _tick_of(self, picture: int, rate_hz: float) -> int:
-        return picture_tick(picture, self.inner_rate_hz, rate_hz)
+    def _tick_of(self, image: int, rate_hz: float) -> int:
+        return image_tick(image, self.inner_rate_hz, rate_hz)
 
     def _frame(self, camera: str) -> Frame:
         blind = self._is_blind(camera)

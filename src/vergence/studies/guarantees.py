@@ -13,7 +13,7 @@ from vergence.control.limits import RELAXED
 from vergence.robot import Arm
 from vergence.runtime import Run, RunRecorder
 from vergence.signals import OutcomeKind
-from vergence.simulation import IdealCell
+from vergence.simulation import KinematicCell
 from vergence.studies import guarantees_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
 from vergence.studies.guarantees_faults import blind_check, faults_check
@@ -117,12 +117,12 @@ def _limits(
         f"of {count} runs",
         violations == 0,
         f"{len(LAWS)} laws, {len(CELLS)} arms of 6 and 7 joints, targets at 0.01 to 10 m/s, "
-        "depth wrong by 0.3 to 3, 0 to 4 frames of latency, up to 30 % of the pictures dropped",
+        "depth wrong by 0.3 to 3, 0 to 4 frames of latency, up to 30 % of the images dropped",
     )
     return check, ends
 
 
-def _line(arm: Arm, speed: float, heading: float) -> IdealCell:
+def _line(arm: Arm, speed: float, heading: float) -> KinematicCell:
     """Return the first paper's object on its line, a feature in the middle of the image."""
     start = np.deg2rad(PUMA_START_DEG)
     T_start = arm.forward_kinematics(start) @ facing(1.0)
@@ -133,7 +133,7 @@ def _line(arm: Arm, speed: float, heading: float) -> IdealCell:
         T[:, :3, 3] += np.outer(np.minimum(speed * times, RANGE_M), direction)
         return T
 
-    return IdealCell(
+    return KinematicCell(
         arm, CAMERA_MODEL, start, target, np.zeros((1, 3)), latency_frames=LATENCY_FRAMES
     )
 
@@ -144,7 +144,7 @@ def _follows(arm: Arm, law: str, speed: float, heading: float, error_px: float |
     return run.outcome.succeeded and close
 
 
-def _recorded(cell: IdealCell, law: str, duration_s: float) -> tuple[Excess, Run]:
+def _recorded(cell: KinematicCell, law: str, duration_s: float) -> tuple[Excess, Run]:
     recorder = RunRecorder()
     excess, _ = run_ideal(cell, law, duration_s, recorder=recorder)
     return excess, recorder.run()
@@ -196,9 +196,9 @@ def _speed(arm: Arm) -> Check:
 _SQUARE = np.array([[0.08, 0.08, 0], [-0.08, 0.08, 0], [-0.08, -0.08, 0], [0.08, -0.08, 0.0]])
 
 
-def _still(arm: Arm, start: FloatArray, depth: float = 0.6) -> IdealCell:
+def _still(arm: Arm, start: FloatArray, depth: float = 0.6) -> KinematicCell:
     T_target = arm.forward_kinematics(start) @ facing(depth)
-    return IdealCell(
+    return KinematicCell(
         arm, CAMERA_MODEL, start, lambda times: np.tile(T_target, (len(times), 1, 1)), _SQUARE
     )
 

@@ -13,8 +13,8 @@ from vergence.planning import FixedReference
 from vergence.robot import Arm
 from vergence.runtime import Loop, Timeouts
 from vergence.signals import Frame, ImagePoints, Observation, Outcome, Reference
-from vergence.simulation import IdealCell, IdealDriver
-from vergence.simulation.ideal_driver import ARM, CAMERA
+from vergence.simulation import KinematicCell, KinematicDriver
+from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.check import Check
 from vergence.studies.driver_faults import DRIVER_FAULTS
 from vergence.studies.faulty_driver import FaultyDriver
@@ -162,12 +162,12 @@ def _run(driver: FaultyDriver, law: FaultyLaw, duration_s: float) -> Outcome:
     return loop.run(duration_s)
 
 
-def _ideal(arm: Arm, rng: np.random.Generator) -> IdealDriver:
+def _ideal(arm: Arm, rng: np.random.Generator) -> KinematicDriver:
     """Return a driver of an arm that starts in the middle of its range."""
     low, high = _range(arm)
     start = low + rng.uniform(0.4, 0.6, arm.joint_count) * (high - low)
-    return IdealDriver(
-        IdealCell(
+    return KinematicDriver(
+        KinematicCell(
             arm,
             _SMALL,
             start,

@@ -24,8 +24,8 @@ from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajector
 from vergence.runtime import Loop, Timeouts
 from vergence.runtime.stages import Planner
 from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
-from vergence.simulation import ExactPoints, IdealCell, IdealDriver
-from vergence.simulation.ideal_driver import ARM, CAMERA
+from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
+from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.ideal_loop import Ending
 from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, estimate_two_view
@@ -73,7 +73,9 @@ class _StrictView:
 class _KnownTarget:
     """Wants the goal's image, and knows how far away the points are now and at the goal."""
 
-    def __init__(self, driver: IdealDriver, goal_px: FloatArray, goal_depth_m: FloatArray) -> None:
+    def __init__(
+        self, driver: KinematicDriver, goal_px: FloatArray, goal_depth_m: FloatArray
+    ) -> None:
         self._driver, self._goal_px, self._goal_depth_m = driver, goal_px, goal_depth_m
 
     def reference(self, time: float) -> Reference:
@@ -153,12 +155,14 @@ def plan_from_homography(scene: Scene) -> Path | None:
     return plan if isinstance(plan, Path) else None
 
 
-def _driver(scene: Scene) -> IdealDriver:
+def _driver(scene: Scene) -> KinematicDriver:
     def target(times: FloatArray) -> FloatArray:
         return np.broadcast_to(scene.T_world_target, (len(times), 4, 4))
 
-    cell = IdealCell(scene.arm, scene.camera, scene.q_start, target, scene.marks, rate_hz=RATE_HZ)
-    return IdealDriver(cell)
+    cell = KinematicCell(
+        scene.arm, scene.camera, scene.q_start, target, scene.marks, rate_hz=RATE_HZ
+    )
+    return KinematicDriver(cell)
 
 
 def _constrained(
@@ -191,7 +195,7 @@ def _constrained(
 
 def _run(
     scene: Scene,
-    driver: IdealDriver,
+    driver: KinematicDriver,
     law: Law,
     planner: Planner,
     duration_s: float,

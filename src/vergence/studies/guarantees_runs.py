@@ -31,8 +31,8 @@ from vergence.robot import Arm
 from vergence.runtime import Loop, RunInfo, RunRecorder
 from vergence.runtime.stages import Planner
 from vergence.signals import FrameTruth, Outcome, Reference, Sample, Setpoint
-from vergence.simulation import ExactPoints, IdealCell, IdealDriver
-from vergence.simulation.ideal_driver import ARM, CAMERA
+from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
+from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.wrong_beliefs import MovingGoal, WrongDepthPose
 
 CAMERA_MODEL = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
@@ -67,7 +67,7 @@ class Watched:
         arm: whose limits count.
     """
 
-    def __init__(self, driver: IdealDriver, arm: Arm) -> None:
+    def __init__(self, driver: KinematicDriver, arm: Arm) -> None:
         self._driver, self._arm = driver, arm
         self.excess = Excess(-np.inf, -np.inf)
 
@@ -109,7 +109,7 @@ class Watched:
 class Attempt:
     """A run that is to be tried."""
 
-    cell: IdealCell
+    cell: KinematicCell
     law: str
     depth_factor: float  # believed over true
     offset_px: FloatArray  # (2,) of the goal from the start
@@ -120,7 +120,7 @@ class Attempt:
 
 
 def run_ideal(
-    cell: IdealCell,
+    cell: KinematicCell,
     law: str,
     duration_s: float,
     depth_factor: float = 1.0,
@@ -128,7 +128,7 @@ def run_ideal(
     recorder: RunRecorder | None = None,
 ) -> tuple[Excess, Outcome]:
     """Run the real loop on an ideal cell, features desired where they are at the start."""
-    driver = IdealDriver(cell)
+    driver = KinematicDriver(cell)
     truth = driver.frame().truth
     assert truth is not None
     offset = np.zeros(2) if offset_px is None else offset_px
@@ -161,7 +161,7 @@ def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray)
     return FixedReference(Reference(0.0, wanted, T_camera_target=T_camera_target))
 
 
-def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
+def build(law: str, cell: KinematicCell, depth: FloatArray) -> Law:
     """Make one of `LAWS`."""
     if "position-based" in law:
         return _pose_servo(law, cell)
@@ -202,7 +202,7 @@ def build(law: str, cell: IdealCell, depth: FloatArray) -> Law:
     )  # fmt: skip
 
 
-def _pose_servo(law: str, cell: IdealCell) -> PoseServo:
+def _pose_servo(law: str, cell: KinematicCell) -> PoseServo:
     constrained = law.startswith("constrained")
     return PoseServo(
         cell.arm,
@@ -216,7 +216,7 @@ def _pose_servo(law: str, cell: IdealCell) -> PoseServo:
 
 
 def arms() -> tuple[Arm, ...]:
-    """Return the arms of `CELLS`, each up to a camera in its hand.
+    """Return the arms of `CELLS`, each up to a camera that it carries.
 
     Raises:
         InputError: if the models of the UR5 and the Panda are not installed, with how to do it.
@@ -251,7 +251,7 @@ def attempt(known: tuple[Arm, ...], seed: int) -> Attempt:
         return T
 
     features = np.column_stack((rng.uniform(-0.1, 0.1, (4, 2)), np.zeros(4)))
-    cell = IdealCell(
+    cell = KinematicCell(
         arm,
         CAMERA_MODEL,
         start,
@@ -268,8 +268,8 @@ def attempt(known: tuple[Arm, ...], seed: int) -> Attempt:
 
 
 def joint_path(
-    cell: IdealCell, q_end: FloatArray, duration_s: float, T_camera_target: FloatArray
-) -> IdealCell:
+    cell: KinematicCell, q_end: FloatArray, duration_s: float, T_camera_target: FloatArray
+) -> KinematicCell:
     """Return the cell with a target that is seen alike all along a straight way of the joints."""
     start, arm = cell.start, cell.arm
 

@@ -156,8 +156,8 @@ def _speed(cell: Cell, trials: Trials) -> list[Check]:
 
 def _slave(trials: Trials) -> list[Check]:
     ours, paper = trials["ours"], trials["hybrid"]
-    position, angle = ours.hand_m().max(), ours.hand_deg().max()
-    paper_m, paper_deg = paper.hand_m().max(), paper.hand_deg().max()
+    position, angle = ours.pose_m().max(), ours.pose_deg().max()
+    paper_m, paper_deg = paper.pose_m().max(), paper.pose_deg().max()
     delayed = "higher than the estimation error, because of the delay (Fig. 7)"
     return [
         Check(

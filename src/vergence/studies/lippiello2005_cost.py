@@ -73,7 +73,7 @@ class _TimedPerception:
     def __init__(self, cell: Cell, driver: SimulatedDriver, count: int) -> None:
         model = target_shape(cell, driver.world)
         T_world_camera = driver.world.camera_pose("fixed")
-        self._picture = driver.first_frame("fixed")
+        self._image = driver.first_frame("fixed")
         self._names = [f"camera {n}" for n in range(count)]
         self._extraction, self._update = _Stopwatch(), _Stopwatch()
         cameras = dict.fromkeys(self._names, driver.cameras["fixed"])
@@ -90,7 +90,7 @@ class _TimedPerception:
 
     def tick(self, k: int) -> Cost:
         """Look at the k-th image with every camera."""
-        frames = [replace(self._picture, camera=name, time=k / 26.0) for name in self._names]
+        frames = [replace(self._image, camera=name, time=k / 26.0) for name in self._names]
         began = perf_counter()
         self._perception.observe(frames)
         return Cost(self._extraction.lap(), self._update.lap(), perf_counter() - began)

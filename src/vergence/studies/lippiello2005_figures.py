@@ -29,12 +29,12 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
             "Figure 6: error of the estimated pose, both cameras, the paper's settings.",
         ),
         "figure_07": (
-            _hand_errors(hybrid),
-            "Figure 7: error of the slave's hand relative to the object, both cameras, the "
+            _pose_errors(hybrid),
+            "Figure 7: error of the slave's end effector relative to the object, both cameras, the "
             "paper's settings.",
         ),
         "figure_07_ours": (
-            _hand_errors(ours),
+            _pose_errors(ours),
             "The same with the error-state filter, feed-forward and prediction over the latency.",
         ),
         "figure_08": (
@@ -62,7 +62,7 @@ def _target_errors(trial: Trial) -> Any:
     return _errors(errors.time, errors.target_m, errors.target_rad)
 
 
-def _hand_errors(trial: Trial) -> Any:
+def _pose_errors(trial: Trial) -> Any:
     errors = trial.errors.between(trial.moving_from / 2)
     return _errors(errors.time, errors.camera_m, errors.camera_rad)
 

@@ -51,14 +51,14 @@ class Trial:
         degrees: FloatArray = np.rad2deg(moving.target_rad)
         return degrees
 
-    def hand_m(self) -> FloatArray:
-        """Return how far the object is from its desired place in the hand, while it moves, (K,)."""
+    def pose_m(self) -> FloatArray:
+        """Return how far the object is from its desired place in the end effector, (K,)."""
         sizes = np.linalg.norm(self.errors.between(self.moving_from).camera_m, axis=1)
         known: FloatArray = sizes[np.isfinite(sizes)]
         return known
 
-    def hand_deg(self) -> FloatArray:
-        """Return how far it is from its desired orientation in the hand, (K,)."""
+    def pose_deg(self) -> FloatArray:
+        """Return how far it is from its desired orientation in it, (K,)."""
         angles = self.errors.between(self.moving_from).camera_rad
         degrees: FloatArray = np.rad2deg(angles[np.isfinite(angles)])
         return degrees

@@ -17,10 +17,10 @@ from vergence.studies.mezouar2001_run import Realised, Section6
 from vergence.studies.mezouar2001_trials import Trial, endings
 from vergence.studies.path_panels import (
     camera_paths,
+    draw_image,
     grid,
     image_paths,
     joint_paths,
-    picture,
     space,
 )
 from vergence.studies.reach_scene import Scene
@@ -47,7 +47,7 @@ def draw(
     drawn = {
         "figure_03": (
             _figure_3(section),
-            "Figure 3: initial and desired picture; paths without potentials in the image and "
+            "Figure 3: initial and desired image; paths without potentials in the image and "
             "in the joints' ranges (limits at -1 and 1).",
         ),
         "figure_04": (
@@ -84,10 +84,10 @@ def _figure_3(section: Section6) -> Any:
     drawing, axes = grid(_WIDTH, 6.2, 2, 2)
     first = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
     for place, name, px, image in (
-        (axes[0, 0], "(a) initial picture", first, section.pictures[0]),
-        (axes[0, 1], "(b) desired picture", scene.goal_px, section.pictures[1]),
+        (axes[0, 0], "(a) initial image", first, section.end_images[0]),
+        (axes[0, 1], "(b) desired image", scene.goal_px, section.end_images[1]),
     ):
-        picture(place, scene.camera, px, image)
+        draw_image(place, scene.camera, px, image)
         place.set_title(name, fontsize=9)
     _planned(axes[1], path, "(c)", "(d)")
     return drawing

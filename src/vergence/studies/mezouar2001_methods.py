@@ -63,7 +63,7 @@ SETTLE_S = 4.0  # after a plan's end
 PLANS = 6  # at most, one after the other
 ROOM = 0.003  # to a joint limit, of half the range; with less the arm stops and plans again
 CAMERA_SPEED = 0.25  # m/s
-PICTURES = 25  # averaged at either end before planning
+IMAGES = 25  # averaged at either end before planning
 LOOKS = 3  # at most, where one image's marks do not agree with the other's
 REFERENCE = np.array([0, 1, 2])  # the marks of the middle plane span the reference plane
 
@@ -109,7 +109,7 @@ def _follow_plans(
     """Plan and track; plan again from where a joint comes closer to its limit than it should."""
     here, motion = scene, None
     for _ in range(PLANS):
-        plan = plan_between_pictures(here, method, belief, random)
+        plan = plan_between_images(here, method, belief, random)
         if not isinstance(plan, Path):
             px = here.seen_px(here.arm.forward_kinematics(here.q_start))[None]
             refused = Motion(Ending.NO_PLAN, plan, here.q_start[None], px, np.array([np.inf]))
@@ -151,7 +151,7 @@ def too_close(arm: Arm, q_start: FloatArray) -> Callable[[FloatArray], bool]:
     return lambda q: bool((room(q) < kept).any())
 
 
-def plan_between_pictures(
+def plan_between_images(
     scene: Scene, method: Method, belief: Belief, random: np.random.Generator
 ) -> Path | str:
     """Plan from the images at start and goal and the believed d*; or say why there is no path."""
@@ -178,7 +178,7 @@ def _two_views(
 ) -> TwoView | TwoViewFailure:
     """Reconstruct from start and goal; look again if the noise was larger than it mostly is."""
     poses = (scene.arm.forward_kinematics(scene.q_start), scene.T_world_goal)
-    spread = belief.noise_px / np.sqrt(PICTURES)
+    spread = belief.noise_px / np.sqrt(IMAGES)
     noise = belief.misfit_px or max(spread, 0.05)
     for _ in range(LOOKS):
         here, there = (

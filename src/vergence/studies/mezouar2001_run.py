@@ -84,7 +84,7 @@ class Section6:
     """The paths of the section, and the runs of those that can be run."""
 
     scene: Scene
-    pictures: tuple[ImageArray | None, ImageArray | None]  # from start and goal
+    end_images: tuple[ImageArray | None, ImageArray | None]  # from start and goal
     paths: Mapping[str, Path]  # straight, visibility_only, both, optimised
     runs: Mapping[str, Realised]  # both, optimised
 

@@ -39,7 +39,9 @@ def space(width: float, height: float) -> "tuple[Figure, Any]":
     return drawn, axes
 
 
-def picture(axes: "Axes", camera: Camera, points_px: FloatArray, image: ImageArray | None) -> None:
+def draw_image(
+    axes: "Axes", camera: Camera, points_px: FloatArray, image: ImageArray | None
+) -> None:
     """Draw what the camera saw, its marks (N, 2) numbered; on white if there is no image."""
     _image_frame(axes, camera)
     if image is not None:

@@ -123,7 +123,7 @@ class Board:
         T: FloatArray = se3(R, self.center - R @ self.center)
         return T
 
-    def picture(self, square_px: int) -> ImageArray:
+    def image(self, square_px: int) -> ImageArray:
         """Return the board as a grey image for printing or rendering, white around included."""
         import cv2
 

@@ -175,7 +175,7 @@ class Studio:
         return Board(_COLUMNS, _ROWS, square_m, marker_m, _DICTIONARY)
 
     def _with_board(self, cell: Cell, world: Any, folder: Path) -> Cell:
-        """Put the board where the camera sees it at the start: into the hand, or into the world."""
+        """Put the board where the camera sees it at the start: on the arm, or in the world."""
         facing = se3(np.eye(3), np.array([0.0, 0.0, self._depth]) - self.board.center)
         T = world.camera_pose(self.name) @ facing
         if self.fixed:
@@ -232,13 +232,13 @@ class Studio:
 
 
 def make_data(
-    studio: Studio, pictures: int, folder: Path | None, noise_px: float
+    studio: Studio, images: int, folder: Path | None, noise_px: float
 ) -> tuple[Dataset, Truth]:
     """Make images, board and poses in a folder, or only project, without one.
 
     Args:
         studio: the cell with a board.
-        pictures: how many.
+        images: how many.
         folder: where to write them; None gives projected corners, with noise.
         noise_px: standard deviation of these.
 
@@ -251,9 +251,9 @@ def make_data(
     sightings = []
     renderer = None if folder is None else studio.renderer()
     progress = bar("{task.completed} / {task.total}")
-    task = progress.add_task("take pictures", total=pictures)
+    task = progress.add_task("take images", total=images)
     with progress:
-        for number in range(pictures):
+        for number in range(images):
             name = f"{number:03d}.png"
             poses[name] = studio.pose()
             if folder is None:
@@ -270,7 +270,7 @@ def make_data(
 
 
 def _nearest_arm(cell: Cell, world: Any) -> str:
-    """Return the arm that holds the target, or whose hand is nearest to it."""
+    """Return the arm that holds the target, or whose end effector is nearest to it."""
     target = world.target_pose()[:3, 3]
 
     def distance(name: str) -> float:
@@ -287,7 +287,7 @@ def _usual_depth(world: Any, camera: str) -> float:
 
 
 def _held_at(cell: Cell, world: Any, flange: FloatArray) -> FloatArray:
-    """Return where in the world a hand holds the middle of the board, (3,), m."""
+    """Return where in the world an arm holds the middle of the board, (3,), m."""
     if cell.target.carried_by is not None:
         return np.asarray(world.target_pose()[:3, 3])
     return flange[:3, 3] + 0.1 * flange[:3, 2]
@@ -311,7 +311,7 @@ def _write_model(folder: Path, board: Board) -> Path:
     import cv2
 
     texture = (folder / "board.png").resolve()
-    cv2.imwrite(str(texture), board.picture(_TEXTURE_PX))
+    cv2.imwrite(str(texture), board.image(_TEXTURE_PX))
     (width, height), middle = board.outline_m, board.center
     text = _MODEL.format(
         texture=texture,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vergence.app.figures.image import picture_frame
+from vergence.app.figures.image import image_frame
 from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
@@ -22,7 +22,7 @@ def residual_field_figure(
     """Draw every corner where it was found, with its residual as an arrow made longer."""
     out = panels(1, "u (px)", height=5.6)
     axes = out.axes[0]
-    picture_frame(axes, camera)
+    image_frame(axes, camera)
     places = np.concatenate([seen.points_px for seen in sightings])
     arrows = np.concatenate([residual.reshape(-1, 2) for residual in residuals])
     longest = float(np.quantile(np.hypot(*arrows.T), 0.99))
@@ -52,7 +52,7 @@ def residual_bars_figure(
         residuals: (2n,) of each, px.
         left_out_px: root mean square of each, (N,), px.
     """
-    out = panels(1, "picture", height=2.6)
+    out = panels(1, "image", height=2.6)
     axes = out.axes[0]
     places = np.arange(len(sightings))
     inside = np.array([rms(residual) for residual in residuals])

@@ -40,7 +40,7 @@ def paths_figure(camera: Camera, trace: CameraTrace) -> Panels | None:
         return None
     out = panels(1, "u (px)", height=4.6)
     axes = out.axes[0]
-    picture_frame(axes, camera)
+    image_frame(axes, camera)
     paths = np.where(trace.found[..., None], trace.points_px, np.nan)
     few = paths.shape[1] <= _MANY
     for index in range(paths.shape[1]):
@@ -66,7 +66,7 @@ def _distances(axes: "Axes", time: FloatArray, values: FloatArray) -> None:
     axes.plot(time[seen], middle, color=COLORS[0], label="median")
 
 
-def picture_frame(axes: "Axes", camera: Camera) -> None:
+def image_frame(axes: "Axes", camera: Camera) -> None:
     """Show the image as the camera has it: v downwards, pixel centres at integers."""
     from matplotlib.patches import Rectangle
 

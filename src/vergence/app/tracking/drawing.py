@@ -7,7 +7,8 @@ from vergence.app.overlay import DESIRED, FOUND, LOST
 from vergence.app.tracking.follower import Sighting, Step
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.vision.known_object import ObjectModel, lens_of
+from vergence.camera.lens import pack_lens
+from vergence.vision.known_object import ObjectModel
 from vergence.vision.known_object.edge_samples import sample_edges
 
 _SHIFT = 4  # fractional bits of a place
@@ -56,7 +57,9 @@ def _edges(
     import cv2
 
     places = np.full(len(model.edges), _PLACES)
-    seen = sample_edges(T, lens_of(camera), model.edges, model.edge_normals, model.surface, places)
+    seen = sample_edges(
+        T, pack_lens(camera), model.edges, model.edge_normals, model.surface, places
+    )
     along = (np.diff(seen.edge) == 0) & (np.diff(seen.place) == 1)
     for n in np.flatnonzero(along):
         ends = _fixed(seen.points_px[n]), _fixed(seen.points_px[n + 1])

@@ -112,7 +112,7 @@ class ObjectFollower:
             update = self._filter.update(self._belief, view)
             belief = update.belief
             if update.verdict not in _USED:
-                reason = f"the picture {update.verdict.value}"
+                reason = f"the image {update.verdict.value}"
         self._belief = belief
         if not reason:
             self._missed = 0

@@ -17,7 +17,7 @@ VIDEOS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
 DEFAULT_RATE_HZ = 25.0
 
 
-class Picture(NamedTuple):
+class FootageFrame(NamedTuple):
     """One image of the footage."""
 
     name: str  # its file, or the video's with a number
@@ -35,7 +35,7 @@ class Footage:
     rate_hz: float
     stamped: bool = False  # whether a video's own time stamps count, not the rate
 
-    def pictures(self) -> Iterator[Picture]:
+    def frames(self) -> Iterator[FootageFrame]:
         """Yield the images, all of one size; those of a folder as `grey_images` does.
 
         Raises:
@@ -44,14 +44,14 @@ class Footage:
         """
         if self.files:
             for number, (file, image) in enumerate(grey_images(self.files)):
-                yield Picture(str(file), number / self.rate_hz, image)
+                yield FootageFrame(str(file), number / self.rate_hz, image)
             return
         first = None
         for name, time, raw in _video(self.path, self.rate_hz, self.stamped):
             values = grey_values(raw, name)
             first = values if first is None else first
             require_like(values, first, name)
-            yield Picture(name, time, grey_levels(values, white_level(values)))
+            yield FootageFrame(name, time, grey_levels(values, white_level(values)))
 
 
 def open_footage(path: str | Path, rate_hz: float | None = None) -> Footage:

@@ -13,7 +13,7 @@ from vergence.app.tracking.follower import Step
 from vergence.geometry import matrix_to_quaternion
 
 COLUMNS = (
-    *("picture", "time_s", "sighting"),
+    *("image", "time_s", "sighting"),
     *("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"),
     *("sd_x_m", "sd_y_m", "sd_z_m", "sd_rx_rad", "sd_ry_rad", "sd_rz_rad"),
     *("share", "reason"),
@@ -62,7 +62,7 @@ class PoseFiles:
         ]
         words = [f"{number:.9g}" for number in numbers]
         self._writer.writerow([name, f"{step.time:.6f}", step.sighting.value, *words, step.reason])
-        self._jsonl.write(json.dumps({"picture": name, **pose}) + "\n")
+        self._jsonl.write(json.dumps({"image": name, **pose}) + "\n")
 
 
 def pose_record(step: Step) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from vergence.app.output import SUCCESS, emit, new_folder, say, warn
 from vergence.errors import InputError
+from vergence.optional_package import optional_package
 from vergence.places import RECORDING, find_recording
 
 if TYPE_CHECKING:
@@ -32,7 +33,13 @@ class Request(NamedTuple):
 
 
 def watch(request: Request) -> int:
-    """Serve the page until Ctrl-C; return the exit code."""
+    """Serve the page until Ctrl-C; return the exit code.
+
+    Raises:
+        InputError: if what is asked for cannot be shown, or the page's packages are not installed.
+    """
+    for module in ("websockets", "psutil"):
+        optional_package("the live page", module, "watch", "vergence watch")
     recording = _recording_in(Path(request.source))
     answer = _watch_cell(request) if recording is None else _watch_recording(request, recording)
     if request.as_json:

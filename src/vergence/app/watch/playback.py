@@ -7,10 +7,10 @@ import numpy as np
 from vergence.app.figures.arm import drawn_positions
 from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.plots import (
-    HAND_DEG,
-    HAND_MM,
     MANIPULABILITY,
     MEASURE,
+    POSE_DEG,
+    POSE_MM,
     TARGET_MM,
     Plot,
     error_key,
@@ -58,7 +58,7 @@ class Playback:
         found = [
             *self._arm_rows(),
             *self._error_rows(),
-            *self._hand_rows(),
+            *self._pose_rows(),
             *self._target_rows(),
         ]
         return sorted(found, key=lambda entry: entry[0])
@@ -95,7 +95,7 @@ class Playback:
             if np.isfinite(trace.error_px).any():
                 yield error_plot(trace.error_px.shape[1], self._further(name))
             if np.isfinite(trace.T_camera_target_desired).any():
-                yield from (HAND_MM, HAND_DEG)
+                yield from (POSE_MM, POSE_DEG)
         if self._recording.target is not None and len(self._truth[0]):
             yield TARGET_MM
         yield joints_plot(self._recording.info.arms[self._arm])
@@ -121,14 +121,14 @@ class Playback:
             for time, error in zip(trace.received.tolist(), trace.error_px, strict=True):
                 yield row(time, self.plots, {key: error})
 
-    def _hand_rows(self) -> Iterator[Row]:
+    def _pose_rows(self) -> Iterator[Row]:
         for trace in self._recording.cameras.values():
             for index in np.flatnonzero(np.isfinite(trace.T_camera_target_desired[:, 0, 0])):
                 wanted = trace.T_camera_target_desired[index]
                 T = se3_inverse(trace.T_world_camera[index]) @ trace.T_world_target[index]
                 values = {
-                    "hand_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - wanted[:3, 3])]),
-                    "hand_deg": np.array([np.rad2deg(angle_between(T, wanted))]),
+                    "pose_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - wanted[:3, 3])]),
+                    "pose_deg": np.array([np.rad2deg(angle_between(T, wanted))]),
                 }
                 yield row(float(trace.received[index]), self.plots, values)
 

@@ -32,8 +32,8 @@ class Plot:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-HAND_MM = Plot("hand_mm", "hand from where it should be", "mm", ("distance",))
-HAND_DEG = Plot("hand_deg", "hand from how it should be turned", "°", ("angle",))
+POSE_MM = Plot("pose_mm", "end effector from where it should be", "mm", ("distance",))
+POSE_DEG = Plot("pose_deg", "end effector from how it should be turned", "°", ("angle",))
 TARGET_MM = Plot("target_mm", "estimated from true target", "mm", ("distance",))
 MANIPULABILITY = Plot("manipulability", "manipulability √det(J Jᵀ)", "SI units", ("of the arm",))
 MEASURE = Plot("manipulability", "manipulability w′", "SI units", ("of the arm",))
@@ -67,7 +67,7 @@ def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
     """
     common = (joints_plot(arm), MANIPULABILITY)
     if cell.task.kind == "follow":
-        return (HAND_MM, HAND_DEG, TARGET_MM, *common)
+        return (POSE_MM, POSE_DEG, TARGET_MM, *common)
     tool = cell.tool
     held = () if tool is None else (error_plot(len(tool.features), tool.camera),)
     return (error_plot(points), *held, *common)

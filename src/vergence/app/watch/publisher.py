@@ -134,8 +134,8 @@ class Publisher:
             if not len(errors.time):
                 return {}
             return {
-                "hand_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
-                "hand_deg": np.rad2deg(errors.camera_rad),
+                "pose_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
+                "pose_deg": np.rad2deg(errors.camera_rad),
                 "target_mm": _MM * np.linalg.norm(errors.target_m, axis=1),
             }
         if record.observation is None or record.reference is None:

@@ -1,10 +1,10 @@
 """Hand and eye in closed form, and which images agree on it.
 
-One equation holds for a camera in the hand and for one that looks at the hand:
+One equation holds for a camera on the arm and for one that looks at the end effector:
 
     T_camera_board = X⁻¹ A Y
 
-with A the arm's pose as recorded. In the hand, X = T_flange_camera, A = T_flange_base and
+with A the arm's pose as recorded. On the arm, X = T_flange_camera, A = T_flange_base and
 Y = T_base_board; fixed, X = T_base_camera, A = T_base_flange and Y = T_flange_board.
 """
 

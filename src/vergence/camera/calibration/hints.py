@@ -53,7 +53,7 @@ def hint(
 
 def _guesses(A: FloatArray, T: FloatArray, fixed: bool) -> Iterator[_Guess]:
     back = np.array([se3_inverse(a) for a in A])
-    other = "if the camera were mounted the other way, in the hand or fixed (see --fixed), or the "
+    other = "if the camera were mounted the other way, on the arm or fixed (see --fixed), or the "
     yield _Guess(other + "poses were those of the base in the flange", back)
     scale = _scale(A, T)
     if 0.2 < scale < 5.0:

@@ -82,7 +82,7 @@ class Block(NamedTuple):
 class JointProblem:
     """Reprojection of all corners through the chain X⁻¹ A Y, see `hand_eye`.
 
-    Each recorded pose A has an error E of its own, with a prior: X⁻¹ E A Y in the hand, and
+    Each recorded pose A has an error E of its own, with a prior: X⁻¹ E A Y on the arm, and
     X⁻¹ A E Y where the camera is fixed. So has the board's size. The parameters are in `State`.
     """
 

@@ -130,7 +130,7 @@ class TargetTable(Placement):
 
 
 class ToolTable(Placement):
-    """What the arm holds in its hand; its placement is in the arm's last body."""
+    """What the arm holds beside its camera; its placement is in the arm's last body."""
 
     model: Path  # MJCF
     camera: Text  # the fixed one that looks at it
@@ -161,7 +161,7 @@ class TrackTable(Table):
 
 
 class FollowTable(Table):
-    """Keep a camera in the hand, or what the hand holds before a fixed one, at a desired pose."""
+    """Keep a camera on the arm, or what the arm holds before a fixed one, at a desired pose."""
 
     kind: Literal["follow"]
     arm: Text  # which moves

@@ -74,11 +74,11 @@ class TargetView:
 
 def _held(target: TargetState) -> TargetState:
     """Return the target in the frame of the tip that holds it."""
-    assert target.T_world_hand is not None
-    turn = np.kron(np.eye(4), target.T_world_hand[:3, :3].T)
+    assert target.T_world_tip is not None
+    turn = np.kron(np.eye(4), target.T_world_tip[:3, :3].T)
     return replace(
         target,
-        T_world_target=se3_compose(se3_inverse(target.T_world_hand), target.T_world_target),
+        T_world_target=se3_compose(se3_inverse(target.T_world_tip), target.T_world_target),
         velocity=turn[:6, :6] @ target.velocity,
         covariance=turn @ target.covariance @ turn.T,
     )

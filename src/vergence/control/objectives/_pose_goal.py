@@ -33,10 +33,10 @@ def tip_goal_of_holder(target: TargetState, T_world_desired: FloatArray) -> Movi
         target: held, with the pose of the tip.
         T_world_desired: (4, 4).
     """
-    assert target.T_world_hand is not None
-    T_tip_target = se3_compose(se3_inverse(target.T_world_hand), target.T_world_target)
+    assert target.T_world_tip is not None
+    T_tip_target = se3_compose(se3_inverse(target.T_world_tip), target.T_world_target)
     T_tip = se3_compose(T_world_desired, se3_inverse(T_tip_target))
-    turn = T_tip[:3, :3] @ target.T_world_hand[:3, :3].T
+    turn = T_tip[:3, :3] @ target.T_world_tip[:3, :3].T
     against = -np.concatenate((turn @ target.velocity[:3], turn @ target.velocity[3:]))
     return MovingPose(T_tip, _with_lever(against, T_tip[:3, 3] - T_world_desired[:3, 3]))
 

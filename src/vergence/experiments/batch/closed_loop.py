@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.camera import picture_tick
+from vergence.camera import image_tick
 from vergence.control import (
     guarded_step,
     guarded_steps,
@@ -109,7 +109,7 @@ def faded_step(
 def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, float]:
     """Run [Nelson1995] in the loop, on an arm that moves exactly as it is told.
 
-    It is `vergence.runtime.Loop` on an `IdealDriver`, decision by decision, by the same kernels.
+    It is `vergence.runtime.Loop` on a `KinematicDriver`, decision by decision, by the same kernels.
 
     Returns:
         One of the codes above, the inner tick, how many images had been looked at had all
@@ -126,7 +126,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
         run.ends_s[2],
         run.ends_s[3],
     )
-    tick, last_picture, last_seen = 0, 0.0, 0.0
+    tick, last_image, last_seen = 0, 0.0, 0.0
     for k in range(len(run.arrived)):
         time, seen = tick / inner_hz, k - run.latency[0]
         if time >= duration:
@@ -136,9 +136,9 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
         record.camera_m[k, 0], record.camera_m[k, 1], record.camera_m[k, 2] = tip[3]
         project(tip, run.T_world_target[k], run.features, run.camera, record.points_px[k])
         if seen >= 0 and run.arrived[seen]:
-            last_picture = time
-            picture, noise = record.points_px[seen], run.noise_px[seen]
-            count = look(picture, noise, run.wanted, run.camera, found)
+            last_image = time
+            image, noise = record.points_px[seen], run.noise_px[seen]
+            count = look(image, noise, run.wanted, run.camera, found)
             if count > 0:
                 last_seen = time
                 optimal_tracking_tick(run.weights, run.joints, q, found[:count], answer)
@@ -150,15 +150,15 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
                 rates[:] = 0.0
                 if time - last_seen > target_s:
                     return TARGET_LOST, tick, seen + 1, time - last_seen
-        elif time - last_picture > image_s:
-            return IMAGE_LATE, tick, seen, time - last_picture
-        steps = picture_tick(k + 1, inner_hz, outer_hz) - tick
-        if last_picture == time:
+        elif time - last_image > image_s:
+            return IMAGE_LATE, tick, seen, time - last_image
+        steps = image_tick(k + 1, inner_hz, outer_hz) - tick
+        if last_image == time:
             guarded_steps(q, velocity, rates, run.limits, 1.0 / inner_hz, steps, record.stuck)
         else:
             record.stuck[:] = True
             for step in range(steps):
-                age_s = (tick + step) / inner_hz - last_picture
+                age_s = (tick + step) / inner_hz - last_image
                 share = command_share(age_s, 1.0 / outer_hz, decay_s)
                 faded_step(q, velocity, share * rates, run.limits, 1.0 / inner_hz, record.stuck)
         tick += steps
@@ -193,8 +193,8 @@ def run_one(runs: LoopInputs, records: LoopRecord, r: int) -> None:
         records.stuck[r],
         records.end[r],
     )
-    code, tick, pictures, value = closed_loop(run, record)
-    record.end[0], record.end[1], record.end[2], record.end[3] = code, tick, pictures, value
+    code, tick, images, value = closed_loop(run, record)
+    record.end[0], record.end[1], record.end[2], record.end[3] = code, tick, images, value
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.camera import picture_times
+from vergence.camera import image_times
 from vergence.control import Servo, TrackingSetup, pack_setup, singular_fault
 from vergence.experiments.batch import closed_loop
 from vergence.experiments.batch.closed_loop import (
@@ -17,7 +17,7 @@ from vergence.experiments.batch.closed_loop import (
     closed_loops,
     closed_loops_parallel,
 )
-from vergence.experiments.batch.ideal_run import IdealRun
+from vergence.experiments.batch.kinematic_run import KinematicRun
 from vergence.runtime import endings
 from vergence.signals import Outcome
 from vergence.simulation.exact_points import OUT_OF_SIGHT
@@ -35,7 +35,7 @@ class BatchTrace:
     target_m: FloatArray  # (F, 3) and of the target
 
 
-def covers(run: IdealRun) -> bool:
+def covers(run: KinematicRun) -> bool:
     """Tell whether the kernel knows the law of a run and its camera."""
     law, camera = run.law, run.cell.camera
     if not isinstance(law, Servo) or law.feeds_forward or camera.distorted:
@@ -43,7 +43,7 @@ def covers(run: IdealRun) -> bool:
     return law.tracking is not None
 
 
-def run_batch(runs: Sequence[IdealRun], threads: int | None = None) -> list[BatchTrace]:
+def run_batch(runs: Sequence[KinematicRun], threads: int | None = None) -> list[BatchTrace]:
     """Make many runs; each comes to what it comes to in the loop, up to rounding.
 
     Args:
@@ -58,11 +58,11 @@ def run_batch(runs: Sequence[IdealRun], threads: int | None = None) -> list[Batc
     return [traces[r] for r in range(len(runs))]
 
 
-def _size(run: IdealRun) -> tuple[int, int]:
+def _size(run: KinematicRun) -> tuple[int, int]:
     return len(run.cell.start), len(run.cell.features)
 
 
-def _alike(runs: list[IdealRun], threads: int | None) -> Iterator[BatchTrace]:
+def _alike(runs: list[KinematicRun], threads: int | None) -> Iterator[BatchTrace]:
     """Make runs with as many joints and features each."""
     inputs = pack(runs)
     records = empty_records(inputs)
@@ -76,33 +76,33 @@ def _alike(runs: list[IdealRun], threads: int | None) -> Iterator[BatchTrace]:
         yield _trace(run, inputs, records, r)
 
 
-def _pictures(run: IdealRun) -> int:
+def _images(run: KinematicRun) -> int:
     """Return how many images a run takes at most."""
     return int(np.ceil(run.duration_s * run.cell.rate_hz)) + 2
 
 
 def empty_records(inputs: LoopInputs) -> LoopRecord:
     """Return room for what is kept of runs."""
-    (count, pictures), joints = inputs.arrived.shape, inputs.start.shape[1]
+    (count, images), joints = inputs.arrived.shape, inputs.start.shape[1]
     return LoopRecord(
-        np.empty((count, pictures, joints)),
-        np.empty((count, pictures, 3)),
+        np.empty((count, images, joints)),
+        np.empty((count, images, 3)),
         np.empty(inputs.noise_px.shape),
         np.zeros((count, joints), dtype=np.bool_),
         np.empty((count, 4)),
     )
 
 
-def pack(runs: Sequence[IdealRun]) -> LoopInputs:
+def pack(runs: Sequence[KinematicRun]) -> LoopInputs:
     """Write runs with as many joints and features each into arrays."""
-    features, pictures = len(runs[0].cell.features), max(_pictures(run) for run in runs)
-    poses = np.empty((len(runs), pictures, 4, 4))
-    arrived = np.empty((len(runs), pictures), dtype=np.bool_)
-    noise_px = np.zeros((len(runs), pictures, features, 2))
+    features, images = len(runs[0].cell.features), max(_images(run) for run in runs)
+    poses = np.empty((len(runs), images, 4, 4))
+    arrived = np.empty((len(runs), images), dtype=np.bool_)
+    noise_px = np.zeros((len(runs), images, features, 2))
     for r, run in enumerate(runs):
         cell = run.cell
-        poses[r] = cell.target(_times(run, pictures))
-        arrived[r] = np.random.default_rng(cell.seed).random(pictures) >= cell.dropped
+        poses[r] = cell.target(_times(run, images))
+        arrived[r] = np.random.default_rng(cell.seed).random(images) >= cell.dropped
         if run.noise_px:
             shape = (int(arrived[r].sum()), features, 2)
             noise_px[r, arrived[r]] = run.noise().normal(0.0, 1.0, shape) * run.noise_px
@@ -125,46 +125,46 @@ def pack(runs: Sequence[IdealRun]) -> LoopInputs:
     )
 
 
-def _times(run: IdealRun, pictures: int) -> FloatArray:
+def _times(run: KinematicRun, images: int) -> FloatArray:
     """Return when images are taken, (images,), s."""
-    times: FloatArray = picture_times(pictures, run.cell.inner_rate_hz, run.cell.rate_hz)
+    times: FloatArray = image_times(images, run.cell.inner_rate_hz, run.cell.rate_hz)
     return times
 
 
-def _setup(run: IdealRun) -> TrackingSetup:
+def _setup(run: KinematicRun) -> TrackingSetup:
     assert isinstance(run.law, Servo)
     setup = run.law.tracking
     assert setup is not None
     return setup
 
 
-def _ends(run: IdealRun) -> tuple[float, ...]:
+def _ends(run: KinematicRun) -> tuple[float, ...]:
     return run.duration_s, run.timeouts.image_s, run.timeouts.target_s, run.timeouts.decay_s
 
 
-def _limits(run: IdealRun) -> FloatArray:
+def _limits(run: KinematicRun) -> FloatArray:
     arm = run.cell.arm
     return np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
 
 
-def _wanted(run: IdealRun) -> FloatArray:
+def _wanted(run: KinematicRun) -> FloatArray:
     assert isinstance(run.law, Servo)
     depth = run.law.believed_depth(len(run.wanted_px))
     return np.column_stack((run.cell.camera.normalize(run.wanted_px), depth))
 
 
-def _camera(run: IdealRun) -> tuple[float, ...]:
+def _camera(run: KinematicRun) -> tuple[float, ...]:
     camera = run.cell.camera
     return camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy
 
 
-def _trace(run: IdealRun, inputs: LoopInputs, records: LoopRecord, r: int) -> BatchTrace:
+def _trace(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -> BatchTrace:
     """Read run r out of what the kernel filled."""
-    pictures = int(records.end[r, 2])
-    shown = np.flatnonzero(inputs.arrived[r, : max(pictures, 0)])
+    images = int(records.end[r, 2])
+    shown = np.flatnonzero(inputs.arrived[r, : max(images, 0)])
     return BatchTrace(
         _outcome(run, records, r),
-        records.position[r, : pictures + run.cell.latency_frames],
+        records.position[r, : images + run.cell.latency_frames],
         _times(run, len(records.position[r]))[shown],
         records.points_px[r, shown],
         records.camera_m[r, shown],
@@ -172,7 +172,7 @@ def _trace(run: IdealRun, inputs: LoopInputs, records: LoopRecord, r: int) -> Ba
     )
 
 
-def _outcome(run: IdealRun, records: LoopRecord, r: int) -> Outcome:
+def _outcome(run: KinematicRun, records: LoopRecord, r: int) -> Outcome:
     code, tick, _, value = records.end[r].tolist()
     time = tick / run.cell.inner_rate_hz
     match code:

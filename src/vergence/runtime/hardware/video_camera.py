@@ -82,7 +82,7 @@ class VideoCamera:
             time = self._clock() - self._latency_s
             there, raw = self._capture.retrieve() if there else (False, None)
             if not there:
-                _LOG.info("camera %s: no more pictures", self.name)
+                _LOG.info("camera %s: no more images", self.name)
                 return
             self._waiting.append((time, _grey(np.asarray(raw))))
 

@@ -35,7 +35,7 @@ class McapWriter:
         self._info = info
         self._image_every = image_every
         self._jpeg_quality = jpeg_quality
-        self._pictures = dict.fromkeys(info.cameras, 0)
+        self._images = dict.fromkeys(info.cameras, 0)
         self._flushed = 0.0
         self.now = 0.0  # s, of the last thing recorded
         folder.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,7 @@ class McapWriter:
             self._record_arm(record, arm)
         for frame, view in images_of(record):
             if frame is not None:
-                self._record_picture(frame)
+                self._record_image(frame)
             self._record_points(record, frame, view)
         self._record_target(record)
         if record.time - self._flushed >= _FLUSH_PERIOD:
@@ -108,13 +108,13 @@ class McapWriter:
                 poses["target"] = row["T_world_target"]
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
 
-    def _record_picture(self, frame: Frame) -> None:
-        count = self._pictures.get(frame.camera, 0)
-        self._pictures[frame.camera] = count + 1
+    def _record_image(self, frame: Frame) -> None:
+        count = self._images.get(frame.camera, 0)
+        self._images[frame.camera] = count + 1
         if frame.image is None or not self._image_every or count % self._image_every:
             return
-        picture = messages.image(frame.camera, frame.time, _jpeg(frame.image, self._jpeg_quality))
-        self._file.typed(f"/camera/{frame.camera}/image", self.now, picture)
+        image = messages.image(frame.camera, frame.time, _jpeg(frame.image, self._jpeg_quality))
+        self._file.typed(f"/camera/{frame.camera}/image", self.now, image)
 
     def _record_target(self, record: TickRecord) -> None:
         target = record.observation.target if record.observation else None

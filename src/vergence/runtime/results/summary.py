@@ -15,7 +15,7 @@ def summarise(run: Run) -> dict[str, float]:
     errors = run.pose_errors
     for name, metres, radians in (
         ("target", errors.target_m, errors.target_rad),
-        ("hand", errors.camera_m, errors.camera_rad),
+        ("pose", errors.camera_m, errors.camera_rad),
     ):
         values |= _final_and_max(f"{name}_error_m", np.linalg.norm(metres, axis=1))
         values |= _final_and_max(f"{name}_error_deg", np.rad2deg(radians))

@@ -8,7 +8,6 @@ from vergence.vision.known_object.corner_extractor import (
 from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
 from vergence.vision.known_object.loading import load_object_model, object_model_of
 from vergence.vision.known_object.object_model import ObjectModel
-from vergence.vision.known_object.projection import lens_of
 
 __all__ = [
     "CornerExtractor",
@@ -17,7 +16,6 @@ __all__ = [
     "EdgeMemory",
     "EdgeTracker",
     "ObjectModel",
-    "lens_of",
     "load_object_model",
     "object_model_of",
     "require_image",

@@ -8,17 +8,11 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
+from vergence.camera.lens import pack_lens, pixel_of
 from vergence.errors import InputError
 from vergence.vision.known_object.corner_fit import FOUND, LONGEST_PX, TOO_FEW, fit_corner
 from vergence.vision.known_object.object_model import ObjectModel
-from vergence.vision.known_object.projection import (
-    edge_faces_camera,
-    face_table,
-    hidden,
-    in_camera,
-    lens_of,
-    pixel_of,
-)
+from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
 
 REASONS = (
     "",
@@ -259,7 +253,7 @@ class CornerExtractor:
         places, covariances, codes = measure_corners(
             np.ascontiguousarray(image),
             np.ascontiguousarray(T_camera_target),
-            lens_of(camera),
+            pack_lens(camera),
             model.corners,
             model.corner_edges,
             model.edges,

@@ -6,16 +6,9 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
+from vergence.camera.lens import HEIGHT, WIDTH, pixel_of
 from vergence.vision.known_object.profiles import MARGIN, SHARP_WIDTH, find_steps, read_profile
-from vergence.vision.known_object.projection import (
-    HEIGHT,
-    WIDTH,
-    edge_faces_camera,
-    face_table,
-    hidden,
-    in_camera,
-    pixel_of,
-)
+from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
 
 TEMPLATE = 4  # samples on each side of an edge that are remembered
 BLUR = 9  # samples by which a profile is longer than the search, to follow blurred edges

@@ -7,6 +7,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
+from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.vision.known_object.corner_extractor import require_image
 from vergence.vision.known_object.edge_lines import edge_points
@@ -21,7 +22,7 @@ from vergence.vision.known_object.edge_samples import (
 )
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.pose_fit import PoseFit, agreeing, fit_pose, shifted
-from vergence.vision.known_object.projection import lens_of, pixel_rows
+from vergence.vision.known_object.projection import pixel_rows
 
 _FINE_REACH_PX = 5
 _DOUBLE_PX = 5.0  # edges nearer to each other are not told apart
@@ -125,7 +126,7 @@ class EdgeTracker:
             InputError: if the image is not grey 8 bit or not of the camera's size.
         """
         require_image(image, camera)
-        lens = lens_of(camera)
+        lens = pack_lens(camera)
         prior = np.asarray(np.linalg.inv(pose_covariance), dtype=np.float64)
         samples = self._samples(T_camera_target, lens, _DOUBLE_PX)
         reach = self._reach(T_camera_target, lens, samples, pose_covariance)

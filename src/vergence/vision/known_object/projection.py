@@ -6,26 +6,11 @@ A pose error is (δp, δθ) along camera axes: t + δp, exp(δθ) R, as the filt
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray, frozen
-from vergence.camera import Camera
-from vergence.camera.distortion import distort, distortion_slope
+from vergence.arrays import FloatArray
+from vergence.camera.distortion import distortion_slope
+from vergence.camera.lens import K1, K2, K3, P1, P2, pixel_of
 
-# Columns of a packed lens.
-FX, FY, CX, CY, WIDTH, HEIGHT, K1, K2, P1, P2, K3 = range(11)
 HIDDEN_SLACK = 2e-3  # of its depth: by how much a point must be behind a face to be hidden
-
-
-def lens_of(camera: Camera) -> FloatArray:
-    """Pack a camera for kernels, (11,): fx, fy, cx, cy, width, height, k1, k2, p1, p2, k3."""
-    c = camera
-    return frozen((c.fx, c.fy, c.cx, c.cy, c.width, c.height, *c.distortion), (11,), "lens")
-
-
-@njit(cache=True)
-def pixel_of(lens: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Return the pixel of normalized (x, y); the model of `Camera`."""
-    u, v = distort(x, y, lens[K1], lens[K2], lens[P1], lens[P2], lens[K3])
-    return lens[FX] * u + lens[CX], lens[FY] * v + lens[CY]
 
 
 @njit(cache=True)

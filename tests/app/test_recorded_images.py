@@ -7,7 +7,7 @@ import made_up_run
 import numpy as np
 import pytest
 
-from vergence.app.pictures import encode, film, key_frames
+from vergence.app.recorded_images import encode, film, key_frames
 from vergence.runtime.recording import Recording
 
 
@@ -23,7 +23,7 @@ def decoded(data: bytes, folder: Path) -> tuple[list[object], float]:
     return frames, rate
 
 
-def test_a_film_plays_every_kept_picture_in_real_time(recording: Recording, tmp_path: Path) -> None:
+def test_a_film_plays_every_kept_image_in_real_time(recording: Recording, tmp_path: Path) -> None:
     data = film(recording, "wrist")
     assert data is not None
     frames, rate = decoded(data, tmp_path)
@@ -32,7 +32,7 @@ def test_a_film_plays_every_kept_picture_in_real_time(recording: Recording, tmp_
     assert frames[0].shape == (300, 400, 3)
 
 
-def test_a_film_shows_the_picture_it_was_given(tmp_path: Path) -> None:
+def test_a_film_shows_the_image_it_was_given(tmp_path: Path) -> None:
     ramp = np.add.outer(np.arange(64), np.arange(96)).astype(np.uint8)
     frame = np.repeat(ramp[..., None], 3, axis=2)
     data = encode([frame] * 5, 10.0)
@@ -41,7 +41,7 @@ def test_a_film_shows_the_picture_it_was_given(tmp_path: Path) -> None:
     assert np.abs(frames[-1].astype(float) - frame).mean() < 4.0
 
 
-def test_odd_pictures_lose_a_row_and_a_column(tmp_path: Path) -> None:
+def test_odd_images_lose_a_row_and_a_column(tmp_path: Path) -> None:
     data = encode([np.zeros((63, 95, 3), dtype=np.uint8)] * 3, 10.0)
     assert data is not None
     assert decoded(data, tmp_path)[0][0].shape == (62, 94, 3)
@@ -58,11 +58,11 @@ def test_key_frames_span_the_run(recording: Recording) -> None:
     assert frames[0].time == times[0]
     assert frames[-1].time == times[-1]
     assert len(frames) == 4
-    picture = cv2.imdecode(np.frombuffer(frames[0].jpeg, np.uint8), cv2.IMREAD_COLOR)
-    assert picture.shape == (480, 640, 3)
+    image = cv2.imdecode(np.frombuffer(frames[0].jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert image.shape == (480, 640, 3)
 
 
-def test_a_run_without_pictures_has_neither(tmp_path: Path) -> None:
+def test_a_run_without_images_has_neither(tmp_path: Path) -> None:
     bare = Recording.open(made_up_run.record(tmp_path, images=False, duration=0.5))
     assert film(bare, "wrist") is None
     assert key_frames(bare, "wrist") == []

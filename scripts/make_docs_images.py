@@ -1,6 +1,6 @@
-"""Make the pictures of the documentation's guides; the report's needs Chromium on the path.
+"""Make the images of the documentation's guides; the report's needs Chromium on the path.
 
-It reads the cell of docs/guide/own-arm.md from that page, so picture and page go together.
+It reads the cell of docs/guide/own-arm.md from that page, so image and page go together.
 """
 
 import re
@@ -29,7 +29,7 @@ GREEN, ORANGE, WHITE = (115, 158, 0), (0, 159, 230), (255, 255, 255)  # BGR
 
 
 class Snapshot:
-    """Keeps the tick nearest to an instant that has a picture."""
+    """Keeps the tick nearest to an instant that has an image."""
 
     def __init__(self, time: float) -> None:
         self.time, self.record = time, None
@@ -59,7 +59,7 @@ def own_arm() -> None:
 
 
 def own_object() -> None:
-    """The last picture of the page's footage, with the object drawn in by `vergence track`."""
+    """The last image of the page's footage, with the object drawn in by `vergence track`."""
     page = (DOCS / "guide" / "own-object.md").read_text()
     with tempfile.TemporaryDirectory() as folder:
         for name, text in re.findall(r":caption: (wedge/\S+)\n(.*?)```", page, re.DOTALL):
@@ -85,23 +85,23 @@ def outside(cell, record):
     view = mujoco.MjvCamera()
     view.lookat, view.distance, view.azimuth, view.elevation = [0.2, 0, 0.27], 1.15, 130, -18
     renderer.update_scene(world.data, view)
-    picture = renderer.render()[..., ::-1].copy()
-    picture[picture.sum(axis=2) == 0] = (244, 240, 236)
-    return picture
+    image = renderer.render()[..., ::-1].copy()
+    image[image.sum(axis=2) == 0] = (244, 240, 236)
+    return image
 
 
 def inside(record):
-    """Draw tracked and wanted points into the camera's picture."""
-    picture = cv2.cvtColor(record.sample.frames[-1].image, cv2.COLOR_GRAY2BGR)
+    """Draw tracked and wanted points into the camera's image."""
+    image = cv2.cvtColor(record.sample.frames[-1].image, cv2.COLOR_GRAY2BGR)
     for points_px, color, kind in (
         (record.reference.points_px, ORANGE, cv2.MARKER_CROSS),
         (record.observation.views[-1].points_px, GREEN, cv2.MARKER_SQUARE),
     ):
         for u, v in points_px:
             place = (round(u), round(v))
-            cv2.drawMarker(picture, place, WHITE, kind, 26, 5, cv2.LINE_AA)
-            cv2.drawMarker(picture, place, color, kind, 24, 2, cv2.LINE_AA)
-    return picture
+            cv2.drawMarker(image, place, WHITE, kind, 26, 5, cv2.LINE_AA)
+            cv2.drawMarker(image, place, color, kind, 24, 2, cv2.LINE_AA)
+    return image
 
 
 def report() -> None:

@@ -9,15 +9,15 @@ from vergence.control import Law
 from vergence.planning import FixedReference
 from vergence.runtime import Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.signals import Reference
-from vergence.simulation import ExactPoints, IdealCell, IdealDriver
-from vergence.simulation.ideal_driver import ARM, CAMERA
+from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
+from vergence.simulation.kinematic_driver import ARM, CAMERA
 
 
 @dataclass(frozen=True, slots=True)
-class IdealRun:
+class KinematicRun:
     """One run: by itself in the loop, or among many in `run_batch`, with the same result."""
 
-    cell: IdealCell
+    cell: KinematicCell
     law: Law  # of its own: a law remembers
     wanted_px: FloatArray  # (M, 2) where the features are to be
     duration_s: float
@@ -30,7 +30,7 @@ class IdealRun:
 
     def in_loop(self) -> Run:
         """Make the run in the loop."""
-        driver, recorder = IdealDriver(self.cell), RunRecorder()
+        driver, recorder = KinematicDriver(self.cell), RunRecorder()
         recorder.begin(RunInfo.of(driver, "ideal", "", self.cell.seed, CAMERA))
         loop = Loop(
             driver,

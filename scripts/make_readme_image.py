@@ -1,4 +1,4 @@
-"""Make the README's picture from real runs of the Puma cell: the cell, its camera, its tracks."""
+"""Make the README's image from real runs of the Puma cell: the cell, its camera, its tracks."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ SHOWN_S = 16.0
 
 
 class Snapshot:
-    """Keeps the picture of the task's camera and the joints nearest to an instant."""
+    """Keeps the image of the task's camera and the joints nearest to an instant."""
 
     def __init__(self, time: float) -> None:
         self.time, self.record = time, None
@@ -57,23 +57,23 @@ def cell_view(cell, record):
     view = mujoco.MjvCamera()
     view.lookat, view.distance, view.azimuth, view.elevation = [-0.55, -0.2, 0.62], 3.5, 62, -14
     renderer.update_scene(world.data, view)
-    picture = renderer.render().copy()
-    sky = picture.sum(axis=2) == 0
-    picture[sky] = (236, 240, 244)
-    return picture
+    image = renderer.render().copy()
+    sky = image.sum(axis=2) == 0
+    image[sky] = (236, 240, 244)
+    return image
 
 
 def camera_view(record):
     frame, points = record.sample.frames[-1], record.observation.views[-1].points_px
-    picture = cv2.cvtColor(frame.image, cv2.COLOR_GRAY2RGB)
+    image = cv2.cvtColor(frame.image, cv2.COLOR_GRAY2RGB)
     for points_px, color, kind in (
         (record.reference.points_px, (230, 159, 0), cv2.MARKER_CROSS),
         (points, (0, 158, 115), cv2.MARKER_SQUARE),
     ):
         for u, v in points_px:
-            cv2.drawMarker(picture, (round(u), round(v)), (255, 255, 255), kind, 30, 5, cv2.LINE_AA)
-            cv2.drawMarker(picture, (round(u), round(v)), color, kind, 28, 2, cv2.LINE_AA)
-    return picture
+            cv2.drawMarker(image, (round(u), round(v)), (255, 255, 255), kind, 30, 5, cv2.LINE_AA)
+            cv2.drawMarker(image, (round(u), round(v)), color, kind, 28, 2, cv2.LINE_AA)
+    return image
 
 
 def main() -> None:
@@ -82,11 +82,11 @@ def main() -> None:
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(12.6, 3.3), layout="constrained")
         left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1.05))
-    for axes, picture, title in (
+    for axes, image, title in (
         (left, cell_view(cell, record), "the cell in MuJoCo"),
         (middle, camera_view(record), "its wrist camera: tracked (square), wanted (cross)"),
     ):
-        axes.imshow(picture)
+        axes.imshow(image)
         axes.set_axis_off()
         axes.set_title(title, fontsize=9)
     labels = {

@@ -1,4 +1,4 @@
-"""Pictures that cannot be used: the features are lost with that reason, and the arm holds."""
+"""Images that cannot be used: the features are lost with that reason, and the arm holds."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,8 +16,8 @@ from vergence.simulation import SimulatedDriver
 SPOILT_AT = 0.4
 
 
-class SpoiltPictures:
-    """A driver whose pictures go bad after a while."""
+class SpoiltImages:
+    """A driver whose images go bad after a while."""
 
     def __init__(self, driver: SimulatedDriver, spoil: Callable[[np.ndarray], np.ndarray]) -> None:
         self._driver, self._spoil = driver, spoil
@@ -53,7 +53,7 @@ class SpoiltPictures:
 )
 def test_the_run_ends_by_name_with_the_reason_and_the_arm_at_rest(spoil, kind, reason) -> None:
     cell = load_cell("puma560")
-    driver = SpoiltPictures(SimulatedDriver(cell), spoil)
+    driver = SpoiltImages(SimulatedDriver(cell), spoil)
     notes = Notes()
     try:
         parts = assemble_parts(cell, driver, images=True)

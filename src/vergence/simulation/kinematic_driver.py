@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.camera import Camera, picture_tick
+from vergence.camera import Camera, image_tick
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm
 from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
@@ -20,7 +20,7 @@ Sees = Callable[[FloatArray, FloatArray], BoolArray]
 
 
 @dataclass(frozen=True, slots=True)
-class IdealCell:
+class KinematicCell:
     """One arm that carries one camera, and a target in free space."""
 
     arm: Arm  # up to the camera
@@ -36,14 +36,14 @@ class IdealCell:
     sees: Sees | None = None  # what nothing hides; everything if None
 
 
-class IdealDriver:
+class KinematicDriver:
     """Moves the joints exactly as told and projects the features exactly.
 
     It is a driver like any other, so the loop, the guard and the laws that run in it are those that
     move a real arm.
     """
 
-    def __init__(self, cell: IdealCell) -> None:
+    def __init__(self, cell: KinematicCell) -> None:
         self._cell = cell
         self._rng = np.random.default_rng(cell.seed)
         self._tick = self._exposed = 0
@@ -100,8 +100,8 @@ class IdealDriver:
         if self._rng.random() >= self._cell.dropped:
             self._queue.append((arrival, self.frame()))
 
-    def _tick_of(self, picture: int) -> int:
-        return picture_tick(picture, self._cell.inner_rate_hz, self._cell.rate_hz)
+    def _tick_of(self, image: int) -> int:
+        return image_tick(image, self._cell.inner_rate_hz, self._cell.rate_hz)
 
     def _truth(self) -> FrameTruth:
         cell = self._cell
