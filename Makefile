@@ -6,18 +6,22 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 RENDERS := $(VENV)/.renders
 
+# Drivers whose robots' packages are tried, each in an environment of its own.
+DRIVERS := ur
+
 PYTEST_ARGS ?=
 
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-images test-browser demo test docs bench peers format clean
+.PHONY: help setup test-drivers test-images test-browser demo test docs bench peers format clean
 .PHONY: check test-wheel lint lint-format lint-rules lint-types lint-page fuzz
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
+	@echo "make test-drivers  test the drivers of real robots with the robots' own packages"
 	@echo "make test-wheel  build the wheel, install it into a bare environment and run a cell from it"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
 	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
@@ -50,6 +54,15 @@ demo: setup
 test: setup test-images test-browser
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
+test-drivers: $(DRIVERS:%=test-driver-%)
+
+test-driver-%: .drivers/%/.installed $(RENDERS)
+	.drivers/$*/bin/python -m pytest tests/drivers/protocol_$*.py $(PYTEST_ARGS)
+
+.drivers/%/.installed: $(INSTALLED) scripts/make-driver-venv
+	@scripts/make-driver-venv $* $(VENV)
+	@touch $@
+
 fuzz: setup
 	VERGENCE_FUZZ=long $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)
 
@@ -74,7 +87,7 @@ docs: $(INSTALLED)
 test-wheel: setup
 	@scripts/try-wheel $(BIN)/python
 
-check: lint docs test test-wheel
+check: lint docs test test-drivers test-wheel
 
 bench: setup
 	$(BIN)/python benchmarks/run.py
@@ -87,5 +100,5 @@ format: $(INSTALLED)
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf $(VENV) build dist docs/_build .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .drivers build dist docs/_build .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -140,7 +140,7 @@ def test_a_cell_runs_with_a_driver_of_ones_own(folder: Path, capsys, monkeypatch
     ("named", "said"),
     [
         ("nowhere:Robot", "cannot be imported"),
-        ("ur", "module:Class"),
+        ("no_such_robot", "module:Class"),
         ("mine:Centre", "declared as objective"),
         ("broken_robot:MyRobot", "which raised OSError: no robot answers"),
     ],

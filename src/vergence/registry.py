@@ -29,7 +29,10 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "posture": f"{_CONTROL}.objectives:Posture",
     },
     "limit": {},
-    "driver": {"socket": "vergence.drivers.socket_robot:SocketRobot"},
+    "driver": {
+        "socket": "vergence.drivers.socket_robot:SocketRobot",
+        "ur": "vergence.drivers.ur:Ur",
+    },
     "camera_source": {"video": "vergence.drivers.cameras:Video"},
     "matcher": {"sift": f"{_VISION}.matching:Sift"},
     "planner": {

@@ -67,9 +67,12 @@ def overrides(settings: Sequence[str]) -> dict[str, str]:
 
 def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | None = None) -> "Run":
     """Run a cell, in simulation or with a driver; whatever happens, the recording is closed."""
-    from vergence.app.progress import RunProgress
-    from vergence.assembly import open_driver, run_cell, run_driver
+    from vergence.app.progress import RunProgress, working
+    from vergence.assembly import open_driver, rehearse, run_cell, run_driver
 
+    if driver is not None:
+        with working("rehearsing in simulation"):
+            rehearse(cell)
     try:
         with RunProgress(cell.duration_s) as progress:
             if driver is None:

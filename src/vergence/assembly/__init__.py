@@ -8,7 +8,7 @@ from vergence.assembly.parts import Parts
 from vergence.assembly.photograph import with_goal
 from vergence.assembly.plan import plan
 from vergence.assembly.run import changed_cell, run
-from vergence.assembly.run_cell import run_cell, run_driver
+from vergence.assembly.run_cell import rehearse, run_cell, run_driver
 
 __all__ = [
     "LawContext",
@@ -18,6 +18,7 @@ __all__ = [
     "changed_cell",
     "open_driver",
     "plan",
+    "rehearse",
     "run",
     "run_cell",
     "run_driver",

@@ -1,11 +1,13 @@
 """From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
 
+import logging
 from collections.abc import Callable, Sequence
 
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.parts import Parts
 from vergence.cell import Cell
 from vergence.cell.schema import FollowTable, ReachTable, Task
+from vergence.errors import RenderingError
 from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.runtime.arrival import Goal
 from vergence.runtime.driver import Driver
@@ -13,6 +15,8 @@ from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
+
+_LOG = logging.getLogger(__name__)
 
 
 def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> Run:
@@ -32,6 +36,20 @@ def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True
         return run_driver(cell, driver, listeners, images)
     finally:
         driver.close()
+
+
+def rehearse(cell: Cell, duration_s: float = 0.2) -> None:
+    """Run a cell in simulation for a moment, so that no kernel is compiled while a robot waits.
+
+    Without a renderer on this machine nothing is rehearsed.
+
+    Raises:
+        InputError: if the cell cannot be run as it is written; no robot has been touched then.
+    """
+    try:
+        run_cell(cell.replace(duration_s=duration_s))
+    except RenderingError as error:
+        _LOG.info("no rehearsal: %s", error)
 
 
 def run_driver(
