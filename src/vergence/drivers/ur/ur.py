@@ -4,9 +4,9 @@ from typing import Literal
 
 from vergence.drivers.arm_driver import ArmDriver
 from vergence.drivers.equipment import Equipment
-from vergence.drivers.optional_package import optional_package
 from vergence.drivers.ur.dashboard import check_ready
 from vergence.drivers.ur.ur_link import UrLink
+from vergence.optional_package import optional_package
 from vergence.parts import knob, part
 from vergence.runtime.driver import Driver
 
