@@ -19,6 +19,7 @@ from vergence.app.figures import (
     target_figure,
     twist_figure,
 )
+from vergence.app.goal_pictures import goal_section
 from vergence.app.marks_legend import marks_legend
 from vergence.app.recorded_images import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
@@ -65,6 +66,7 @@ def make_report(run: Run) -> str:
     parts = [
         _header(run),
         _summary(run),
+        goal_section(run) if isinstance(run, Recording) else "",
         *(_camera(run, name) for name in run.cameras),
         _target(run),
         *(_arm(run, name) for name in run.arms),

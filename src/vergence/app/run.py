@@ -35,6 +35,7 @@ def run(
         loaded = with_goal(loaded, goal)
     if out is not None and (out / RECORDING).exists():
         raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
+    from vergence.app.goal_pictures import keep_goal
     from vergence.app.progress import working
     from vergence.app.report import write_report
     from vergence.runtime import Recorder
@@ -42,6 +43,7 @@ def run(
     recorder = Recorder(out or new_folder(loaded.name), image_every)
     result = _recorded(loaded, recorder, images, driver)
     with working("writing the report"):
+        keep_goal(loaded, recorder.folder, result.info.cameras[loaded.task.camera])
         report = write_report(recorder.folder)
     if as_json:
         emit(_answer(loaded.name, result, recorder.folder, report))

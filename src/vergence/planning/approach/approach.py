@@ -16,7 +16,9 @@ from vergence.planning.approach.recognition import (
     ROUGH,
     ROUGH_M,
     UNKNOWN,
+    Confirmation,
     Recognition,
+    confirm,
     recognise,
     tracked_image,
 )
@@ -58,6 +60,25 @@ class _Answer(NamedTuple):
     recognition: Recognition | TwoViewFailure
     path: Path | PlanFailure | None  # None if the plan holds
     new_points: bool  # whether other points are to be followed
+
+
+class _Arrived(NamedTuple):
+    """What a last comparison says of a camera that seems to be at its goal."""
+
+    confirmation: Confirmation
+    reason: str  # where it stands, in words
+
+    def outcome(self, time: float) -> Outcome:
+        """Return the end of the run."""
+        found = self.confirmation
+        if found.holds:
+            return Outcome(OutcomeKind.REACHED, self.reason, time)
+        where = f"{found.in_place} of {found.recognised} points recognised"
+        reason = (
+            f"{self.reason} by the points followed, but only {where} are where the photograph "
+            "shows them: a part of what it shows was moved"
+        )
+        return Outcome(OutcomeKind.NOT_REACHED, reason, time)
 
 
 class Approach:
@@ -286,8 +307,11 @@ class Approach:
         far = float(np.linalg.norm(off[:3])) > max(_OFF * rest, _OFF_M)
         return bool(sure and (far or np.linalg.norm(off[3:]) > _OFF_RAD))
 
-    def _take(self, answer: _Answer, frame: Frame) -> bool:
+    def _take(self, answer: _Answer | _Arrived, frame: Frame) -> bool:
         """Go by the answer of a job; return whether other points are followed from now on."""
+        if isinstance(answer, _Arrived):
+            self._outcome = answer.outcome(frame.time)
+            return False
         found = answer.recognition
         if isinstance(found, TwoViewFailure):
             self._failures += 1
@@ -371,7 +395,9 @@ class Approach:
         far = _in_words(*displacement.at_most())
         reason = f"{where} from the goal; sure within {far}"
         if displacement.within(settings.tolerance_m, settings.tolerance_rad):
-            self._outcome = Outcome(OutcomeKind.REACHED, reason, frame.time)
+            image = frame.image
+            assert image is not None
+            self._worker.ask(lambda: _Arrived(confirm(self._goal, image), reason))
         elif self._stays >= _LOOKS:
             self._outcome = Outcome(OutcomeKind.NOT_REACHED, f"at rest at {reason}", frame.time)
         elif frame.time - self._looked >= _AGAIN_S:

@@ -1,6 +1,7 @@
 """What an image of the arm and the photograph have in common, in metres."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem
 ROUGH_M = 0.3  # distance of the object if nothing is known: rather too near, for short first moves
 UNKNOWN, ROUGH, KNOWN = 0.7, 0.3, 0.01  # deviations of its logarithm
 FEWEST = 8  # points to follow
+IN_PLACE_PX = 3.0
+MOST = 0.7  # share of the points recognised that have to be in their places
 _RIVAL = 13.8  # by how much χ² of a second motion must be larger: odds of one to a thousand
 _TRACK_PX = 0.15  # what a tracked point may be off beside its stated deviation
 
@@ -130,6 +133,25 @@ def recognise(
     return Recognition(
         image, points_px, star_px, star, (first,), fits, by_depth, matches.points_star_px
     )
+
+
+class Confirmation(NamedTuple):
+    """How much of the photograph is where it shows it, once the camera is thought to be there."""
+
+    recognised: int  # points
+    in_place: int  # of them within `IN_PLACE_PX` of where the photograph has them
+
+    @property
+    def holds(self) -> bool:
+        """Whether enough is recognised, and most of it in its place."""
+        return self.recognised >= FEWEST and self.in_place >= MOST * self.recognised
+
+
+def confirm(goal: GoalImage, image: ImageArray) -> Confirmation:
+    """Compare an image with the photograph afresh, by nothing that was tracked."""
+    found = goal.matcher.match(goal.matcher.describe(image), goal.described)
+    shift = np.linalg.norm(found.points_px - found.points_star_px, axis=1)
+    return Confirmation(len(shift), int(np.count_nonzero(shift < IN_PLACE_PX)))
 
 
 def tracked_image(
