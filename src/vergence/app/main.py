@@ -82,12 +82,20 @@ def run(
             metavar="PHOTO", help="Go where this was taken, by images alone; see `vergence goal`."
         ),
     ] = None,
+    points: Annotated[
+        str | None,
+        typer.Option(
+            metavar="U,V U,V …",
+            help="Track these points of the first image, by pixel, whatever the task was.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run a work cell: progress, a summary, and a folder with recording and report."""
     from vergence.app.run import run as command
 
-    code = command(cell, out, seed, images, image_every, settings or (), as_json, driver, goal)
+    chosen = settings or ()
+    code = command(cell, out, seed, images, image_every, chosen, as_json, driver, goal, points)
     raise typer.Exit(code)
 
 

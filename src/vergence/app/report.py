@@ -19,7 +19,7 @@ from vergence.app.figures import (
     target_figure,
     twist_figure,
 )
-from vergence.app.goal_pictures import goal_section
+from vergence.app.goal_images import goal_section
 from vergence.app.marks_legend import marks_legend
 from vergence.app.recorded_images import film, key_frames
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows

@@ -24,18 +24,25 @@ def run(
     as_json: bool,
     driver: str | None = None,
     goal: Path | None = None,
+    points: str | None = None,
 ) -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
     from vergence.cell import load_cell
 
     loaded = load_cell(cell, overrides(settings), seed)  # a mistake is told before all is loaded
+    if goal is not None and points is not None:
+        raise InputError("--points", "", points, "nothing with --goal: one task at a time")
     if goal is not None:
         from vergence.assembly import with_goal
 
         loaded = with_goal(loaded, goal)
+    if points is not None:
+        from vergence.assembly import with_points
+
+        loaded = with_points(loaded, _pixels(points))
     if out is not None and (out / RECORDING).exists():
         raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
-    from vergence.app.goal_pictures import keep_goal
+    from vergence.app.goal_images import keep_goal
     from vergence.app.progress import working
     from vergence.app.report import write_report
     from vergence.runtime import Recorder
@@ -65,6 +72,15 @@ def overrides(settings: Sequence[str]) -> dict[str, str]:
             raise InputError("--set", "", setting, "key=value, such as duration_s=5")
         pairs[key] = value
     return pairs
+
+
+def _pixels(text: str) -> list[tuple[float, float]]:
+    """Read points given as ``u,v u,v``."""
+    try:
+        pairs = [tuple(float(number) for number in pair.split(",")) for pair in text.split()]
+        return [(u, v) for u, v in pairs]
+    except ValueError:
+        raise InputError("--points", "", text, "pixels as u,v u,v") from None
 
 
 def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | None = None) -> "Run":

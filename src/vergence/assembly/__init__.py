@@ -9,6 +9,7 @@ from vergence.assembly.photograph import with_goal
 from vergence.assembly.plan import plan
 from vergence.assembly.run import changed_cell, run
 from vergence.assembly.run_cell import rehearse, run_cell, run_driver
+from vergence.assembly.track import with_points
 
 __all__ = [
     "LawContext",
@@ -23,4 +24,5 @@ __all__ = [
     "run_cell",
     "run_driver",
     "with_goal",
+    "with_points",
 ]

@@ -20,6 +20,7 @@ from vergence.planning.approach import (
     ApproachSettings,
     GoalImage,
     InlineWorker,
+    KnownLength,
     ThreadWorker,
 )
 from vergence.planning.failure import PlanFailure
@@ -67,7 +68,12 @@ def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) 
     """Return what goes to where a photograph was taken; it has not looked yet."""
     taken = take_goal(context, task, driver)
     camera = context.cameras[task.camera]
+    length = None
+    if task.length is not None:
+        ends = taken.in_image(np.array(task.length.points_px), camera)
+        length = KnownLength(ends, task.length.length_m)
     settings = ApproachSettings(
+        length=length,
         tolerance_m=task.tolerance_m,
         tolerance_rad=float(np.deg2rad(task.tolerance_deg)),
         distance_m=taken.distance_m if task.distance_m is None else task.distance_m,
@@ -98,7 +104,7 @@ def take_goal(context: LawContext, task: ReachTable, driver: StartedDriver) -> P
     goal = goal_positions(cell, arm)
     image = driver.driver.frame_at(task.camera, task.arm, goal).image
     assert image is not None
-    return Photograph(image, None, {}, None)
+    return Photograph(image, None, {}, None, camera)
 
 
 def plan_approach(

@@ -1,5 +1,6 @@
 """The task `track`: features kept where they are desired in one camera's image."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from vergence.assembly.first_points import first_points
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
+from vergence.cell import Cell
 from vergence.cell.schema import ToolTable, TrackTable
 from vergence.errors import InputError
 from vergence.planning import FixedReference
@@ -37,6 +39,19 @@ def track_parts(
     context = context.with_points(points)
     law = build_law(context)
     return Parts(driver, perception, FixedReference(reference), law, context)
+
+
+def with_points(cell: Cell, points_px: Sequence[tuple[float, float]]) -> Cell:
+    """Return a cell whose task is to keep points of the first image where they are."""
+    if isinstance(cell.task, TrackTable):
+        task = {**cell.task.model_dump(exclude={"tool"}), "points_px": points_px}
+        return cell.replace(task=task, target={"features": None})
+    task = {"kind": "track", "arm": cell.task.arm, "camera": cell.task.camera}
+    return cell.replace(
+        task={**task, "points_px": points_px},
+        target={"features": None},
+        law={"kind": "image_based"},
+    )
 
 
 def _desired_points(

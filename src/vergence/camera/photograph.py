@@ -25,6 +25,12 @@ class Photograph(NamedTuple):
     shown: BoolArray | None  # (height, width) what the photograph covers; all of it if None
     joints_deg: dict[str, FloatArray]  # by arm, when it was taken; empty if not known
     distance_m: float | None  # from the camera to what it shows, if known
+    lens: Camera  # that took it
+
+    def in_image(self, points_px: FloatArray, camera: Camera) -> FloatArray:
+        """Return where points (N, 2) of the photograph are in `image`, of the arm's camera."""
+        rays = self.lens.normalize(points_px)
+        return camera.project(np.column_stack((rays, np.ones(len(rays)))))
 
 
 def read_photograph(path: Path, camera: Camera) -> Photograph:
@@ -45,13 +51,13 @@ def read_photograph(path: Path, camera: Camera) -> Photograph:
     image = grey_levels(values, white_level(values))
     lens = _lens(path, image, camera)
     joints, distance = _notes(path)
-    if lens == camera:
-        return Photograph(image, None, joints, distance)
+    if _same(lens, camera):
+        return Photograph(image, None, joints, distance, lens)
     seen, shown = _as_seen_by(camera, lens, image)
     if shown.mean() < _LEAST_SHOWN:
         given = f"a photograph that covers {100 * shown.mean():.0f} % of what the camera sees"
         raise InputError(str(path), "", given, f"{100 * _LEAST_SHOWN:.0f} % or more")
-    return Photograph(seen, None if shown.all() else shown, joints, distance)
+    return Photograph(seen, None if shown.all() else shown, joints, distance, lens)
 
 
 def write_photograph(
@@ -95,6 +101,13 @@ def _lens(path: Path, image: ImageArray, camera: Camera) -> Camera:
         )
         raise InputError(str(path), "", given, allowed)
     return Camera(width, height, focal_mm / _DIAGONAL_35MM * float(np.hypot(width, height)))
+
+
+def _same(lens: Camera, camera: Camera) -> bool:
+    """Tell whether two cameras see alike, to a thousandth of a pixel; files are rounded."""
+    size = (lens.width, lens.height) == (camera.width, camera.height)
+    matrix = np.allclose(lens.matrix, camera.matrix, rtol=0.0, atol=1e-3)
+    return size and matrix and np.allclose(lens.distortion, camera.distortion, rtol=0.0, atol=1e-6)
 
 
 def _focal_35mm(path: Path) -> float | None:

@@ -14,6 +14,7 @@ from vergence.cell.schema.tables import (
     CameraTable,
     DriverTable,
     FollowTable,
+    LengthTable,
     PerceptionTable,
     ReachTable,
     SceneTable,
@@ -30,6 +31,7 @@ __all__ = [
     "DriverTable",
     "Duration",
     "FollowTable",
+    "LengthTable",
     "Name",
     "Part",
     "PerceptionTable",
@@ -56,6 +58,7 @@ TABLES: dict[str, type[Table]] = {
     "tool": ToolTable,
     "follow": FollowTable,
     "reach": ReachTable,
+    "length": LengthTable,
     "perception": PerceptionTable,
     "driver": DriverTable,
 }

@@ -171,6 +171,19 @@ class FollowTable(Table):
     target_timeout_s: Duration = 2.0  # with images, but the target lost
 
 
+class LengthTable(Table):
+    """How far two points are apart that a photograph shows."""
+
+    points_px: tuple[Point2, Point2]  # (u, v) of both, in the photograph
+    length_m: Length  # between them
+
+    @model_validator(mode="after")
+    def _apart(self) -> "LengthTable":
+        if max(abs(a - b) for a, b in zip(*self.points_px, strict=True)) < 5.0:
+            raise ValueError("two points at least 5 pixels apart")
+        return self
+
+
 class ReachTable(Table):
     """Bring the camera to where the target looks as in an image taken before, along a plan."""
 
@@ -184,6 +197,7 @@ class ReachTable(Table):
     distance_m: Length | None = (
         None  # rough distance of that camera from what it sees; the arm's motion tells it as well
     )
+    length: LengthTable | None = None  # a known length in the photograph, for the scale
     matcher: Part = "sift"  # what recognises the photograph
     tolerance_m: Length = 1e-3  # distance from the goal at which it is reached, for sure
     tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 0.2  # and angle

@@ -1,7 +1,7 @@
 """The way to a photograph: recognise it, plan, follow the plan, look again, arrive."""
 
 from vergence.planning.approach.approach import Approach, Plan
-from vergence.planning.approach.goal import ApproachSettings, GoalImage
+from vergence.planning.approach.goal import ApproachSettings, GoalImage, KnownLength
 from vergence.planning.approach.worker import InlineWorker, ThreadWorker, Worker
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "ApproachSettings",
     "GoalImage",
     "InlineWorker",
+    "KnownLength",
     "Plan",
     "ThreadWorker",
     "Worker",

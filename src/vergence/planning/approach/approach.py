@@ -19,6 +19,7 @@ from vergence.planning.approach.recognition import (
     Confirmation,
     Recognition,
     confirm,
+    length_ratio,
     recognise,
     tracked_image,
 )
@@ -128,13 +129,16 @@ class Approach:
     def begin(self, frame: Frame) -> Trajectory | PlanFailure | TwoViewFailure:
         """Recognise the photograph from the start and plan; or say why not, before a move."""
         settings = self._settings
-        deviation = KNOWN if settings.exact_distance else ROUGH
-        if settings.distance_m is None:
-            deviation = UNKNOWN
+        deviation = UNKNOWN if settings.distance_m is None else ROUGH
         prior = Prior(np.array([settings.distance_m or ROUGH_M]), deviation)
         assert frame.image is not None
         T = self._camera_pose(frame)
         found = recognise(self._goal, frame.image, T, settings.points, prior)
+        if isinstance(found, Recognition) and settings.length is not None:
+            assert prior.depth_m is not None
+            ratio = length_ratio(settings.length, self._goal, found.fit)
+            prior = Prior(ratio * prior.depth_m, KNOWN)
+            found = recognise(self._goal, frame.image, T, settings.points, prior)
         if isinstance(found, TwoViewFailure):
             return found
         path = self._plan(self._problem(found.fit, frame))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vergence.arrays import FloatArray, ImageArray
+from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.estimation.displacement import Displacement, fit_displacement
 from vergence.estimation.goal_fit import GoalFit, points_in
 from vergence.planning.approach.goal import GoalImage
@@ -75,6 +75,8 @@ class GoalPoints:
         displacement = fit_displacement(points, covariance, self._points_goal()[found])
         if displacement is None:
             return None
+        at_odds = np.flatnonzero(found)[~displacement.agrees]
+        tracks = _without(tracks, at_odds)
         self._seen = [(t, d) for t, d in self._seen if t >= time - _REST_S] + [(time, displacement)]
         return tracks
 
@@ -106,6 +108,15 @@ class GoalPoints:
         points = self.goal.camera.normalize(self.points_px)
         rays: FloatArray = np.column_stack((points, np.ones(len(points))))
         return rays * self._depth_m[:, None]
+
+
+def _without(tracks: Tracks, chosen: IntArray) -> Tracks:
+    """Return tracks without points that disagree with the others, as those on something hidden."""
+    found, reasons = tracks.found.copy(), list(tracks.reasons)
+    found[chosen] = False
+    for number in chosen:
+        reasons[number] = "disagrees with the other points"
+    return tracks._replace(found=found, reasons=tuple(reasons))
 
 
 def _picked(goal: GoalImage, star_px: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
-from vergence.arrays import BoolArray, ImageArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.vision.matching import Matcher
 
@@ -25,6 +25,13 @@ class GoalImage(NamedTuple):
         return cls(image, camera, matcher, matcher.describe(image, mask), mask)
 
 
+class KnownLength(NamedTuple):
+    """How far two points are apart that the photograph shows."""
+
+    points_px: FloatArray  # (2, 2) in the photograph
+    length_m: float
+
+
 @dataclass(frozen=True, slots=True)
 class ApproachSettings:
     """How a photograph is approached."""
@@ -32,7 +39,7 @@ class ApproachSettings:
     tolerance_m: float = 1e-3  # distance from the goal that the confidence region must be within
     tolerance_rad: float = 0.0035  # and angle
     distance_m: float | None = None  # rough distance from camera to object at the goal
-    exact_distance: bool = False  # whether it is known well, as by a length in the photograph
+    length: KnownLength | None = None  # in the photograph
     margin_px: float = 10.0  # kept from the border of the image
     margin_joint: float = 0.01  # of half a joint's range
     camera_speed_m_s: float = 0.25  # on the path

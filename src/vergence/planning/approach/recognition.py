@@ -16,14 +16,14 @@ from vergence.estimation.goal_fit import (
     points_in,
 )
 from vergence.geometry import se3, se3_inverse, transform_points
-from vergence.planning.approach.goal import GoalImage
+from vergence.planning.approach.goal import GoalImage, KnownLength
 from vergence.planning.approach.points import choose_points, depth_between
 from vergence.vision.matching import compare_images
 from vergence.vision.matching.compare import NOISE_PX, Compared
 from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem
 
 ROUGH_M = 0.3  # distance of the object if nothing is known: rather too near, for short first moves
-UNKNOWN, ROUGH, KNOWN = 0.7, 0.3, 0.01  # deviations of its logarithm
+UNKNOWN, ROUGH, KNOWN = 0.7, 0.3, 0.05  # deviations of its logarithm
 FEWEST = 8  # points to follow
 IN_PLACE_PX = 3.0
 MOST = 0.7  # share of the points recognised that have to be in their places
@@ -133,6 +133,15 @@ def recognise(
     return Recognition(
         image, points_px, star_px, star, (first,), fits, by_depth, matches.points_star_px
     )
+
+
+def length_ratio(length: KnownLength, goal: GoalImage, fit: GoalFit) -> float:
+    """Return how much longer a known length is than a fit has it."""
+    known = points_in(fit.T_world_goal, fit.points_world[fit.agrees])
+    points = goal.camera.normalize(length.points_px)
+    depth = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
+    ends = np.column_stack((points, np.ones(2))) * depth[:, None]
+    return length.length_m / float(np.linalg.norm(ends[1] - ends[0]))
 
 
 class Confirmation(NamedTuple):

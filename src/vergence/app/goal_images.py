@@ -49,8 +49,8 @@ def goal_section(recording: Recording) -> str:
     blended = _jpeg(np.hstack([_coloured(goal), _coloured(last), _blended(last, goal)]))
     return markup.section(
         "Goal",
-        markup.picture(found, "image/jpeg", caption),
-        markup.picture(
+        markup.image(found, "image/jpeg", caption),
+        markup.image(
             blended,
             "image/jpeg",
             "The photograph, the last image, and both blended: grey where they agree, orange where "
