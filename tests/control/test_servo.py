@@ -201,7 +201,7 @@ def test_a_limit_of_ones_own_is_kept_and_named():
     points, depth = seen(ARM, START, WORLD)
     free, kept = (
         Servo(
-            ARM, CAMERA, ImageBased(gain=5.0), depth_m=depth,
+            ARM, CAMERA, ImageBased(gain=5.0, interaction="current"), depth_m=depth,
             limits=Limits(manipulability_share=0.0, own=own),
         )
         for own in ((), (Slower(),))

@@ -37,6 +37,7 @@ from vergence.loading import asking
 from vergence.parts import kind_of
 from vergence.registry import kinds
 
+PLAN_MARGIN_PX, PLAN_MARGIN_JOINT = 10.0, 0.01  # of a plan whose task states none
 _OF_PLAN = 0.5  # share of a plan's margins that is kept: it was made to be followed to within them
 _POINT_DEPTHS, _POSE_DEPTHS = (0.5, 2.0), (0.9, 1.1)  # bounds on true over believed depth
 _FEWEST_OF_PATH = 3  # points that leave no direction of the camera open
@@ -203,14 +204,17 @@ def _limits(context: LawContext) -> Limits | None:
     if given is None and not isinstance(cell.law.solver, QuadraticProgram):
         return None
     limits: Limits = given or Limits()
-    if not isinstance(cell.task, ReachTable):
+    planned = getattr(cell.task, "approach", "") == "auto"
+    if not (planned or isinstance(cell.task, ReachTable)):
         return limits
+    margin_px = PLAN_MARGIN_PX if planned else cell.task.margin_px
+    margin_joint = PLAN_MARGIN_JOINT if planned else cell.task.margin_joint
     view_px, joint = limits.view_margin_px, limits.joint_margin
     return replace(
         limits,
-        view_margin_px=_OF_PLAN * cell.task.margin_px if view_px is None else view_px,
+        view_margin_px=_OF_PLAN * margin_px if view_px is None else view_px,
         # The plan's margin is a share of half a range.
-        joint_margin=_OF_PLAN * cell.task.margin_joint / 2.0 if joint is None else joint,
+        joint_margin=_OF_PLAN * margin_joint / 2.0 if joint is None else joint,
     )
 
 

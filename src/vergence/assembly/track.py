@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.assembly.approach import desired_depth, plan_approach
 from vergence.assembly.build_law import build_law
 from vergence.assembly.first_points import first_points
 from vergence.assembly.law_context import LawContext
@@ -14,22 +15,30 @@ from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
 from vergence.cell.schema import ToolTable, TrackTable
 from vergence.errors import InputError
-from vergence.planning import FixedReference
+from vergence.planning import FixedReference, PlanFailure
 from vergence.runtime.several_cameras import SeveralCameras
-from vergence.signals import Reference
+from vergence.runtime.stages import Planner
+from vergence.signals import Outcome, Reference
 
 
 def track_parts(
     context: LawContext, task: TrackTable, driver: StartedDriver, images: bool
-) -> Parts:
-    """Put together what tracks features in the image.
+) -> Parts | Outcome:
+    """Put together what tracks features in the image; or why its goal cannot be reached.
 
     Raises:
         InputError: if the features are not in sight, or the cell cannot be run as it is written.
     """
     points_px, perception = first_points(context, "target", task.camera, driver, images)
     points, tool = {task.camera: points_px}, task.tool
-    reference = Reference(0.0, _desired_points(context, "task.desired", task, points_px))
+    desired_px = _desired_points(context, "task.desired", task, points_px)
+    planner: Planner | PlanFailure | None = None
+    if task.approach == "auto":
+        planner = plan_approach(context, task, points_px, desired_px)
+        if isinstance(planner, PlanFailure):
+            return planner.outcome(0.0)
+    depth = None if isinstance(task.desired, str) else desired_depth(context, task, desired_px)
+    reference = Reference(0.0, desired_px, desired_depth_m=depth)
     if tool is not None:
         points_px, second = first_points(context, "task.tool", tool.camera, driver, images)
         desired = _desired_points(context, "task.tool.desired", tool, points_px)
@@ -38,7 +47,7 @@ def track_parts(
         perception = SeveralCameras((perception, second))
     context = context.with_points(points)
     law = build_law(context)
-    return Parts(driver, perception, FixedReference(reference), law, context)
+    return Parts(driver, perception, planner or FixedReference(reference), law, context)
 
 
 def with_points(cell: Cell, points_px: Sequence[tuple[float, float]]) -> Cell:

@@ -11,7 +11,9 @@ from vergence.parts import field_names, written
 
 OWN = "own"
 PRESETS: Mapping[str, Mapping[str, Any]] = {
-    "image_based": {"kind": "image_based", "solver": "pseudo_inverse"},
+    "image_based": {
+        "kind": "image_based", "solver": "pseudo_inverse", "interaction": "current",
+    },
     "image_based_desired": {
         "kind": "image_based", "solver": "pseudo_inverse", "interaction": "desired",
     },

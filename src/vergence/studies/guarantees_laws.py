@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.control import (
+    DepthFromFeatures,
     ImageBased,
     Law,
     Limits,
@@ -19,19 +20,21 @@ from vergence.control import (
     Servo,
     Situation,
 )
-from vergence.geometry import se3_inverse, transform_points
-from vergence.planning import OptimisedPlanner, Path, PlanningProblem, Trajectory
+from vergence.geometry import flat_normal, se3_inverse, so3_log, transform_points
+from vergence.planning import FixedReference, OptimisedPlanner, Path, PlanningProblem, Trajectory
 from vergence.runtime import Loop, Timeouts
 from vergence.runtime.stages import Planner
 from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import ARM, CAMERA
+from vergence.studies.defaults_run import plan as plan_known
 from vergence.studies.ideal_loop import Ending
 from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, estimate_two_view
 
 RATE_HZ = 30.0
-ARRIVED_PX = 1.0  # every point, truly, this near to its goal at the end
+# Every point, truly, this near to its goal at the end, and the camera to its own.
+ARRIVED_PX, ARRIVED_M, ARRIVED_DEG = 1.0, 1e-3, 0.1
 GAIN = 1.0  # 1/s
 SERVO_S = 25.0  # given to a law without a plan
 REST_S = (
@@ -39,7 +42,6 @@ REST_S = (
 )
 CAMERA_SPEED = 0.25  # m/s, of a plan
 SETTLE_S = 4.0  # after a plan's end
-SITUATION = Situation(1.0 / RATE_HZ, MotionSettings(feed_forward=False))  # a stationary target
 
 PLANNED = "planned, constrained"
 PLAIN, CONSTRAINED = "plain", "constrained"
@@ -47,7 +49,7 @@ VIEW_MARGIN_PX, JOINT_MARGIN = 10.0, 0.01  # kept without a plan; less than star
 
 
 OBJECTIVES: dict[str, Objective] = {
-    "image-based, current L": ImageBased(gain=GAIN),
+    "image-based, current L": ImageBased(gain=GAIN, interaction="current"),
     "image-based, desired L": ImageBased(gain=GAIN, interaction="desired"),
     "image-based, mean L": ImageBased(gain=GAIN, interaction="mean"),
     "optimal tracking": OptimalTracking(Q=8e-6, R=1.0),
@@ -67,22 +69,6 @@ class _StrictView:
             tuple(
                 frame for frame in frames if frame.truth is not None and frame.truth.visible.all()
             )
-        )
-
-
-class _KnownTarget:
-    """Wants the goal's image, and knows how far away the points are now and at the goal."""
-
-    def __init__(
-        self, driver: KinematicDriver, goal_px: FloatArray, goal_depth_m: FloatArray
-    ) -> None:
-        self._driver, self._goal_px, self._goal_depth_m = driver, goal_px, goal_depth_m
-
-    def reference(self, time: float) -> Reference:
-        truth = self._driver.frame().truth
-        assert truth is not None
-        return Reference(
-            time, self._goal_px, depth_m=truth.depth_m, desired_depth_m=self._goal_depth_m
         )
 
 
@@ -107,7 +93,7 @@ def servo(scene: Scene, name: str, how: str) -> Ending:
     """Bring the camera to the goal by one of `LAWS`, through the loop and the guard."""
     if name == PLANNED:
         return _planned(scene)
-    driver = _driver(scene)
+    driver = driver_of(scene)
     goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
     depth = goal[:, 2].copy()
     if how == CONSTRAINED:
@@ -119,10 +105,11 @@ def servo(scene: Scene, name: str, how: str) -> Ending:
             OBJECTIVES[name],
             solver=PseudoInverse(singular_below=0.0),
             depth_m=depth,
-            situation=SITUATION,
+            situation=_situation(scene),
         )
     law = _UntilRest(built, scene.arm.rate_max)
-    return _run(scene, driver, law, _KnownTarget(driver, scene.goal_px, depth), SERVO_S)
+    wanted = FixedReference(Reference(0.0, scene.goal_px, desired_depth_m=depth))
+    return _run(scene, driver, law, wanted, SERVO_S)
 
 
 def _planned(scene: Scene) -> Ending:
@@ -136,7 +123,7 @@ def _planned(scene: Scene) -> Ending:
     # image says little the joints are to go the plan's way.
     law = _constrained(scene, objective, plan.depth_m[-1], *kept, approach_rate=8.0, damping=1e-3)
     duration = trajectory.duration + SETTLE_S
-    return _run(scene, _driver(scene), law, trajectory, duration)
+    return _run(scene, driver_of(scene), law, trajectory, duration)
 
 
 def plan_from_homography(scene: Scene) -> Path | None:
@@ -146,8 +133,9 @@ def plan_from_homography(scene: Scene) -> Path | None:
     normal *= np.sign(normal[2]) / np.linalg.norm(normal)
     now = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
     view = estimate_two_view(now, scene.goal_px, scene.camera, normal_hint=normal, flat=True)
-    if not isinstance(view, TwoView):
-        return None
+    if not isinstance(view, TwoView):  # edge-on, points look collinear: their places tell more
+        found = plan_known(scene, np.random.default_rng(0)).path
+        return found if isinstance(found, Path) else None
     problem = PlanningProblem.from_two_view(
         view, float(normal @ goal[0]), scene.arm, scene.camera, scene.q_start
     )
@@ -155,14 +143,30 @@ def plan_from_homography(scene: Scene) -> Path | None:
     return plan if isinstance(plan, Path) else None
 
 
-def _driver(scene: Scene) -> KinematicDriver:
+def driver_of(scene: Scene) -> KinematicDriver:
+    """Return a driver whose camera sees the marks from their front alone."""
+    middle, normal = scene.points_world.mean(axis=0), flat_normal(scene.points_world)
+    assert normal is not None
+    side = np.sign(normal @ (scene.T_world_goal[:3, 3] - middle))
+
     def target(times: FloatArray) -> FloatArray:
         return np.broadcast_to(scene.T_world_target, (len(times), 4, 4))
 
-    cell = KinematicCell(
-        scene.arm, scene.camera, scene.q_start, target, scene.marks, rate_hz=RATE_HZ
+    def sees(q: FloatArray, _: FloatArray) -> BoolArray:
+        eye = scene.arm.forward_kinematics(q)[:3, 3]
+        return np.full(len(scene.marks), side * (normal @ (eye - middle)) > 0.0)
+
+    return KinematicDriver(
+        KinematicCell(
+            scene.arm, scene.camera, scene.q_start, target, scene.marks, rate_hz=RATE_HZ, sees=sees
+        )
     )
-    return KinematicDriver(cell)
+
+
+def _situation(scene: Scene) -> Situation:
+    """Return what a user's law knows: a stationary target's features, and no true depth."""
+    motion = MotionSettings(feed_forward=False, depth=DepthFromFeatures())
+    return Situation(1.0 / RATE_HZ, motion, features={"": scene.marks})
 
 
 def _constrained(
@@ -189,7 +193,7 @@ def _constrained(
         limits=limits,
         solver=QuadraticProgram(damping=damping),
         depth_m=depth,
-        situation=SITUATION,
+        situation=_situation(scene),
     )
 
 
@@ -209,7 +213,10 @@ def _run(
         truth = driver.frame().truth
         assert truth is not None
         error = np.linalg.norm(truth.points_px - scene.goal_px, axis=1).max()
-        return Ending.ARRIVED if error < ARRIVED_PX else Ending.SHORT
+        off = se3_inverse(scene.T_world_goal.copy()) @ truth.T_world_camera
+        angle = np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))
+        there = np.linalg.norm(off[:3, 3]) < ARRIVED_M and np.degrees(angle) < ARRIVED_DEG
+        return Ending.ARRIVED if error < ARRIVED_PX and there else Ending.SHORT
     return {OutcomeKind.IMAGE_LATE: Ending.VIEW, OutcomeKind.JOINT_LIMIT: Ending.JOINT}[
         outcome.kind
     ]

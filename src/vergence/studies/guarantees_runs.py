@@ -49,7 +49,7 @@ LAWS = (
 # Six turning joints, seven with a track, three that slide and three that turn, six, seven.
 CELLS = ("puma560", "lippiello2005", "gantry", "ur5", "panda")
 RUN_S = 2.0
-LIMITS = Limits(manipulability_share=0.0)  # a random start may be singular
+LIMITS = Limits(manipulability_share=0.0, joint_margin=0.03)  # a random start may be singular
 
 
 class Excess(NamedTuple):

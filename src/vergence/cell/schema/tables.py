@@ -154,6 +154,9 @@ class TrackTable(Table):
         "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
     )
     tracker: Part = "ssd"  # what follows the features from image to image
+    approach: Literal["direct", "auto"] = (
+        "direct"  # auto: along a planned path to stated `desired` points, where they can be planned
+    )
     tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
     tolerance_px: Pixels = 1.0  # mean error above which an arm at rest has not reached its goal
     image_timeout_s: Duration = 0.5  # without an image for so long, the run ends

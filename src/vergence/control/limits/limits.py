@@ -45,7 +45,7 @@ class Limits:
     view_margin_px: float | None = knob(None, "px", least=0, upto=1e4)  # 10, or half of a plan's
     joint_margin: float | None = knob(
         None, least=0, below=0.5
-    )  # of a range: 0.03, or half a plan's
+    )  # of a range: 0.01, or half a plan's
     facing_deg: float = knob(
         1.0, "degrees", least=0, below=90
     )  # least angle at which a flat target is seen; a part of "view"

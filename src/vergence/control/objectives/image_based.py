@@ -23,11 +23,11 @@ class ImageBased:
     """Lets the error of a feature decay exponentially: L v = -λ (s - s_star) + ∂s_star/∂t - ∂s/∂t.
 
     L is taken at the feature as it is, as it should be, or as the mean of both
-    [Chaumette2006] section 5.
+    [Chaumette2006] section 5. The mean alone brings a camera through half a turn about its axis.
     """
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
-    interaction: InteractionModel = knob("current")  # where L is taken
+    interaction: InteractionModel = knob("mean")  # where L is taken
     feature: type[Feature] = slot("feature", Points, by_class=True)  # made of the image points
     damping: float = knob(1e-6, above=0, upto=1, live=False)  # on the twist: closes open directions
 

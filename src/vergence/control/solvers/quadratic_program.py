@@ -24,7 +24,7 @@ from vergence.errors import InputError
 from vergence.parts import knob, part
 from vergence.robot import manipulability_measure
 
-_VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.03
+_VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
 _DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
