@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.motion_needed import require_motion
-from vergence.cell.schema import ReachTable
+from vergence.cell.schema import ReachTable, TrackTable
 from vergence.control import (
     CameraMounting,
     CarriedDepth,
@@ -204,11 +204,12 @@ def _limits(context: LawContext) -> Limits | None:
     if given is None and not isinstance(cell.law.solver, QuadraticProgram):
         return None
     limits: Limits = given or Limits()
-    planned = getattr(cell.task, "approach", "") == "auto"
-    if not (planned or isinstance(cell.task, ReachTable)):
+    if isinstance(cell.task, ReachTable):
+        margin_px, margin_joint = cell.task.margin_px, cell.task.margin_joint
+    elif isinstance(cell.task, TrackTable) and cell.task.approach == "auto":
+        margin_px, margin_joint = PLAN_MARGIN_PX, PLAN_MARGIN_JOINT
+    else:
         return limits
-    margin_px = PLAN_MARGIN_PX if planned else cell.task.margin_px
-    margin_joint = PLAN_MARGIN_JOINT if planned else cell.task.margin_joint
     view_px, joint = limits.view_margin_px, limits.joint_margin
     return replace(
         limits,

@@ -32,11 +32,10 @@ def track_parts(
     points_px, perception = first_points(context, "target", task.camera, driver, images)
     points, tool = {task.camera: points_px}, task.tool
     desired_px = _desired_points(context, "task.desired", task, points_px)
-    planner: Planner | PlanFailure | None = None
-    if task.approach == "auto":
-        planner = plan_approach(context, task, points_px, desired_px)
-        if isinstance(planner, PlanFailure):
-            return planner.outcome(0.0)
+    auto = task.approach == "auto"
+    plan = plan_approach(context, task, points_px, desired_px) if auto else None
+    if isinstance(plan, PlanFailure):
+        return plan.outcome(0.0)
     depth = None if isinstance(task.desired, str) else desired_depth(context, task, desired_px)
     reference = Reference(0.0, desired_px, desired_depth_m=depth)
     if tool is not None:
@@ -47,7 +46,8 @@ def track_parts(
         perception = SeveralCameras((perception, second))
     context = context.with_points(points)
     law = build_law(context)
-    return Parts(driver, perception, planner or FixedReference(reference), law, context)
+    planner: Planner = FixedReference(reference) if plan is None else plan
+    return Parts(driver, perception, planner, law, context)
 
 
 def with_points(cell: Cell, points_px: Sequence[tuple[float, float]]) -> Cell:
