@@ -7,6 +7,7 @@ import numpy as np
 
 import vergence as vg
 from vergence.control import LawSetting
+from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 @vg.part("law")
@@ -29,14 +30,14 @@ class TransposeLaw:
         self._camera, self._depth_m = mounting.camera, setting.depth_m[name]
 
     def command(
-        self, observation: vg.Observation, reference: vg.Reference, joints: vg.JointState
-    ) -> vg.JointCommand:
+        self, observation: Observation, reference: Reference, joints: JointState
+    ) -> JointCommand:
         """Return joint rates for the next outer period."""
         seen = self._camera.normalize(observation.views[-1].points_px)
         error = (seen - self._camera.normalize(reference.points_px)).ravel()
         L = vg.Points(seen, self._depth_m).interaction()
         v_camera = -self._gain * L.T @ error
-        return vg.JointCommand(
+        return JointCommand(
             np.linalg.pinv(self._arm.jacobian(joints.position)) @ v_camera, v_camera
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vergence as vg
+from vergence.errors import ShapeError
 
 STUB = Path(vg.__file__).with_suffix(".pyi")
 
@@ -115,7 +116,7 @@ def test_a_camera_has_its_principal_point_in_the_middle() -> None:
     assert camera.matrix.tolist() == [[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]]
     with pytest.raises(vg.InputError, match="given neither; allowed: one of them"):
         vg.Camera(640, 480)
-    with pytest.raises(vg.ShapeError, match=r"points_px has shape \(2,\)"):
+    with pytest.raises(ShapeError, match=r"points_px has shape \(2,\)"):
         camera.normalize([300, 180])
     with pytest.raises(vg.InputError, match="an array of numbers"):
         camera.normalize([["a", "b"]])
@@ -159,7 +160,7 @@ def test_an_arm_is_read_from_a_urdf_and_ends_where_its_tip_is_put(arm: vg.Arm) -
 
 
 def test_a_mistake_with_an_arm_names_what_is_wrong(arm: vg.Arm, tmp_path: Path) -> None:
-    with pytest.raises(vg.ShapeError, match=r"q has shape \(3,\); it must have shape \(2\)"):
+    with pytest.raises(ShapeError, match=r"q has shape \(3,\); it must have shape \(2\)"):
         arm.jacobian([0, 0, 0])
     with pytest.raises(vg.InputError, match="a rotation and a translation"):
         arm.with_tip(2 * np.eye(4))
@@ -176,7 +177,7 @@ def test_a_guard_takes_any_rates_and_keeps_every_limit(arm: vg.Arm) -> None:
         assert (np.abs(setpoint.velocity) <= arm.rate_max).all()
         assert ((arm.q_min <= setpoint.position) & (setpoint.position <= arm.q_max)).all()
     np.testing.assert_allclose(setpoint.position, [2.0, 0.0], atol=1e-5)
-    with pytest.raises(vg.ShapeError, match=r"rates has shape \(1,\)"):
+    with pytest.raises(ShapeError, match=r"rates has shape \(1,\)"):
         guard.step([0.0])
     with pytest.raises(vg.InputError, match="period_s"):
         vg.Guard(arm, [0.0, 0.1], period_s=0)
