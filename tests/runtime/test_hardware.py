@@ -11,7 +11,14 @@ from scripted_cell import Notes, ScriptedDriver, ScriptedEyes, looped
 
 from vergence.arrays import FloatArray
 from vergence.errors import InputError
-from vergence.runtime.hardware import JointHistory, Metronome, VideoCamera, metronome
+from vergence.runtime.hardware import (
+    DeviceClock,
+    JointHistory,
+    Metronome,
+    VideoCamera,
+    metronome,
+    video_camera,
+)
 from vergence.signals import Frame, JointState, OutcomeKind, Sample
 
 
@@ -48,12 +55,13 @@ def test_every_image_of_a_file_becomes_a_frame(video: Path) -> None:
 
 
 def test_frames_carry_the_time_of_exposure_and_the_joints_then(video: Path) -> None:
-    ticks = iter(np.arange(100.0))
+    ticks = iter(0.02 * np.arange(100.0))  # the file's images are as far apart
     frames = all_frames(
         VideoCamera("eye", str(video), lambda: next(ticks), latency_s=0.25, keep=99)
     )
-    np.testing.assert_allclose([frame.time for frame in frames], np.arange(12) - 0.25)
-    np.testing.assert_allclose([frame.joints["left"][0] for frame in frames], np.arange(12) - 0.25)
+    exposed = 0.02 * np.arange(12) - 0.25
+    np.testing.assert_allclose([frame.time for frame in frames], exposed)
+    np.testing.assert_allclose([frame.joints["left"][0] for frame in frames], exposed)
 
 
 def test_images_nobody_fetches_do_not_pile_up(video: Path) -> None:
@@ -136,6 +144,73 @@ class Unplugged:
     def release(self) -> None: ...
 
 
+class Device:
+    """A device at 50 Hz that stamps its images or not; its images wait until they are fetched.
+
+    Its stamps run fast by 300 ppm, images take 3 to 8 ms, and for a second nobody fetches any.
+    """
+
+    def __init__(self, stamped: bool, count: int = 200) -> None:
+        self.stamped, self.count, self.taken, self.now = stamped, count, 0, 0.0
+        self.exposed = 0.02 * (1 + np.arange(count))
+        self.arrives = self.exposed + np.random.default_rng(3).uniform(0.003, 0.008, count)
+
+    def isOpened(self) -> bool:
+        return True
+
+    def get(self, what: int) -> float:
+        if what == cv2.CAP_PROP_FPS:
+            return 50.0
+        return 1e3 * (1.0003 * self.exposed[self.taken - 1] + 70.0) if self.stamped else 0.0
+
+    def grab(self) -> bool:
+        if self.taken == self.count:
+            return False
+        waited = max(self.arrives[self.taken] - self.now, 0.0)
+        self.now += waited + 1e-4
+        self.taken += 1
+        return True
+
+    def retrieve(self):
+        self.now += 1.0 if self.taken == 120 else 0.0
+        return True, np.zeros((48, 64), np.uint8)
+
+    def release(self) -> None: ...
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_stamps_neither_bunch_up_after_a_stall_nor_drift(stamped: bool, monkeypatch) -> None:
+    device = Device(stamped)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda source: device)
+    monkeypatch.setattr(video_camera, "monotonic", lambda: device.now)
+    frames = all_frames(VideoCamera("eye", 0, lambda: device.now, latency_s=0.0055, keep=999))
+    times = np.array([frame.time for frame in frames])
+    assert len(times) == device.count
+    assert np.abs(times - device.exposed).max() < 4e-3
+    assert np.diff(times).min() > 0.75 * 0.02
+
+
+def test_a_device_clock_finds_offset_and_drift_under_delays_that_vary() -> None:
+    rng = np.random.default_rng(1)
+    for drift in (0.0, 2e-4, -1e-3):
+        clock, errors = DeviceClock(), []
+        for made in np.arange(0.0, 60.0, 0.02):
+            arrival = made + 0.004 + rng.exponential(0.003)
+            if 20.0 < made < 21.2:
+                arrival = 21.3  # a stall
+            errors.append(clock.time(777.0 + (1.0 + drift) * made, arrival) - made - 0.004)
+        assert min(errors[200:]) > -1e-4
+        assert max(errors[200:]) < 1e-3
+
+
+def test_a_device_clock_begins_anew_when_the_device_does() -> None:
+    clock = DeviceClock()
+    for stamp in (5.0, 6.0, 7.0):
+        assert clock.time(stamp, stamp + 10.0) == pytest.approx(stamp + 10.0)
+    for stamp in (0.5, 1.5, 90.0):
+        assert clock.time(stamp, stamp + 30.0) == pytest.approx(stamp + 30.0)
+
+
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     """A clock that only moves when somebody sleeps, or the test says so."""
@@ -184,9 +259,11 @@ def test_joints_between_two_states_lie_on_the_line_between() -> None:
     np.testing.assert_allclose(history.at(2.0), [4.0, -2.0])
 
 
-def test_joints_outside_of_what_is_remembered_are_the_nearest() -> None:
+def test_joints_outside_of_what_is_remembered_go_on_at_their_velocity_for_a_while() -> None:
     history = JointHistory(length=2)
     for t in (1.0, 2.0, 3.0):
-        history.add(JointState(t, np.array([t]), np.zeros(1)))
-    assert history.at(0.0) == 2.0
-    assert history.at(9.0) == 3.0
+        history.add(JointState(t, np.array([t]), np.array([2.0])))
+    assert history.at(3.05) == pytest.approx(3.1)
+    assert history.at(1.95) == pytest.approx(1.9)
+    assert history.at(0.0) == pytest.approx(1.8)
+    assert history.at(9.0) == pytest.approx(3.2)

@@ -149,6 +149,7 @@ class Loop:
     def _begin(self, sample: Sample) -> Outcome | None:
         """Take the set-points from the measured joints; refuse a start far outside the limits."""
         dt, timeouts = 1.0 / self._driver.inner_rate_hz, self._timeouts
+        command_share(0.0, self._period_s, timeouts.decay_s)  # compiles or loads it
         for name, arm in self._driver.arms.items():
             start = sample.joints[name].position
             outside = np.maximum(arm.q_min - start, start - arm.q_max)

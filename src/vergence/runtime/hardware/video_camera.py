@@ -5,19 +5,26 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Event, Thread
+from time import monotonic
 
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
+from vergence.runtime.hardware.device_clock import DeviceClock
 from vergence.runtime.hardware.metronome import Metronome
 from vergence.signals import Frame
 
 _LOG = logging.getLogger(__name__)
+_FRESH_S = 5e-4  # an image that had to be waited for so long has just arrived
 
 
 class VideoCamera:
-    """Takes images in a thread of its own, as fast as they come, and stamps each on arrival.
+    """Takes images in a thread of its own, as fast as they come, and tells when each was exposed.
+
+    Where the source stamps its images, the stamps count, mapped to the run's clock by offset and
+    drift (`DeviceClock`). Where it does not, an image is stamped on arrival; one that has waited
+    already, while this thread was held up, comes a period after the one before.
 
     When the camera is unplugged or the file ends, no more images come, and the loop ends the run
     as it does whenever images stay away: image late.
@@ -48,7 +55,9 @@ class VideoCamera:
         self._capture = cv2.VideoCapture(source)
         if not self._capture.isOpened():
             raise InputError(f"camera {name}", "", source, "a device, file or address OpenCV opens")
-        self._pace = _pace_of(source, self._capture.get(cv2.CAP_PROP_FPS))
+        rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
+        self._pace = _pace_of(source, rate_hz)
+        self._stamps = _Stamps(1.0 / rate_hz if rate_hz > 0.0 else np.inf)
         self._waiting: deque[tuple[float, ImageArray]] = deque(maxlen=keep)
         self._closing = Event()
         self._thread = Thread(target=self._take, name=f"camera {name}", daemon=True)
@@ -75,16 +84,50 @@ class VideoCamera:
         self._capture.release()
 
     def _take(self) -> None:
+        import cv2
+
         while not self._closing.is_set():
             if self._pace is not None:
                 self._pace.wait()
+            before = monotonic()
             there = self._capture.grab()
-            time = self._clock() - self._latency_s
+            arrival, waited_s = self._clock(), monotonic() - before
+            stamp = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
             there, raw = self._capture.retrieve() if there else (False, None)
             if not there:
                 _LOG.info("camera %s: no more images", self.name)
                 return
-            self._waiting.append((time, _grey(np.asarray(raw))))
+            time = self._stamps.time(stamp, arrival, fresh=waited_s > _FRESH_S)
+            self._waiting.append((time - self._latency_s, _grey(np.asarray(raw))))
+
+
+class _Stamps:
+    """Says when images were exposed, by their own stamps where they have some.
+
+    Args:
+        period_s: between images; infinite if not known.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._device = DeviceClock()
+        self._stamp = self._time = float("-inf")
+
+    def time(self, stamp: float, arrival: float, fresh: bool) -> float:
+        """Return the time of an image that arrived, s.
+
+        Args:
+            stamp: the source's, s; one that does not advance is none.
+            arrival: by the run's clock, s.
+            fresh: whether the image was waited for; else it may have waited.
+        """
+        stamped, self._stamp = stamp > self._stamp > float("-inf"), stamp
+        if stamped:
+            self._time = self._device.time(stamp, arrival)
+        else:
+            waited = not fresh and self._time > float("-inf")
+            self._time = min(arrival, self._time + self._period_s) if waited else arrival
+        return self._time
 
 
 def _pace_of(source: int | str, rate_hz: float) -> Metronome | None:
