@@ -2,7 +2,7 @@
 
 import io
 import pickle
-from types import FunctionType
+from types import FunctionType, MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -39,6 +39,11 @@ class _Pickler(pickle.Pickler):
         self.shared.append(obj)
         return len(self.shared) - 1
 
+    def reducer_override(self, obj: Any) -> Any:
+        if isinstance(obj, MappingProxyType):
+            return _read_only, (dict(obj),)
+        return NotImplemented
+
 
 class _Unpickler(pickle.Unpickler):
     def __init__(self, stream: io.BytesIO, shared: list[Any]) -> None:
@@ -47,3 +52,7 @@ class _Unpickler(pickle.Unpickler):
 
     def persistent_load(self, pid: int) -> Any:
         return self._shared[pid]
+
+
+def _read_only(items: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(items)

@@ -76,7 +76,4 @@ def _images(driver: StartedDriver, time: float, moved: float | None) -> Iterator
 
 def _blank(frame: Frame) -> Frame:
     image = None if frame.image is None else np.zeros_like(frame.image)
-    truth = frame.truth
-    if truth is not None:
-        truth = replace(truth, visible=np.zeros_like(truth.visible))
-    return replace(frame, image=image, truth=truth)
+    return replace(frame, image=image)

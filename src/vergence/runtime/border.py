@@ -34,11 +34,12 @@ class Border:
     def __init__(self, driver: Driver, at_rest: Callable[[], bool], image_age_s: float) -> None:
         self._arms: Mapping[str, Arm] = driver.arms
         self._dt = 1.0 / driver.inner_rate_hz
+        self._least_s = _SLOW * self._dt  # by which the clock has to advance in a tick
         self._at_rest = at_rest
         self._images = ImageCheck(driver.cameras, image_age_s)
         self._joints = [JointCheck(name, arm) for name, arm in self._arms.items()]
         self._origin: float | None = None  # the driver's time at the start of the run, s
-        self._time = 0.0  # the driver's, s
+        self._time = 0.0  # the driver's at the last sample, s
         self._behind = 0.0  # s by which the clock has fallen behind the ticks
 
     @property
@@ -49,7 +50,21 @@ class Border:
     def admit(self, sample: Sample) -> Sample | Fault:
         """Return the sample with its new images only, or what is wrong with it."""
         try:
-            return self._admit(sample)
+            time = sample.time
+            if self._origin is None:
+                self._origin = self._time = float(time)
+            elapsed = time - self._time
+            behind = self._behind + self._least_s - elapsed
+            self._behind = behind if behind > 0.0 else 0.0
+            steady = 0.0 <= elapsed <= _JUMP_S and behind <= _FROZEN_S
+            if not steady and (fault := self._check_clock(time, elapsed)):
+                return fault
+            self._time = time
+            since_s = elapsed if elapsed > self._dt else self._dt
+            for joints in self._joints:
+                if fault := joints.check(sample, since_s):
+                    return fault
+            return self._with_new_frames(sample) if sample.frames else sample
         except (AttributeError, TypeError, ValueError, KeyError, IndexError) as error:
             return bad_sample(f"the driver's sample cannot be read: {error}")
 
@@ -83,21 +98,6 @@ class Border:
             return None
         first = names[int(np.argmin(np.isfinite(rates)))]
         return bad_command(f"the law's rate of {first} is not finite")
-
-    def _admit(self, sample: Sample) -> Sample | Fault:
-        time = float(sample.time)
-        if self._origin is None:
-            self._origin = self._time = time
-        elapsed = time - self._time
-        self._behind = max(self._behind + _SLOW * self._dt - elapsed, 0.0)
-        steady = 0.0 <= elapsed <= _JUMP_S and self._behind <= _FROZEN_S
-        if not steady and (fault := self._check_clock(time, elapsed)):
-            return fault
-        self._time = time
-        for joints in self._joints:
-            if fault := joints.check(sample, max(elapsed, self._dt)):
-                return fault
-        return self._with_new_frames(sample) if sample.frames else sample
 
     def _check_clock(self, time: float, elapsed: float) -> Fault | None:
         """Say what is wrong with a clock that went backwards, far ahead, or hardly at all."""

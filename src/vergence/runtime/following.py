@@ -31,26 +31,27 @@ class FollowingBound(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def farthest_joint(
-    measured: FloatArray, setpoint: FloatArray, bound: FloatArray, recent: FloatArray, row: int
+    measured: FloatArray, setpoint: FloatArray, memory: FloatArray, tick: int
 ) -> int:
     """Return the joint farthest beyond its bound from all recent set-points, -1 if none is.
 
     Args:
         measured: joint positions, (n,).
-        setpoint: the last one, (n,); it is written into a row of `recent`.
-        bound: for each joint, rad or m, (n,).
-        recent: the last set-points, (K, n).
-        row: which one is the oldest.
+        setpoint: the last one, (n,).
+        memory: the bound of each joint, rad or m, then the last set-points, (1 + K, n); the oldest
+            is overwritten.
+        tick: how many set-points there were before.
     """
-    recent[row] = setpoint
+    recent = memory[1:]
+    recent[tick % len(recent)] = setpoint
     worst, joint = 0.0, -1
     for i in range(len(measured)):
-        if abs(measured[i] - setpoint[i]) <= bound[i]:
+        if abs(measured[i] - setpoint[i]) <= memory[0, i]:
             continue
         low = high = recent[0, i]
         for k in range(1, len(recent)):
             low, high = min(low, recent[k, i]), max(high, recent[k, i])
-        beyond = max(low - measured[i], measured[i] - high) - bound[i]
+        beyond = max(low - measured[i], measured[i] - high) - memory[0, i]
         if beyond > worst:
             worst, joint = beyond, i
     return joint
@@ -86,7 +87,8 @@ class Follower:
         self.holding: Fault | None = None  # why the arm is held, if it is
         self._name, self._names = name, arm.names
         self._bound, self._patience_s = bound.of(arm), patience_s
-        self._recent = np.tile(start, (max(round(bound.lag_s / dt), 1), 1))
+        recent = np.tile(start, (max(round(bound.lag_s / dt), 1), 1))
+        self._memory = np.vstack((self._bound, recent))
         self._tick = 0
         self._scale = 1.0
         self._anchor = start  # where set-points go while the arm is held
@@ -95,14 +97,14 @@ class Follower:
 
     def observe(self, time: float, measured: FloatArray, robot: RobotState | None) -> Fault | None:
         """Take note of where the arm is; return why the run ends, if it was held for too long."""
-        recent = self._recent
-        row, self._tick = self._tick % len(recent), self._tick + 1
-        joint = farthest_joint(measured, self.guard.position, self._bound, recent, row)
-        stopped = False
-        if robot is not None:
-            self._scale = robot.speed_scale
-            stopped = not robot.running or robot.speed_scale == 0.0
-        if joint < 0 and self.holding is None and not stopped:
+        joint = farthest_joint(measured, self.guard.position, self._memory, self._tick)
+        self._tick += 1
+        if robot is None:
+            if joint < 0 and self.holding is None:
+                return None
+            return self._hold(time, measured, self._reason(joint, measured, None))
+        self._scale = robot.speed_scale
+        if joint < 0 and self.holding is None and robot.running and robot.speed_scale > 0.0:
             return None
         return self._hold(time, measured, self._reason(joint, measured, robot))
 

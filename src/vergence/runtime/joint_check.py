@@ -18,7 +18,9 @@ _NOISE = 0.01  # rad or m that a joint may move in no time: resolution, vibratio
 def first_implausible(
     position: FloatArray, velocity: FloatArray, memory: FloatArray, elapsed: float
 ) -> int:
-    """Return i if joint i is not finite, n + i if it moved too far since the last sample, else -1.
+    """Return i if joint i is not finite, n + i if it moved too far since the last sample.
+
+    Else -1, or -2 if there are not n positions and velocities.
 
     Args:
         position: measured, (n,).
@@ -27,7 +29,9 @@ def first_implausible(
             joint may be seen to move, (2, n); the positions are overwritten if nothing is wrong.
         elapsed: time since the last sample, s.
     """
-    n = len(position)
+    n = memory.shape[1]
+    if len(position) != n or len(velocity) != n:
+        return -2
     for i in range(n):
         if not (np.isfinite(position[i]) and np.isfinite(velocity[i])):
             return i
@@ -58,29 +62,29 @@ class JointCheck:
         """
         state = sample.joints.get(self._name)
         if not isinstance(state, JointState):
-            return self._too_few("no state")
-        position, velocity = state.position, state.velocity
-        if len(position) != self._count:
-            return self._too_few(f"{len(position)} joints")
-        if len(velocity) != self._count:
-            return self._too_few(f"{len(velocity)} joint velocities")
-        age = sample.time - state.time
-        if not -EARLY_S <= age <= _STALE_S:
-            return bad_sample(f"joints of {self._name} are {age:.3f} s old")
-        joint = first_implausible(position, velocity, self._memory, elapsed)
-        if joint >= 0:
-            return self._implausible(joint, position, elapsed)
+            return self._lacks("no state")
+        if not -EARLY_S <= sample.time - state.time <= _STALE_S:
+            return bad_sample(f"joints of {self._name} are {sample.time - state.time:.3f} s old")
+        joint = first_implausible(state.position, state.velocity, self._memory, elapsed)
+        if joint != -1:
+            return self._implausible(joint, state, elapsed)
         return self._check_robot(sample) if sample.robots else None
 
-    def _too_few(self, given: str) -> Fault:
+    def _lacks(self, given: str) -> Fault:
         return bad_sample(f"{given} of {self._name}, which has {self._count} joints")
 
-    def _implausible(self, joint: int, position: FloatArray, elapsed: float) -> Fault:
+    def _implausible(self, joint: int, state: JointState, elapsed: float) -> Fault:
+        if joint < 0:
+            short = len(state.position) == self._count
+            what, values = (
+                ("velocities", state.velocity) if short else ("positions", state.position)
+            )
+            return self._lacks(f"{len(values)} joint {what}")
         moved, joint = divmod(joint, self._count)
         where = f"{self._names[joint]} of {self._name}"
         if not moved:
             return bad_sample(f"{where} is not finite")
-        before, now = float(self._memory[0, joint]), float(position[joint])
+        before, now = float(self._memory[0, joint]), float(state.position[joint])
         return bad_sample(f"{where} went from {before:.4g} to {now:.4g} in {elapsed:.3g} s")
 
     def _check_robot(self, sample: Sample) -> Fault | None:
