@@ -132,7 +132,7 @@ def test_no_fault_of_a_driver_or_law_compiles_anything(compiled, caplog) -> None
 
 
 def test_a_kernel_that_is_compiled_while_the_arm_moves_is_noticed(compiled, monkeypatch) -> None:
-    monkeypatch.setitem(run_driver.__globals__, "rehearse", lambda *arguments: None)
+    monkeypatch.setitem(run_driver.__globals__, "warm_up", lambda *arguments: None)
     cell = load_cell("puma560")
     run_for(cell, SimulatedDriver(cell), 0.3)
     assert compiled

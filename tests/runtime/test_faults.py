@@ -121,3 +121,30 @@ def test_a_set_point_past_a_limit_is_noticed(position, velocity) -> None:
 def test_there_are_enough_faults() -> None:
     assert len(DRIVER_FAULTS) >= 40
     assert len(LAW_FAULTS) >= 30
+
+
+def test_an_arm_that_is_stuck_until_the_time_is_over_does_not_complete() -> None:
+    for duration_s in (1.0, 1.05, 1.1):
+        driver = FaultyDriver(ScriptedDriver(), DRIVER_FAULTS["arm stuck"])
+        outcome = looped(driver, law=FaultyLaw(np.array([0.5, -0.2]))).run(duration_s)
+        assert outcome.kind is OutcomeKind.NOT_FOLLOWING
+
+
+@pytest.mark.parametrize("fault", ["arm stuck for a while", "stopped for a while"])
+@pytest.mark.parametrize("seed", range(4))
+def test_an_arm_that_is_released_goes_on_from_where_it_is(fault: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    driver = FaultyDriver(ScriptedDriver(), DRIVER_FAULTS[fault], rng.uniform(0.2, 0.5), rng)
+    notes = Notes()
+    loop = looped(driver, law=FaultyLaw(np.array([0.5, -0.4])), listeners=[notes])
+    assert loop.run(1.6).succeeded
+    assert keeps_limits(driver)
+    names = [name for _, name, _ in notes.events]
+    released = notes.events[names.index("following")][0]
+    assert names[0] in ("not following", "protective stop")
+    states = {record.time: record for record in notes.ticks}
+    first = min(time for time in states if time >= released)
+    gap = states[first].setpoints["left"].position - states[first].sample.joints["left"].position
+    assert np.abs(gap).max() < 0.02  # within half of the bound
+    went = [states[time].sample.joints["left"].position for time in (first, max(states))]
+    assert np.abs(went[1] - went[0]).max() > 0.05

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vergence.assembly.follow import follow_parts
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
@@ -43,6 +45,10 @@ def assemble_parts(
     if started.missing:
         reason = f"no image from {', '.join(started.missing)} before the start"
         return Outcome(OutcomeKind.IMAGE_LATE, reason, 0.0)
+    for name, q in started.joints.items():
+        if not np.isfinite(q).all():
+            reason = f"the joints of {name} are not finite before the start"
+            return Outcome(OutcomeKind.BAD_SAMPLE, reason, 0.0)
     context = LawContext.of(cell, started, model)
     match cell.task:
         case TrackTable():

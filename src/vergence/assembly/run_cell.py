@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.parts import Parts
-from vergence.assembly.rehearse import rehearse
+from vergence.assembly.warm_up import warm_up
 from vergence.cell import Cell
 from vergence.cell.schema import FollowTable, ReachTable, Task
 from vergence.errors import RenderingError
@@ -86,7 +86,7 @@ def run_driver(
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        rehearse(parts, cell.task.arm, 1.0 / cell.outer_rate_hz)
+        warm_up(parts, cell.task.arm, 1.0 / cell.outer_rate_hz)
         loop = _loop(cell, parts, everyone)
         if attend is not None:
             attend(loop, parts)

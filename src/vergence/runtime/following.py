@@ -84,7 +84,8 @@ class Follower:
     ) -> None:
         self.guard = Guard(arm, start, dt)
         self.guard.approach(start)  # compiles or loads what a hold needs; it moves nothing
-        self.holding: Fault | None = None  # why the arm is held, if it is
+        self.holding: Fault | None = None  # why the arm is held, if it is,
+        self._held_for: Fault | None = None  # and why it was held last
         self._name, self._names = name, arm.names
         self._bound, self._patience_s = bound.of(arm), patience_s
         recent = np.tile(start, (max(round(bound.lag_s / dt), 1), 1))
@@ -114,6 +115,12 @@ class Follower:
             return self.guard.approach(self._anchor)
         return self.guard.step(rates if self._scale == 1.0 else self._scale * rates)
 
+    def hindered(self, time: float, measured: FloatArray) -> Fault | None:
+        """Return why the arm is held, or has hardly moved from where it last was."""
+        stands = (np.abs(measured - self._held_at) <= self._bound).all()
+        lately = stands and time - self._freed < self._patience_s
+        return self.holding or (self._held_for if lately else None)
+
     def _reason(self, joint: int, measured: FloatArray, robot: RobotState | None) -> Fault | None:
         if robot is not None and not robot.running:
             reason = f"{self._name} reports: {robot.mode.value}"
@@ -137,7 +144,7 @@ class Follower:
             # be biased. One that is stopped or guided by hand is kept up with.
             if self.holding is None or reason.kind is OutcomeKind.PROTECTIVE_STOP:
                 self._anchor = measured
-            self.holding = reason
+            self.holding = self._held_for = reason
         elif self._anchored(measured):
             self.holding, self._freed = None, time
             return None

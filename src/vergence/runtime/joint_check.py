@@ -29,7 +29,7 @@ def first_implausible(
             joint may be seen to move, (2, n); the positions are overwritten if nothing is wrong.
         elapsed: time since the last sample, s.
     """
-    n = memory.shape[1]
+    n = len(memory[0])
     if len(position) != n or len(velocity) != n:
         return -2
     for i in range(n):

@@ -175,7 +175,7 @@ class Loop:
             return None
         sample = self._border.in_run_time(sample)
         if self._now >= duration_s:
-            return self._completed(duration_s)
+            return self._completed(duration_s, sample)
         self._part = "perception"
         observation = self._perception.observe(sample.frames)
         self._part = "planner"
@@ -301,10 +301,10 @@ class Loop:
         record = TickRecord(self._now, sample, observation, reference, commands, setpoints)
         self._listeners.tick(record)
 
-    def _completed(self, duration_s: float) -> Outcome:
-        holding = self._followers[self._arm].holding
-        if holding is not None:
-            return Outcome(*holding, self._now)
+    def _completed(self, duration_s: float, sample: Sample) -> Outcome:
+        measured = sample.joints[self._arm].position
+        if hindered := self._followers[self._arm].hindered(self._now, measured):
+            return Outcome(*hindered, self._now)
         if isinstance(self._planner, EndsTask):
             return self._planner.unfinished(self._now)
         return self._arrival.outcome(duration_s, self._now)

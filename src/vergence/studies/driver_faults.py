@@ -231,6 +231,11 @@ _OF_SAMPLES: dict[str, DriverFault] = {
     "every image dropped": DriverFault(LATE, _dropped(1.0)),
     "nine images in ten dropped": DriverFault(GOES_ON | LATE, _dropped(0.9)),
     "protective stop": DriverFault(HELD, _robot_as(mode=RobotMode.PROTECTIVE_STOP)),
+    "stopped for a while": DriverFault(
+        GOES_ON,
+        lambda s, d: _robot_as(mode=RobotMode.PROTECTIVE_STOP)(s, d) if d.time < d.at + 0.3 else s,
+        move=_stuck(0.3),
+    ),
     "emergency stop": DriverFault(HELD, _robot_as(mode=RobotMode.EMERGENCY_STOP)),
     "hand-guided": DriverFault(HELD, _robot_as(mode=RobotMode.HAND_GUIDED)),
     "speed slider at half": DriverFault(GOES_ON, _robot_as(speed_scale=0.5)),

@@ -20,13 +20,13 @@ _LOG = logging.getLogger(__name__)
 _MOTION = (0.0, 1e-3, 2e-3, 3e-3, 2e-2, 4e-2, None, None, 5e-2, 5e-2)
 
 
-def rehearse(parts: Parts, arm: str, period_s: float) -> None:
+def warm_up(parts: Parts, arm: str, period_s: float) -> None:
     """Let copies of perception, planner and law look at the first images again and again.
 
     A kernel is compiled, or loaded from its cache, when it is called first, which takes up to a
     minute: too long for an arm that moves. What contradicts the prediction, or is lost and found
     again, takes other ones, so there are such images as well. A part that cannot be copied is not
-    rehearsed.
+    warmed up.
 
     Args:
         parts: of the run; they are left as they are.
@@ -43,7 +43,7 @@ def rehearse(parts: Parts, arm: str, period_s: float) -> None:
             frames = tuple(_images(parts.driver, time, moved))
             _turn(perception, planner, law, frames, joints, guard)
     except Exception:
-        _LOG.info("the run could not be rehearsed", exc_info=True)
+        _LOG.info("the run could not be warmed up", exc_info=True)
 
 
 def _turn(
