@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from vergence.app import calibrate_command, campaign_commands, goal_command, names
+from vergence.app import calibrate_command, campaign_commands, driver_commands, goal_command, names
 from vergence.app.options import CellName, Driver, ImageEvery, Images, Json, Out, Seed, Settings
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.errors import VergenceError
@@ -285,6 +285,7 @@ def watch(
 
 campaign_commands.register(app)
 calibrate_command.register(app)
+driver_commands.register(app)
 goal_command.register(app)
 
 

@@ -14,7 +14,6 @@ from vergence.robot import Arm
 from vergence.runtime.hardware import JointHistory
 from vergence.signals import JointState, Sample, Setpoint
 
-_CATCH_UP_S = 0.05  # ticks missed by up to so much are made up for, so that the mean rate is kept
 _POLL_S = 2e-4
 
 
@@ -56,7 +55,9 @@ class ArmDriver:
         """Hand the set-point to the arm, and wait for the controller's next tick."""
         if self._name in setpoints:
             self._link.send(setpoints[self._name])
-        self._due = max(self._due + 1.0 / self.inner_rate_hz, self._reading.time - _CATCH_UP_S)
+        period, behind = 1.0 / self.inner_rate_hz, self._reading.time - self._due
+        missed = behind >= max(self._link.catch_up_s, period)
+        self._due = period + (self._reading.time if missed else self._due)
         self._wait()
         self._note()
 

@@ -26,6 +26,15 @@ class ArmLink(Protocol):
         """How many set-points it takes in a second."""
         ...
 
+    @property
+    def catch_up_s(self) -> float:
+        """How much missed time may be made up for by set-points in quick succession.
+
+        0 where set-points are positions, which would move the arm faster than its limits. Speeds
+        do no harm.
+        """
+        ...
+
     def read(self) -> ArmReading:
         """Return the newest reading."""
         ...

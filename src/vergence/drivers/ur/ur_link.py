@@ -42,6 +42,7 @@ class UrLink:
         import rtde_receive
 
         self.rate_hz = settings.rate_hz
+        self.catch_up_s = 0.05 if settings.command == "speedj" else 0.0
         self._settings, self._arm = settings, arm
         self._acceleration = float(arm.acceleration_max.max())
         self._sending = self._halted = False

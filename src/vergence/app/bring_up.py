@@ -1,0 +1,134 @@
+"""`vergence check`: bring up a robot, and leave a page of what was found."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vergence.app import markup
+from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.report import REPORT
+from vergence.app.run import overrides
+
+if TYPE_CHECKING:
+    from vergence.cell import Cell
+    from vergence.drivers.bring_up import CarriedCamera, Finding
+
+_REMINDERS = (
+    "Set payload and centre of gravity of camera and bracket on the robot's own panel.",
+    "Set the robot's own speed limits and safety planes; vergence's limits do not replace them.",
+    "Kill the client once while the arm moves slowly, and see that the arm stops by itself.",
+)
+
+
+def check(
+    cell: str,
+    driver: str,
+    nudge_deg: float,
+    nudge_mm: float,
+    out: Path | None,
+    settings: Sequence[str],
+    as_json: bool,
+) -> int:
+    """Check a robot, print and write what was found; return the exit code."""
+    from vergence.assembly import open_driver
+    from vergence.cell import load_cell
+    from vergence.drivers.bring_up import bring_up
+
+    loaded = load_cell(cell, overrides(settings))
+    opened = open_driver(loaded, driver)
+    findings: list[Finding] = []
+    try:
+        rates = {name: loaded.cameras[name].rate_hz for name in loaded.watched}
+        camera = _carried(loaded)
+        nudges = np.deg2rad(nudge_deg), 1e-3 * nudge_mm
+        for found in bring_up(opened, loaded.task.arm, rates, camera, *nudges):
+            findings.append(found)
+            if not as_json:
+                say(_words(found))
+    finally:
+        opened.close()
+    page = _write_page(out or new_folder(f"check-{loaded.name}"), loaded.name, driver, findings)
+    holds = all(found.holds for found in findings)
+    if as_json:
+        emit(_answer(loaded.name, driver, findings, page))
+    else:
+        for reminder in _REMINDERS:
+            say(f"  to do  {reminder}")
+        say(f"report  {page}")
+    return SUCCESS if holds else FAILURE
+
+
+def _carried(cell: "Cell") -> "CarriedCamera | None":
+    """Return the task's camera, if its arm carries it, with the depth of the target's placement."""
+    from vergence.drivers.bring_up import CarriedCamera
+    from vergence.simulation.cell_model import CellModel
+
+    name = cell.task.camera
+    if cell.cameras[name].arm != cell.task.arm:
+        return None
+    model = CellModel(cell)
+    T_camera_target = np.linalg.inv(model.camera_pose(name)) @ model.target_pose()
+    depth_m = max(float(T_camera_target[2, 3]), 0.05)
+    return CarriedCamera(name, model.cameras[name], model.arm_to_camera(name), depth_m)
+
+
+def _words(found: "Finding") -> str:
+    sign = "ok   " if found.holds else "WRONG"
+    note = f"; {found.note}" if found.note and not found.holds else ""
+    return f"  {sign}  {found.name}: {found.measured:.4g} {found.unit} ({found.allowed}){note}"
+
+
+def _answer(
+    cell: str, driver: str, findings: Sequence["Finding"], page: Path
+) -> Mapping[str, object]:
+    checks = [
+        {
+            "name": f.name,
+            "measured": float(f.measured),
+            "unit": f.unit,
+            "allowed": f.allowed,
+            "holds": bool(f.holds),
+            "note": f.note,
+        }
+        for f in findings
+    ]
+    return {"command": "check", "cell": cell, "driver": driver, "checks": checks, "report": page}
+
+
+def _write_page(folder: Path, cell: str, driver: str, findings: Sequence["Finding"]) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    held = sum(found.holds for found in findings)
+    badge = markup.badge(f"{held} of {len(findings)} checks hold", held == len(findings))
+    header = (
+        '<header><span class="kicker">vergence check</span>'
+        f"<h1>{escape(cell)}</h1><p>{badge}driver {escape(driver)}</p></header>"
+    )
+    reminders = "".join(f"<li>{escape(text)}</li>" for text in _REMINDERS)
+    body = [
+        header,
+        markup.section("Checks", _table(findings)),
+        markup.section("To do by hand", f"<ul>{reminders}</ul>"),
+    ]
+    path = folder / REPORT
+    path.write_text(markup.page(f"{cell} · vergence check", "\n".join(body)), encoding="utf-8")
+    return path
+
+
+def _table(findings: Sequence["Finding"]) -> str:
+    heads = ("check", "measured", "unit", "allowed", "holds", "note")
+    head = "".join(f'<th scope="col">{text}</th>' for text in heads)
+    rows = "\n".join(map(_row, findings))
+    return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>'
+
+
+def _row(found: "Finding") -> str:
+    word = markup.badge("yes" if found.holds else "NO", found.holds)
+    return (
+        f'<tr><th scope="row">{escape(found.name)}</th>'
+        f'<td class="number">{found.measured:.4g}</td><td class="unit">{escape(found.unit)}</td>'
+        f"<td>{escape(found.allowed)}</td><td>{word}</td>"
+        f'<td class="note">{escape(found.note)}</td></tr>'
+    )
