@@ -15,13 +15,14 @@ PYTEST_ARGS ?=
 export MUJOCO_GL ?= egl
 
 .PHONY: help setup test-drivers test-images test-browser demo test docs bench peers format clean
-.PHONY: check test-wheel lint lint-format lint-rules lint-types lint-page fuzz
+.PHONY: check test-wheel lint lint-format lint-rules lint-types lint-page fuzz soak
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
 	@echo "make test-drivers  test the drivers of real robots with the robots' own packages"
+	@echo "make soak     run the loop at 500 Hz for an hour (MINUTES=5 for less), watch its time and memory"
 	@echo "make test-wheel  build the wheel, install it into a bare environment and run a cell from it"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
 	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
@@ -65,6 +66,10 @@ test-driver-%: .drivers/%/.installed $(RENDERS)
 
 fuzz: setup
 	VERGENCE_FUZZ=long $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)
+
+MINUTES ?= 60
+soak: setup
+	$(BIN)/python benchmarks/soak.py --minutes $(MINUTES)
 
 lint: lint-format lint-rules lint-types lint-page
 

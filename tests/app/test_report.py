@@ -57,8 +57,24 @@ def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:
     assert measures["least manipulability"].value == f"{ratio:.2f}"
     assert measures["limit clearance P"].value == f"{arm.penalty.min():.2f}"
     fastest = np.abs(arm.velocity).max()
-    assert measures["fastest joint"].value == f"{100 * fastest:.0f}"
-    assert "joint3" in measures["fastest joint"].note
+    assert measures["joints: fastest"].value == f"{100 * fastest:.0f}"
+    assert "joint3" in measures["joints: fastest"].note
+
+
+def test_set_points_and_the_joints_that_follow_them_are_told_apart(recording: Recording) -> None:
+    info, arm = recording.info.arms["puma"], recording.arms["puma"]
+    beyond = replace(
+        arm,
+        setpoint=np.tile(0.5 * info.q_max, (len(arm.time), 1)),
+        setpoint_rate=np.tile(info.rate_max, (len(arm.time), 1)),
+        velocity=np.tile(1.04 * info.rate_max, (len(arm.time), 1)),
+    )
+    measures = {row.name: row for row in arm_rows(info, beyond)}
+    assert measures["set-points: fastest"].value == "100"
+    assert measures["joints: fastest"].value == "104"
+    assert "overshoot" in measures["joints: fastest"].note
+    before = replace(arm, setpoint=np.full_like(arm.setpoint, np.nan))  # an older recording
+    assert "set-points: nearest a joint limit" not in {row.name for row in arm_rows(info, before)}
 
 
 def test_what_gave_way_is_told_with_when_and_by_how_much(recording: Recording) -> None:

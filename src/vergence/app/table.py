@@ -74,13 +74,18 @@ def _measure_rows(trace: ArmTrace) -> Iterator[Row]:
 
 
 def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
-    position = np.abs(normalized(info, trace.position))
-    rate = np.abs(trace.velocity) / np.where(np.isfinite(info.rate_max), info.rate_max, np.nan)
-    for name, shares in (("nearest a joint limit", position), ("fastest joint", rate)):
-        if np.isfinite(shares).any():
-            row, joint = np.unravel_index(np.nanargmax(shares), shares.shape)
-            where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f} s"
-            yield Row(name, f"{100 * shares[row, joint]:.0f}", "%", where)
+    """Tell apart what is guaranteed, the set-points, and the joints that follow by their servos."""
+    for who, q, rates, note in (
+        ("set-points", trace.setpoint, trace.setpoint_rate, "kept by the guard"),
+        ("joints", trace.position, trace.velocity, "measured; a servo may overshoot"),
+    ):
+        position = np.abs(normalized(info, q))
+        rate = np.abs(rates) / np.where(np.isfinite(info.rate_max), info.rate_max, np.nan)
+        for name, shares in (("nearest a joint limit", position), ("fastest", rate)):
+            if np.isfinite(shares).any():
+                row, joint = np.unravel_index(np.nanargmax(shares), shares.shape)
+                where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f} s; {note}"
+                yield Row(f"{who}: {name}", f"{100 * shares[row, joint]:.0f}", "%", where)
 
 
 def constraint_rows(trace: ArmTrace) -> list[Row]:

@@ -23,7 +23,8 @@ def arm_row(record: TickRecord, arm: str) -> Row:
         "velocity": state.velocity,
     }
     if arm in record.setpoints:
-        row["setpoint"] = record.setpoints[arm].position
+        setpoint = record.setpoints[arm]
+        row |= {"setpoint": setpoint.position, "setpoint_rate": setpoint.velocity}
     command = record.commands.get(arm)
     if command is not None:
         row |= {"command": command.velocity, "v_camera": command.v_camera}

@@ -35,6 +35,7 @@ class ArmTrace(Trace):
     position: FloatArray = column("n")  # (K, n) measured, rad or m
     velocity: FloatArray = column("n")  # (K, n) measured, rad/s or m/s
     setpoint: FloatArray = column("n")  # (K, n) where the joints were last told to be, rad or m
+    setpoint_rate: FloatArray = column("n")  # (K, n) and how fast to move there, rad/s or m/s
     command: FloatArray = column("n")  # (K, n) rates the law asked for; NaN while the arm held
     v_camera: FloatArray = column(6)  # (K, 6) camera twist the command was made from, m/s, rad/s
     manipulability: FloatArray = column()  # (K,) w' of [Nelson1995] eq. (26)
