@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 RENDERS := $(VENV)/.renders
 
 # Drivers whose robots' packages are tried, each in an environment of its own.
-DRIVERS := ur
+DRIVERS := so101 ur
 
 PYTEST_ARGS ?=
 

@@ -31,6 +31,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "limit": {},
     "driver": {
         "socket": "vergence.drivers.socket_robot:SocketRobot",
+        "so101": "vergence.drivers.so101:So101",
         "ur": "vergence.drivers.ur:Ur",
     },
     "camera_source": {"video": "vergence.drivers.cameras:Video"},

@@ -1,0 +1,51 @@
+"""The settings of an arm of Feetech servos."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from vergence.drivers.arm_driver import ArmDriver
+from vergence.drivers.equipment import Equipment
+from vergence.drivers.so101.servo_bus import ServoBus
+from vergence.drivers.so101.so101_link import So101Link
+from vergence.errors import InputError
+from vergence.optional_package import optional_package
+from vergence.parts import knob, part
+from vergence.runtime.driver import Driver
+
+_Id = Annotated[int, Field(ge=0, le=252)]
+_Tick = Annotated[int, Field(ge=0, le=4095)]
+_Sign = Annotated[int, Field(ge=-1, le=1)]
+
+
+@part("driver", "so101")
+class So101:
+    """An SO-100, SO-101 or another arm of STS3215 servos on one serial bus."""
+
+    address: str = "/dev/ttyACM0"  # the serial port of the servo adapter
+    baud: int = knob(1_000_000, "baud", least=9600)  # of the servos
+    ids: tuple[_Id, ...] = ()  # of the servos, from the base outwards; 1, 2, 3 … if absent
+    zero_ticks: tuple[_Tick, ...] = ()  # 0 to 4095 where each joint is at its zero; 2048 if absent
+    signs: tuple[_Sign, ...] = ()  # -1 of a servo that turns against the model; 1 if absent
+    rate_hz: float = knob(100.0, "Hz", least=10.0, upto=200.0)  # of the bus, read and written
+    hottest_deg_c: float = knob(70.0, "°C", least=30.0, upto=90.0)  # above it the arm is held
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)  # without an answer, it is silent
+
+    def open(self, equipment: Equipment) -> Driver:
+        """Open the bus and find every servo; they hold their place."""
+        name = equipment.only_arm("so101")
+        equipment.check_sources("so101")
+        n = equipment.arms[name].joint_count
+        for key in ("ids", "zero_ticks", "signs"):
+            given = getattr(self, key)
+            if given and len(given) != n:
+                allowed = f"{n}, one a joint of {name}"
+                raise InputError(equipment.source, f"driver.{key}", f"{len(given)} values", allowed)
+        sdk = optional_package("so101", "scservo_sdk", "so101")
+        bus = ServoBus(sdk, self.address, self.baud, self.ids or tuple(range(1, n + 1)))
+        try:
+            link = So101Link(bus, self)
+            return ArmDriver(equipment, name, link, 2.0 * self.timeout_s)  # the link tells more
+        except BaseException:
+            bus.close()
+            raise
