@@ -15,7 +15,7 @@ PYTEST_ARGS ?=
 export MUJOCO_GL ?= egl
 
 .PHONY: help setup test-drivers test-images test-browser demo test docs bench peers format clean
-.PHONY: check test-wheel lint lint-format lint-rules lint-types lint-page fuzz soak
+.PHONY: check kernels wheel test-wheel lint lint-format lint-rules lint-types lint-page fuzz soak
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
@@ -23,6 +23,8 @@ help:
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
 	@echo "make test-drivers  test the drivers of real robots with the robots' own packages"
 	@echo "make soak     run the loop at 500 Hz for an hour (MINUTES=5 for less), watch its time and memory"
+	@echo "make kernels  compile now what the first runs would compile"
+	@echo "make wheel    build the wheel, with compiled kernels in it, and the source archive into dist/"
 	@echo "make test-wheel  build the wheel, install it into a bare environment and run a cell from it"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
 	@echo "make check    everything CI checks: formatting, lints, types, documentation, tests"
@@ -89,8 +91,14 @@ docs: $(INSTALLED)
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/_build
 	@echo "documentation: docs/_build/index.html"
 
+kernels: setup
+	@scripts/build-kernels $(BIN)/python
+
+wheel: setup
+	@scripts/build-wheel $(BIN)/python dist
+
 test-wheel: setup
-	@scripts/try-wheel $(BIN)/python
+	@scripts/try-wheel $(BIN)/python dist
 
 check: lint docs test test-drivers test-wheel
 

@@ -4,6 +4,8 @@
 that the import itself takes milliseconds; `__init__.pyi` says what each of them is.
 """
 
+from vergence.prebuilt import use_prebuilt_kernels
+
 _ROOMS = {
     "app.report": ("report",),
     "app.tracking": ("track_points",),
@@ -40,6 +42,8 @@ _ROOMS = {
 _PLACES = {name: room for room, names in _ROOMS.items() for name in names}
 
 __all__ = sorted(_PLACES)
+
+use_prebuilt_kernels()
 
 
 def __getattr__(name: str) -> object:

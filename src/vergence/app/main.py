@@ -14,6 +14,7 @@ from vergence.app.options import CellName, Driver, ImageEvery, Images, Json, Out
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.errors import VergenceError
 from vergence.places import find_recording
+from vergence.prebuilt import use_prebuilt_kernels
 from vergence.studies import PAPERS
 
 app = typer.Typer(
@@ -65,6 +66,8 @@ def start(
         raise typer.Exit(SUCCESS)
     if context.invoked_subcommand is None:
         say(_NEXT.rstrip())
+    elif reason := use_prebuilt_kernels():
+        warn(f"vergence: {reason}. What runs for the first time is compiled: a minute or two.")
 
 
 @app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
