@@ -6,6 +6,7 @@ curvature there says nothing of the other. So the descents start from rotations 
 each with the translation that a linear fit gives it, and from the mirror images of the known pose.
 """
 
+from functools import cache
 from itertools import product
 from typing import NamedTuple
 
@@ -40,7 +41,7 @@ def pose_minima(seen: Seen, known: FloatArray) -> list[PoseMinimum]:
     """
     arguments = seen.poses, seen.points, seen.measured, seen.covariance
     starts = [known, *_mirrored(known, seen)]
-    for R in _SPREAD:
+    for R in _spread_rotations():
         T = with_linear_translation(np.ascontiguousarray(known[:3, :3] @ R), *arguments[:3])
         if np.isfinite(T).all():
             starts.append(T)
@@ -157,6 +158,7 @@ def _mirrored(T_world_target: FloatArray, seen: Seen) -> list[FloatArray]:
     return mirrored
 
 
+@cache
 def _spread_rotations() -> list[FloatArray]:
     """Return the 24 rotations that take a cube to itself, without the identity."""
     axes = product((-1.0, 0.0, 1.0), repeat=3)
@@ -169,6 +171,3 @@ def _spread_rotations() -> list[FloatArray]:
         order = {1: 4, 2: 2, 3: 3}[int(np.count_nonzero(a))]
         rotations += [so3_exp(a * 2.0 * np.pi * k / order) for k in range(1, order)]
     return rotations
-
-
-_SPREAD = _spread_rotations()
