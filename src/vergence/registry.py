@@ -20,7 +20,21 @@ _CONTROL = "vergence.control"
 _MOTIONS = "vergence.simulation.motions"
 _PLANNING, _ESTIMATION, _VISION = "vergence.planning", "vergence.estimation", "vergence.vision"
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
-    "feature": {"points": "vergence.features:Points"},
+    "feature": {
+        "centre": "vergence.features:Centre",
+        "lines": "vergence.features:Lines",
+        "log_depth": "vergence.features:LogDepth",
+        "moments": "vergence.features:Moments",
+        "orientation": "vergence.features:Orientation",
+        "points": "vergence.features:Points",
+        "points_3d": "vergence.features:Points3d",
+        "polar_points": "vergence.features:PolarPoints",
+        "region_moments": "vergence.features:RegionMoments",
+        "segments": "vergence.features:Segments",
+        "size": "vergence.features:Size",
+        "spherical_points": "vergence.features:SphericalPoints",
+        "vanishing_point": "vergence.features:VanishingPoint",
+    },
     "objective": {
         "image_based": f"{_CONTROL}.objectives:ImageBased",
         "optimal_tracking": f"{_CONTROL}.objectives:OptimalTracking",
@@ -74,7 +88,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
 }
 # What a part must have, by its role.
 METHODS: Mapping[str, tuple[str, ...]] = {
-    "feature": ("value", "interaction"),
+    "feature": ("value", "error", "interaction"),
     "objective": ("quadratic",),
     "limit": ("rows",),
     "law": ("bind",),

@@ -1,6 +1,34 @@
 """Visual features: what is seen, and how it moves when the camera does."""
 
+from vergence.features.centre import Centre
 from vergence.features.feature import Feature
-from vergence.features.points import Points, interaction_matrix_points
+from vergence.features.interaction import interaction_matrix_points
+from vergence.features.lines import Lines
+from vergence.features.log_depth import LogDepth
+from vergence.features.moments import Moments, RegionMoments
+from vergence.features.orientation import Orientation
+from vergence.features.points import Points
+from vergence.features.points_3d import Points3d
+from vergence.features.polar_points import PolarPoints
+from vergence.features.segments import Segments
+from vergence.features.size import Size
+from vergence.features.spherical_points import SphericalPoints
+from vergence.features.vanishing_point import VanishingPoint
 
-__all__ = ["Feature", "Points", "interaction_matrix_points"]
+__all__ = [
+    "Centre",
+    "Feature",
+    "Lines",
+    "LogDepth",
+    "Moments",
+    "Orientation",
+    "Points",
+    "Points3d",
+    "PolarPoints",
+    "RegionMoments",
+    "Segments",
+    "Size",
+    "SphericalPoints",
+    "VanishingPoint",
+    "interaction_matrix_points",
+]

@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, frozen
 from vergence.errors import InputError
+from vergence.features.interaction import depth_interaction, interaction_matrix_points
+
+_STEP_S = 1e-6  # of central differences; rates are those of unit twists, about 1 1/s
 
 
 class Feature(ABC):
@@ -22,7 +25,7 @@ class Feature(ABC):
         depth_m: (M,).
 
     Raises:
-        InputError: if a depth is not above zero.
+        InputError: if a depth is not above zero, or if so many points do not make this feature.
     """
 
     def __init__(self, points: ArrayLike, depth_m: ArrayLike = 1.0) -> None:
@@ -37,9 +40,19 @@ class Feature(ABC):
     def value(self) -> FloatArray:
         """Return s, (k,)."""
 
-    @abstractmethod
     def interaction(self) -> FloatArray:
-        """Return L (k, 6) with ṡ = L v_camera for a stationary target."""
+        """Return L (k, 6) with ṡ = L v_camera for a stationary target.
+
+        Column i is the central difference of s while the points and their depths move as the unit
+        twist i moves them. A feature with a formula of its own may return that instead.
+        """
+        flows = interaction_matrix_points(self.points, self.depth_m).T
+        rates = depth_interaction(self.points, self.depth_m).T
+        columns = [
+            self._change(flow.reshape(-1, 2), rate, _STEP_S)
+            for flow, rate in zip(flows, rates, strict=True)
+        ]
+        return np.column_stack(columns)
 
     def error(self, desired: Self) -> FloatArray:
         """Return e = s - s_star, (k,); a feature of angles wraps them here."""
@@ -57,8 +70,13 @@ class Feature(ABC):
             flow: of the points, by the target's own motion, (M, 2), 1/s.
             step_s: of the difference, s.
         """
+        return self._change(flow, np.zeros(len(self.points)), step_s)
+
+    def _change(self, flow: FloatArray, depth_rate: FloatArray, step_s: float) -> FloatArray:
+        """Return ṡ (k,) for rates of points (M, 2) and depths (M,), by a central difference."""
         before, after = (
-            type(self)(self.points + sign * step_s * flow, self.depth_m) for sign in (-1, 1)
+            type(self)(self.points + h * flow, self.depth_m + h * depth_rate)
+            for h in (-step_s, step_s)
         )
         change: FloatArray = after.error(before) / (2 * step_s)
         return change

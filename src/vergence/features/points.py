@@ -1,46 +1,9 @@
 """Image points as visual features."""
 
-import numpy as np
-from numba import njit
-
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
-
-Row = tuple[float, float, float, float, float, float]
-
-
-@njit(cache=True, error_model="numpy")
-def interaction_matrix_points(points: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the interaction matrix L of image points, (2M, 6): ṡ = L v_camera.
-
-    Two rows a point:
-    [-1/Z, 0, x/Z, xy, -(1 + x²), y] and [0, -1/Z, y/Z, 1 + y², -xy, -x].
-    [Nelson1995] eq. (13) is this in pixels, its first entry printed with the wrong sign;
-    [Mezouar2001] section 5.
-
-    Args:
-        points: normalized coordinates, (M, 2).
-        depth: Z of each point along the optical axis, (M,), m.
-    """
-    L = np.empty((2 * len(points), 6))
-    for j in range(len(points)):
-        across, down = point_rows(points[j, 0], points[j, 1], depth[j])
-        r = 2 * j
-        L[r, 0], L[r, 1], L[r, 2], L[r, 3], L[r, 4], L[r, 5] = across
-        r += 1
-        L[r, 0], L[r, 1], L[r, 2], L[r, 3], L[r, 4], L[r, 5] = down
-    return L
-
-
-@njit(cache=True, error_model="numpy")
-def point_rows(x: float, y: float, depth: float) -> tuple[Row, Row]:
-    """Return the two rows of L of a point; as tuples they stay in registers."""
-    near = 1.0 / depth
-    return (
-        (-near, 0.0, x * near, x * y, -(1.0 + x * x), y),
-        (0.0, -near, y * near, 1.0 + y * y, -x * y, -x),
-    )
 
 
 @as_part("feature", "points")

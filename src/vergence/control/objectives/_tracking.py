@@ -8,7 +8,7 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.control._rates import slow_down
 from vergence.features import interaction_matrix_points
-from vergence.features.points import point_rows
+from vergence.features.interaction import point_rows
 from vergence.robot import Chain
 from vergence.robot.manipulability import (
     camera_gradient,

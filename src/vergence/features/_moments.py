@@ -1,0 +1,118 @@
+"""Moments of points and of polygons, and what is made of them [Tahri2005]."""
+
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError
+
+_ORDER = 3
+_ROUND = 1e-9  # share of the spread up to which two extents are one: no orientation
+
+
+class CentralMoments(NamedTuple):
+    """Moments of a set up to the third order, about its centre.
+
+    Attributes:
+        centre: (2,).
+        size: what scales with the square of the distance: a polygon's area, or the sum of
+            squared distances of points from their centre.
+        mu: μ_pq, (4, 4); zero where p + q > 3.
+    """
+
+    centre: FloatArray
+    size: float
+    mu: FloatArray
+
+
+def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
+    """Return the moments of discrete points, (M, 2).
+
+    Raises:
+        InputError: if they coincide.
+    """
+    centre = points.mean(axis=0)
+    powers = (points - centre)[:, :, None] ** np.arange(_ORDER + 1)
+    mu = _up_to_order(np.einsum("mp,mq->pq", powers[:, 0], powers[:, 1]))
+    size = float(mu[2, 0] + mu[0, 2])
+    if not size > 0.0:
+        raise InputError(name, "points", "points at one place", "points that differ")
+    return CentralMoments(centre, size, mu)
+
+
+def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
+    """Return the moments of the inside of a polygon, from its corners in order, (M, 2).
+
+    Integrals over the inside are sums over the sides, by Green's theorem [Steger1996].
+
+    Raises:
+        InputError: if it has no area.
+    """
+    about = corners.mean(axis=0)
+    raw = _polygon_integrals(corners - about)
+    if not abs(raw[0, 0]) > 0.0 or len(corners) < 3:
+        raise InputError(name, "points", "corners without an area between", "corners of a polygon")
+    middle = np.array([raw[1, 0], raw[0, 1]]) / raw[0, 0]
+    mu = _polygon_integrals(corners - about - middle)
+    mu *= np.sign(raw[0, 0])  # corners may come either way round
+    return CentralMoments(about + middle, float(mu[0, 0]), mu)
+
+
+def orientation(name: str, mu: FloatArray) -> float:
+    """Return the direction α of the longest extent, rad within (-π/2, π/2].
+
+    Raises:
+        InputError: if all extents are the same.
+    """
+    across, along = 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
+    if np.hypot(across, along) <= _ROUND * (mu[2, 0] + mu[0, 2]):
+        raise InputError(name, "points", "extents that are alike", "a set with a longest extent")
+    return float(0.5 * np.arctan2(across, along))
+
+
+def tilt_invariants(moments: CentralMoments, dense: bool) -> FloatArray:
+    """Return s_x and s_y, (2,), [Tahri2005] eq. (21).
+
+    They do not change with shifts, size and turns in the image; turns of the camera about its x
+    and y axes change them.
+
+    Args:
+        moments: of the set.
+        dense: whether it is the inside of a polygon, and not points.
+    """
+    mu = moments.mu
+    c1, s1 = mu[2, 0] - mu[0, 2], 2.0 * mu[1, 1]
+    c2, s2 = mu[0, 3] - 3.0 * mu[2, 1], mu[3, 0] - 3.0 * mu[1, 2]
+    c3, s3 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
+    scale = (c1 * c1 + s1 * s1) * (mu[2, 0] + mu[0, 2]) ** 1.5
+    if dense:
+        scale /= np.sqrt(moments.size)
+    return np.array([c2 * c3 + s2 * s3, s2 * c3 - c2 * s3]) / scale
+
+
+def _polygon_integrals(corners: FloatArray) -> FloatArray:
+    """Return ∫ x^p y^q over the inside of a polygon, signed by its sense, (4, 4)."""
+    before = np.roll(corners, 1, axis=0)
+    twice = before[:, 0] * corners[:, 1] - corners[:, 0] * before[:, 1]
+    now = corners[:, :, None] ** np.arange(_ORDER + 1)
+    last = before[:, :, None] ** np.arange(_ORDER + 1)
+    integrals = np.zeros((_ORDER + 1, _ORDER + 1))
+    for p in range(_ORDER + 1):
+        for q in range(_ORDER + 1 - p):
+            total = sum(
+                comb(k + j, j)
+                * comb(p + q - k - j, q - j)
+                * (now[:, 0, k] * last[:, 0, p - k] * now[:, 1, j] * last[:, 1, q - j])
+                for k in range(p + 1)
+                for j in range(q + 1)
+            )
+            share = (p + q + 2) * (p + q + 1) * comb(p + q, p)
+            integrals[p, q] = np.sum(twice * total) / share
+    return integrals
+
+
+def _up_to_order(mu: FloatArray) -> FloatArray:
+    p = np.arange(_ORDER + 1)
+    return np.where(p[:, None] + p <= _ORDER, mu, 0.0)

@@ -1,0 +1,15 @@
+"""The centre of a set of points."""
+
+from vergence.arrays import FloatArray
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "centre")
+class Centre(Feature):
+    """Centre of gravity of the points: s = (x_g, y_g)."""
+
+    def value(self) -> FloatArray:
+        """Return s, (2,)."""
+        centre: FloatArray = self.points.mean(axis=0)
+        return centre

@@ -1,0 +1,33 @@
+"""Straight lines."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features._angles import wrapped
+from vergence.features._pairs import ends
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "lines")
+class Lines(Feature):
+    """Lines x cos θ + y sin θ = ρ through pairs of points: s = (ρ1, θ1, …) [Espiau1992].
+
+    θ is the direction of the normal to the right of the way from the first point to the second: no
+    line is mistaken for itself turned by half a turn.
+    """
+
+    def value(self) -> FloatArray:
+        """Return ρ and θ (rad) of each line in turn, (M,)."""
+        first, second = ends("lines", self.points)
+        way = second - first
+        normal = np.column_stack((way[:, 1], -way[:, 0]))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        distance = np.sum(normal * first, axis=1)
+        return np.column_stack((distance, np.arctan2(normal[:, 1], normal[:, 0]))).ravel()
+
+    def error(self, desired: "Lines") -> FloatArray:
+        """Return e = s - s_star, (M,), with differences of θ within half a turn."""
+        difference = self.value() - desired.value()
+        difference[1::2] = wrapped(difference[1::2])
+        return difference

@@ -1,0 +1,19 @@
+"""The distance of a target along the optical axis."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "log_depth")
+class LogDepth(Feature):
+    """Logarithm of the points' mean depth: s - s_star = ln(Z / Z_star) [Malis1999].
+
+    Beside an image point and the rotation it makes the law of [Malis1999], "2½D".
+    """
+
+    def value(self) -> FloatArray:
+        """Return s, (1,)."""
+        return np.log([self.depth_m.mean()])

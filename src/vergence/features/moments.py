@@ -1,0 +1,55 @@
+"""Moments of a set of points, or of the inside of a polygon, as a feature of six values."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features._angles import wrapped
+from vergence.features._moments import (
+    CentralMoments,
+    moments_of_points,
+    moments_of_polygon,
+    orientation,
+    tilt_invariants,
+)
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "moments")
+class Moments(Feature):
+    """Centre, size, tilt and orientation of points on a plane: s = (x_n, y_n, a_n, s_x, s_y, α).
+
+    The normalised set of [Tahri2005]: with a the sum of squared distances from the centre,
+    a_n = 1/√a, and x_n, y_n are the centre times a_n: for a target seen from the front they move
+    with the camera's three translations, each with one. s_x and s_y are the invariants that turns
+    about x and y change, α turns about the optical axis. The points may come in any order.
+    """
+
+    def value(self) -> FloatArray:
+        """Return s, (6,); α in rad, known up to half a turn."""
+        moments = self._moments()
+        a_n = 1.0 / np.sqrt(moments.size)
+        tilt = tilt_invariants(moments, dense=isinstance(self, RegionMoments))
+        turn = orientation(self._name, moments.mu)
+        return np.array([*(moments.centre * a_n), a_n, *tilt, turn])
+
+    def error(self, desired: "Moments") -> FloatArray:
+        """Return e = s - s_star, (6,), with the difference of α within a quarter turn."""
+        difference = self.value() - desired.value()
+        difference[5:] = wrapped(difference[5:], np.pi)
+        return difference
+
+    _name = "moments"
+
+    def _moments(self) -> CentralMoments:
+        return moments_of_points(self._name, self.points)
+
+
+@as_part("feature", "region_moments")
+class RegionMoments(Moments):
+    """`Moments` of the inside of a polygon; the points are its corners, in order; a is its area."""
+
+    _name = "region_moments"
+
+    def _moments(self) -> CentralMoments:
+        return moments_of_polygon(self._name, self.points)

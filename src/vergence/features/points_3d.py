@@ -1,0 +1,21 @@
+"""Points in space, in the camera's frame."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "points_3d")
+class Points3d(Feature):
+    """Positions of the points in the camera's frame, metres: s = (X1, Y1, Z1, X2, …).
+
+    They are as good as the depths they are made of. The target moves on a straight line in space.
+    """
+
+    def value(self) -> FloatArray:
+        """Return the positions, (3M,), m."""
+        rays = np.column_stack((self.points, np.ones(len(self.points))))
+        positions: FloatArray = (rays * self.depth_m[:, None]).ravel()
+        return positions

@@ -1,0 +1,41 @@
+"""Image points in polar coordinates."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError
+from vergence.features._angles import wrapped
+from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
+from vergence.parts import as_part
+
+
+@as_part("feature", "polar_points")
+class PolarPoints(Feature):
+    """Distance ρ and direction θ of each point: s = (ρ1, θ1, ρ2, θ2, …).
+
+    A turn about the optical axis changes θ alone, so that it does not take the camera backwards
+    as it does with Cartesian coordinates [Iwatsuki2005]. θ is not known at the middle of the image.
+    """
+
+    def value(self) -> FloatArray:
+        """Return ρ and θ in turn, (2M,), rad."""
+        x, y = self.points.T
+        return np.column_stack((np.hypot(x, y), np.arctan2(y, x))).ravel()
+
+    def interaction(self) -> FloatArray:
+        """Return L (2M, 6): the points' own rows, along and across the ray from the middle."""
+        L = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
+        rho = np.hypot(*self.points.T)
+        if not rho.all():
+            raise InputError("polar_points", "points", "one at the middle", "points beside it")
+        c, s = self.points.T / rho
+        along = c[:, None] * L[:, 0] + s[:, None] * L[:, 1]
+        across = (c[:, None] * L[:, 1] - s[:, None] * L[:, 0]) / rho[:, None]
+        return np.stack((along, across), axis=1).reshape(-1, 6)
+
+    def error(self, desired: "PolarPoints") -> FloatArray:
+        """Return e = s - s_star, (2M,), with differences of θ within half a turn."""
+        difference = self.value() - desired.value()
+        difference[1::2] = wrapped(difference[1::2])
+        return difference

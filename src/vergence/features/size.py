@@ -1,0 +1,20 @@
+"""The size of a set of points in the image."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features._moments import moments_of_points
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "size")
+class Size(Feature):
+    """s = 1/√a, a the sum of squared distances from the centre: proportional to the distance.
+
+    [Tahri2005]; a target that faces the camera needs nothing else along the optical axis.
+    """
+
+    def value(self) -> FloatArray:
+        """Return s, (1,)."""
+        return np.array([moments_of_points("size", self.points).size ** -0.5])

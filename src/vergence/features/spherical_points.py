@@ -1,0 +1,21 @@
+"""Image points on the unit sphere."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "spherical_points")
+class SphericalPoints(Feature):
+    """Directions of the lines of sight, as unit vectors: s = (u1, u2, …) [Hamel2002].
+
+    A turn of the camera rotates them as it is, wherever in the image they are.
+    """
+
+    def value(self) -> FloatArray:
+        """Return the unit vectors, (3M,)."""
+        rays = np.column_stack((self.points, np.ones(len(self.points))))
+        unit: FloatArray = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).ravel()
+        return unit

@@ -1,0 +1,34 @@
+"""Where the images of parallel lines meet."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError
+from vergence.features._pairs import ends
+from vergence.features.feature import Feature
+from vergence.parts import as_part
+
+
+@as_part("feature", "vanishing_point")
+class VanishingPoint(Feature):
+    """The direction of two parallel lines, as the unit vector of the ray to where they meet.
+
+    Four points: two on the first line, two on the second, in the same sense. Only turns of the
+    camera move it. The unit vector is defined also where the lines' images are parallel.
+    """
+
+    def value(self) -> FloatArray:
+        """Return the unit vector, (3,), with the sense from first to second points."""
+        if len(self.points) != 4:
+            given = f"{len(self.points)} points"
+            raise InputError("vanishing_point", "points", given, "four: two on each of two lines")
+        first, second = ends("vanishing_point", self.points)
+        ones = np.ones((2, 1))
+        planes = np.cross(np.hstack((first, ones)), np.hstack((second, ones)))
+        ray = np.cross(*planes)
+        length = np.linalg.norm(ray)
+        if not length:
+            raise InputError("vanishing_point", "points", "one line twice", "two lines")
+        towards = np.sum((second - first) * (ray[:2] - ray[2] * first))
+        unit: FloatArray = ray / (length if towards > 0.0 else -length)
+        return unit

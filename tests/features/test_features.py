@@ -1,0 +1,153 @@
+"""Every feature that ships: its interaction matrix, its angles, and what it cannot be made of."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vergence import features
+from vergence.errors import InputError
+from vergence.features import Feature
+from vergence.geometry import se3_exp, se3_inverse, transform_points
+from vergence.registry import find, kinds
+
+POLYGON = np.array(
+    [[-0.1, -0.08], [0.12, -0.06], [0.14, 0.02], [0.05, 0.1], [-0.04, 0.07], [-0.12, 0.04]]
+)
+FLAT = np.column_stack((POLYGON, np.zeros(6)))
+PARALLEL = np.array([[-0.1, -0.1, 0.0], [0.1, -0.08, 0.05], [-0.1, 0.1, 0.0], [0.2, 0.13, 0.075]])
+SHIPPED = {kind: find("feature", kind) for kind in kinds("feature")}
+
+
+def body(kind: str) -> np.ndarray:
+    return PARALLEL if kind == "vanishing_point" else FLAT
+
+
+def seen(kind: str, T_camera_body: np.ndarray) -> Feature:
+    points = transform_points(T_camera_body, body(kind))
+    return SHIPPED[kind](points[:, :2] / points[:, 2:], points[:, 2])
+
+
+def random_pose(rng: np.random.Generator) -> np.ndarray:
+    """A pose from which every point of the bodies is before the camera, and the plane not on edge."""
+    while True:
+        T = se3_exp(np.concatenate((rng.uniform(-0.2, 0.2, 3), rng.normal(0.0, 0.8, 3))))
+        T[2, 3] += rng.uniform(0.4, 1.5)
+        if abs(T[:3, 2] @ T[:3, 3]) > 0.2 * np.linalg.norm(T[:3, 3]):
+            return T
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_interaction_is_what_the_feature_does_when_the_camera_moves(kind: str) -> None:
+    rng = np.random.default_rng(11)
+    h = 1e-6
+    for _ in range(1000):
+        T = random_pose(rng)
+        v_camera = rng.normal(size=6)
+        moved = [seen(kind, se3_inverse(se3_exp(s * h * v_camera)) @ T) for s in (-1.0, 1.0)]
+        rate = moved[1].error(moved[0]) / (2.0 * h)
+        L = seen(kind, T).interaction()
+        assert L.shape == (len(rate), 6)
+        scale = max(np.abs(L).max() * np.abs(v_camera).max(), 1.0)
+        np.testing.assert_allclose(L @ v_camera, rate, atol=1e-6 * scale, rtol=0.0)
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_a_feature_is_at_its_goal_where_it_is_seen_as_there(kind: str) -> None:
+    T = random_pose(np.random.default_rng(5))
+    np.testing.assert_allclose(seen(kind, T).error(seen(kind, T)), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "period"),
+    [
+        ("segments", 2.0),
+        ("lines", 2.0),
+        ("polar_points", 2.0),
+        ("orientation", 1.0),
+        ("moments", 1.0),
+    ],
+)
+def test_a_small_turn_is_a_small_error_wherever_the_angle_jumps(kind: str, period: float) -> None:
+    """Half turns and whole turns of the image in small steps: no error is above the step."""
+    turns = np.arange(0.0, period * np.pi + 0.2, 0.1)
+    sights = []
+    for turn in turns:
+        c, s = np.cos(turn), np.sin(turn)
+        R = np.array([[c, -s], [s, c]])
+        sights.append(SHIPPED[kind](POLYGON @ R.T + [0.4, 0.3], 1.0))
+    for before, after in zip(sights, sights[1:], strict=False):
+        assert np.abs(after.error(before)).max() < 0.5
+
+
+def test_moments_do_not_depend_on_the_order_of_points() -> None:
+    order = np.random.default_rng(2).permutation(len(POLYGON))
+    np.testing.assert_allclose(
+        features.Moments(POLYGON[order]).value(), features.Moments(POLYGON).value()
+    )
+
+
+def test_a_polygon_may_be_named_either_way_round() -> None:
+    np.testing.assert_allclose(
+        features.RegionMoments(POLYGON[::-1]).value(), features.RegionMoments(POLYGON).value()
+    )
+
+
+def test_moments_of_a_polygon_are_integrals() -> None:
+    """Against a triangle's moments of inertia, in closed form."""
+    a, b = 0.3, 0.2
+    triangle = np.array([[0.0, 0.0], [a, 0.0], [0.0, b]])
+    x_n, y_n, a_n, _, _, turn = features.RegionMoments(triangle).value()
+    area = a * b / 2
+    np.testing.assert_allclose([x_n, y_n, a_n], [a / 3 * a_n, b / 3 * a_n, area**-0.5])
+    mu20, mu02, mu11 = a**3 * b / 36, a * b**3 / 36, -(a**2) * b**2 / 72
+    assert turn == pytest.approx(0.5 * np.arctan2(2 * mu11, mu20 - mu02))
+
+
+def test_only_turns_move_a_vanishing_point() -> None:
+    T = random_pose(np.random.default_rng(8))
+    L = seen("vanishing_point", T).interaction()
+    np.testing.assert_allclose(L[:, :3], 0.0, atol=1e-7)
+    direction = T[:3, :3] @ (PARALLEL[1] - PARALLEL[0])
+    direction /= np.linalg.norm(direction)
+    np.testing.assert_allclose(seen("vanishing_point", T).value(), direction, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "points"),
+    [
+        ("segments", [[0.0, 0.0], [0.1, 0.0], [0.2, 0.0]]),
+        ("lines", [[0.1, 0.2], [0.1, 0.2]]),
+        ("vanishing_point", [[0.0, 0.0], [0.1, 0.0]]),
+        ("vanishing_point", [[0.0, 0.0], [0.1, 0.0], [0.2, 0.0], [0.3, 0.0]]),
+        ("size", [[0.1, 0.2], [0.1, 0.2]]),
+        ("orientation", [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]]),
+        ("region_moments", [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2]]),
+    ],
+)
+def test_points_that_do_not_make_the_feature_are_refused(
+    kind: str, points: list[list[float]]
+) -> None:
+    with pytest.raises(InputError, match="points"):
+        SHIPPED[kind](points).value()
+
+
+def test_values_and_matrices_are_those_of_another_implementation() -> None:
+    """ViSP 3.5's; its direction of a segment points the other way."""
+    bodies = {
+        "polar": ("polar_points", np.array([[0.1, 0.05, 0.02]]), slice(0, 2)),
+        "segment": ("segments", np.array([[-0.1, 0.03, 0.0], [0.12, -0.05, 0.04]]), slice(0, 4)),
+        "moment_alpha": ("region_moments", FLAT, slice(5, 6)),
+    }
+    rows = Path(__file__).with_name("reference.jsonl").read_text().splitlines()
+    assert len(rows) == 15
+    for row in map(json.loads, rows):
+        kind, points, which = bodies[row["kind"]]
+        moved = transform_points(np.reshape(row["T_camera_object"], (4, 4)), points)
+        feature = SHIPPED[kind](moved[:, :2] / moved[:, 2:], moved[:, 2])
+        expected = np.array(row["s"])
+        if kind == "segments":
+            expected[3] += np.pi
+        np.testing.assert_allclose(feature.value()[which], expected, atol=1e-12)
+        np.testing.assert_allclose(feature.interaction()[which], row["L"], atol=1e-7)
