@@ -16,6 +16,7 @@ from vergence.control import (
     Depth,
     DepthFromFeatures,
     HeldDepth,
+    ImageBased,
     Law,
     LawSetting,
     Limits,
@@ -118,6 +119,7 @@ def _servo(context: LawContext) -> Servo:
     for name in names:
         if name not in cell.cameras:
             raise InputError("law", "objectives", name, ", ".join(cell.cameras))
+    _require_features_made_of_points(context)
     reaches = isinstance(cell.task, ReachTable)
     depth = _depth(context, names)
     depth_m = None if reaches else {name: context.depth_m(name, settings.depth_m) for name in names}
@@ -138,6 +140,22 @@ def _servo(context: LawContext) -> Servo:
             {name: known for name in names if (known := context.known_features(name)) is not None},
         ),
     )
+
+
+def _require_features_made_of_points(context: LawContext) -> None:
+    """Refuse a visual feature that the points in the first image do not make."""
+    cell = context.cell
+    for term in cell.law.terms:
+        name = term.camera or context.camera_name
+        if not isinstance(term.objective, ImageBased) or name not in context.points_px:
+            continue
+        points_px = context.points_px[name]
+        points = context.cameras[name].normalize(points_px[np.isfinite(points_px).all(axis=1)])
+        try:
+            term.objective.feature(points).value()
+        except InputError as error:
+            given = f"{kind_of(term.objective.feature)} of {error.given}"
+            raise InputError(str(cell.path), "law.feature", given, error.allowed) from None
 
 
 def _depth(context: LawContext, names: list[str]) -> Depth:

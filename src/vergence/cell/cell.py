@@ -22,7 +22,7 @@ from vergence.cell.schema import (
     ToolTable,
     TrackTable,
 )
-from vergence.cell.settings_text import settings_text
+from vergence.cell.settings_text import is_whole, settings_text
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
 from vergence.loading import Place, load_part, names_law
@@ -91,7 +91,7 @@ class Cell(Table):
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some values replaced, by nested dictionaries as in the file.
 
-        A table that names its kind replaces the whole table.
+        A table that names its kind, or a law its objectives, replaces the whole table.
         """
         values = _merge(self.model_dump(), tables)
         return _validate(values, self._path, self._text + settings_text(tables, values))
@@ -145,11 +145,11 @@ def _with(values: Any, keys: list[str], value: Any) -> Any:
 
 
 def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with changes put in; one that names its kind replaces the table whole."""
+    """Return tables with changes put in; see `is_whole` for those that replace one."""
     merged = dict(values)
     for key, change in changes.items():
         old = merged.get(key)
-        if isinstance(change, Mapping) and isinstance(old, dict) and "kind" not in change:
+        if isinstance(change, Mapping) and isinstance(old, dict) and not is_whole(change):
             change = _merge(old, change)
         merged[key] = change
     return merged

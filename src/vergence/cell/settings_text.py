@@ -7,10 +7,15 @@ from typing import Any
 import numpy as np
 
 
+def is_whole(table: Mapping[str, Any]) -> bool:
+    """Tell whether a table replaces another whole: it names its kind, or a law's objectives."""
+    return "kind" in table or "objectives" in table
+
+
 def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> str:
     """Return a line ``# set: KEY = VALUE`` for each change, as `load_cell` writes and reads them.
 
-    A table with a kind is written whole, since its other keys depend on that.
+    A table that replaces another whole is written whole.
 
     Args:
         changes: the nested values that were replaced.
@@ -20,7 +25,7 @@ def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> s
     text = ""
     for key, change in changes.items():
         now = values[key]
-        if isinstance(change, Mapping) and "kind" not in change:
+        if isinstance(change, Mapping) and not is_whole(change):
             text += settings_text(change, now, f"{above}{key}.")
         else:
             text += f"\n# set: {above}{key} = {_toml(now)}"

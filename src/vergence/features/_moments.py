@@ -73,7 +73,7 @@ def orientation(name: str, mu: FloatArray) -> float:
 
 
 def tilt_invariants(moments: CentralMoments, dense: bool) -> FloatArray:
-    """Return s_x and s_y, (2,), [Tahri2005] eq. (21).
+    """Return s_x and s_y, (2,), [Tahri2005].
 
     They do not change with shifts, size and turns in the image; turns of the camera about its x
     and y axes change them.
@@ -89,7 +89,8 @@ def tilt_invariants(moments: CentralMoments, dense: bool) -> FloatArray:
     scale = (c1 * c1 + s1 * s1) * (mu[2, 0] + mu[0, 2]) ** 1.5
     if dense:
         scale /= np.sqrt(moments.size)
-    return np.array([c2 * c3 + s2 * s3, s2 * c3 - c2 * s3]) / scale
+    invariants: FloatArray = np.array([c2 * c3 + s2 * s3, s2 * c3 - c2 * s3]) / scale
+    return invariants
 
 
 def _polygon_integrals(corners: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control import InnerLaw, Law
-from vergence.errors import DriverSilent
+from vergence.errors import DriverSilent, VergenceError
 from vergence.runtime import endings
 from vergence.runtime.arrival import Arrival, Goal
 from vergence.runtime.border import Border
@@ -129,6 +129,8 @@ class Loop:
             return self._stopped()
         except DriverSilent as silence:
             return Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
+        except VergenceError as error:  # says what to do; a traceback would add nothing
+            return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
         except Exception as error:
             _LOG.exception("the %s raised", self._part)
             return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
