@@ -4,7 +4,7 @@
 that the import itself takes milliseconds; `__init__.pyi` says what each of them is.
 """
 
-from vergence.prebuilt import use_prebuilt_kernels
+from vergence.prebuilt import use_prebuilt_kernels as _use_prebuilt_kernels
 
 _ROOMS = {
     "app.report": ("report",),
@@ -43,7 +43,7 @@ _PLACES = {name: room for room, names in _ROOMS.items() for name in names}
 
 __all__ = sorted(_PLACES)
 
-use_prebuilt_kernels()
+_use_prebuilt_kernels()
 
 
 def __getattr__(name: str) -> object:
