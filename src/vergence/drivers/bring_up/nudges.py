@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.drivers.bring_up.finding import Finding
 from vergence.drivers.bring_up.watched import SlowMotion
-from vergence.features.points import interaction_matrix_points
+from vergence.features import interaction_matrix_points
 from vergence.robot import Arm
 from vergence.runtime.driver import Driver
 
