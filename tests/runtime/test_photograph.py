@@ -108,3 +108,37 @@ def test_a_photograph_that_is_not_recognised_is_refused_before_a_move(
     assert run.outcome.time == 0.0
     assert word in run.outcome.reason
     np.testing.assert_allclose(q, start, atol=1e-9)
+
+
+def run_over_the_table(motion):
+    """Run the cell `photograph` with a table that moves; return the outcome and what is left.
+
+    What is left is how far the table is from where the photograph shows it, seen from the camera.
+    """
+    cell = load_cell("photograph")
+    driver = SimulatedDriver(cell)
+    goal = driver.frame_at("wrist", "ur5", np.deg2rad([0, -100, 100, -90, -90, 0])).truth
+    driver.close()
+    driver = SimulatedDriver(cell.replace(target={"motion": motion}, duration_s=12.0))
+    try:
+        run = run_driver(driver.cell, driver, (), images=True)
+        seen = se3_inverse(driver.world.camera_pose("wrist")) @ driver.world.target_pose()
+        desired = se3_inverse(goal.T_world_camera) @ goal.T_world_target
+        return run.outcome, apart(se3_inverse(seen), se3_inverse(desired))
+    finally:
+        driver.close()
+
+
+def test_an_object_that_is_moved_on_the_way_is_reached_where_it_is():
+    motion = {"kind": "step", "offset_m": (0.02, 0.02, 0.0), "time_s": 1.2}
+    outcome, (distance, angle) = run_over_the_table(motion)
+    assert outcome.kind is OutcomeKind.REACHED
+    assert distance < 1e-3
+    assert angle < 0.2
+
+
+def test_an_object_that_keeps_moving_is_never_reached_wrongly():
+    motion = {"kind": "line", "velocity_m_s": (0.01, 0.0, 0.0), "distance_m": 0.5}
+    outcome, (distance, _) = run_over_the_table(motion)
+    assert outcome.kind is not OutcomeKind.REACHED or distance < 1e-3
+    assert outcome.kind is not OutcomeKind.PART_RAISED

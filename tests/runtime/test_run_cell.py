@@ -5,9 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from vergence.assembly import run_cell
+from vergence.assembly import run_cell, run_driver
 from vergence.cell import Cell, load_cell
 from vergence.signals import OutcomeKind
+from vergence.simulation import SimulatedDriver
 
 
 class Trace:
@@ -118,3 +119,12 @@ def test_two_axis_tracking_ends_at_the_joint_limit_or_the_singularity_by_name() 
     assert ends[1].kind is OutcomeKind.SINGULARITY
     assert ends[-1].kind is OutcomeKind.JOINT_LIMIT
     assert "joint1" in ends[-1].reason
+
+
+def test_a_driver_that_is_running_takes_a_second_run() -> None:
+    cell = load_cell("puma560").replace(duration_s=0.3)
+    driver = SimulatedDriver(cell, images=False)
+    for _ in range(2):
+        outcome = run_driver(cell, driver, (), images=False).outcome
+        assert outcome.kind is OutcomeKind.COMPLETED
+    assert driver.time > 0.6

@@ -29,11 +29,6 @@ class Displacement(NamedTuple):
         R = np.ascontiguousarray(self.T_goal_camera[:3, :3])
         return float(np.linalg.norm(so3_log(R)))
 
-    def within(self, tolerance_m: float, tolerance_rad: float, deviations: float = 3.0) -> bool:
-        """Tell whether the whole confidence region is inside the tolerance."""
-        far_m, far_rad = self.at_most(deviations)
-        return far_m <= tolerance_m and far_rad <= tolerance_rad
-
     def at_most(self, deviations: float = 3.0) -> tuple[float, float]:
         """Return the largest distance, m, and angle, rad, in the confidence region."""
         position, turn = self.covariance[:3, :3], self.covariance[3:, 3:]

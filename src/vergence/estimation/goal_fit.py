@@ -17,6 +17,7 @@ from vergence.geometry import se3_inverse, skew, so3_exp
 _ITERATIONS = 12
 _ENOUGH = 1e-4  # step, relative to deviations, below which the adjustment has settled
 _DOUBTFUL = 3.0  # standard deviations from which a point counts less and less
+_FEW = 4  # points that agree, below which none is better than another
 _FLOOR = 1e-10  # of the points' own equations: rays that are parallel leave a depth open
 _LEAST_DEPTH_M = 1e-3
 
@@ -59,6 +60,13 @@ class GoalFit(NamedTuple):
     def scale(self) -> float:
         """Variance of the noise over the stated one, at least 1."""
         return max(1.0, self.chi_square / max(self.freedom, 1))
+
+    @property
+    def points_goal(self) -> FloatArray:
+        """The points that agree in the frame of the photograph, (K, 3), m; all if few do."""
+        few = np.count_nonzero(self.agrees) < _FEW
+        chosen = self.points_world if few else self.points_world[self.agrees]
+        return points_in(self.T_world_goal, chosen)
 
 
 def fit_goal(

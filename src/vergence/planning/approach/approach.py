@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.estimation.displacement import Displacement
 from vergence.estimation.goal_fit import GoalFit, Prior, points_in, pose_difference
 from vergence.geometry import se3_inverse
 from vergence.planning.approach.arrival import GoalPoints
@@ -187,7 +188,7 @@ class Approach:
         displacement = self._goal_points.displacement if self._goal_points else None
         if self._arriving and displacement is not None:
             where = _in_words(displacement.distance_m, displacement.angle_rad)
-            far = _in_words(*displacement.at_most())
+            far = _in_words(*self._at_most(displacement))
             reason = f"its time is over at {where} from the goal; sure within {far}"
         else:
             reason = "its time is over on the way"
@@ -395,10 +396,10 @@ class Approach:
             settings.tolerance_m, settings.tolerance_rad
         ):
             return
+        far_m, far_rad = self._at_most(displacement)
         where = _in_words(displacement.distance_m, displacement.angle_rad)
-        far = _in_words(*displacement.at_most())
-        reason = f"{where} from the goal; sure within {far}"
-        if displacement.within(settings.tolerance_m, settings.tolerance_rad):
+        reason = f"{where} from the goal; sure within {_in_words(far_m, far_rad)}"
+        if far_m <= settings.tolerance_m and far_rad <= settings.tolerance_rad:
             image = frame.image
             assert image is not None
             self._worker.ask(lambda: _Arrived(confirm(self._goal, image), reason))
@@ -408,6 +409,12 @@ class Approach:
             self._stays += 1
             self._looked = frame.time
             self._worker.ask(lambda: self._look(frame))
+
+    def _at_most(self, displacement: Displacement) -> tuple[float, float]:
+        """Return the largest distance, m, and angle, rad, that the camera may be off, for sure."""
+        assert self._recognition is not None
+        far_m, far_rad = displacement.at_most()
+        return far_m * (1.0 + 3.0 * self._recognition.depth_deviation), far_rad
 
     def _tell(self, time: float, name: str, text: str) -> None:
         self._told.append(Told(time, name, text))

@@ -16,7 +16,7 @@ _FEWEST = 8  # of them that have to be found
 _APART_PX = 16.0
 _BORDER_PX = 40.0
 _FLOOR_PX = 0.03  # what a measured place may be off beside its stated deviation
-_REST_S = 0.4  # over which the camera must not move more than a tenth of the tolerance
+_REST_S, _REST = 0.4, 0.03  # in which the camera must not move more than this share of a tolerance
 
 
 class GoalPoints:
@@ -36,7 +36,7 @@ class GoalPoints:
 
     def learn(self, fit: GoalFit) -> None:
         """Take the depths of the points from those of a fit."""
-        known = points_in(fit.T_world_goal, fit.points_world[fit.agrees])
+        known = fit.points_goal
         points = self.goal.camera.normalize(self.points_px)
         self._depth_m = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
 
@@ -86,13 +86,13 @@ class GoalPoints:
         return self._seen[-1][1] if self._seen else None
 
     def at_rest(self, tolerance_m: float, tolerance_rad: float) -> bool:
-        """Tell whether the camera has moved less than a tenth of the tolerances lately."""
+        """Tell whether the camera has hardly moved lately, in shares of the tolerances."""
         if len(self._seen) < 4 or self._seen[-1][0] - self._seen[0][0] < 0.8 * _REST_S:
             return False
         first, last = self._seen[0][1], self._seen[-1][1]
         moved = np.linalg.norm(first.T_goal_camera[:3, 3] - last.T_goal_camera[:3, 3])
         turned = abs(first.angle_rad - last.angle_rad)
-        return bool(moved <= 0.1 * tolerance_m and turned <= 0.1 * tolerance_rad)
+        return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
 
     def reference(self, time: float) -> Reference:
         """Return the points as the photograph shows them."""

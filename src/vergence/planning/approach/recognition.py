@@ -137,7 +137,7 @@ def recognise(
 
 def length_ratio(length: KnownLength, goal: GoalImage, fit: GoalFit) -> float:
     """Return how much longer a known length is than a fit has it."""
-    known = points_in(fit.T_world_goal, fit.points_world[fit.agrees])
+    known = fit.points_goal
     points = goal.camera.normalize(length.points_px)
     depth = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
     ends = np.column_stack((points, np.ones(2))) * depth[:, None]
@@ -197,7 +197,7 @@ def _depths(points_star: FloatArray, known: GoalFit | None, prior: Prior) -> Flo
     if known is None:
         assert prior.depth_m is not None
         return np.full(len(points_star), float(prior.depth_m[0]))
-    seen = points_in(known.T_world_goal, known.points_world[known.agrees])
+    seen = known.points_goal
     return depth_between(points_star, seen[:, :2] / seen[:, 2:], seen[:, 2])
 
 
