@@ -25,8 +25,8 @@ def first_papers_run() -> KinematicRun:
     driver = SimulatedDriver(cell, images=False)
     parts, camera = assemble_parts(cell, driver, images=False), cell.task.camera
     assert isinstance(parts, Parts)
-    wanted = parts.planner.reference(0.0).points_px
-    assert wanted is not None
+    desired = parts.planner.reference(0.0).points_px
+    assert desired is not None
     ideal = KinematicCell(
         driver.world.arm_to_camera(camera),
         driver.cameras[camera],
@@ -37,7 +37,7 @@ def first_papers_run() -> KinematicRun:
         inner_rate_hz=cell.inner_rate_hz,
         latency_frames=cell.cameras[camera].latency_frames,
     )
-    return KinematicRun(ideal, parts.law, wanted, RUN_S)
+    return KinematicRun(ideal, parts.law, desired, RUN_S)
 
 
 def runs_a_second(run: KinematicRun) -> float:

@@ -39,7 +39,7 @@ class Tick(NamedTuple):
     arm: Arm
     settings: ConstraintSettings
     q: FloatArray
-    wanted: FloatArray
+    desired: FloatArray
     features: FloatArray
     solids: FloatArray
 
@@ -58,8 +58,8 @@ def tick_of(cell: str, count: int, posts: int = 0) -> Tick:
     setting = Setting(arm, CameraMounting(camera), None, PERIOD)
     settings = constraint_settings(setting, Limits())._replace(manipulability_min=lowest)
     features = pack_features(points, np.zeros_like(points), depth)
-    wanted = points + np.array([0.06, -0.04])
-    return Tick(arm, settings, q, wanted, features, beside(arm.forward_kinematics(q), posts))
+    desired = points + np.array([0.06, -0.04])
+    return Tick(arm, settings, q, desired, features, beside(arm.forward_kinematics(q), posts))
 
 
 def beside(T_world_camera: FloatArray, count: int) -> FloatArray:
@@ -74,11 +74,11 @@ def beside(T_world_camera: FloatArray, count: int) -> FloatArray:
 
 
 @njit
-def one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def one_tick(chain, limits, q, desired, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
     """From features and joints to joint rates, image-based under every constraint."""
     points = features[:, :2]
     L = interaction_matrix_points(points, features[:, DEPTH])
-    error = (-GAIN * (points - wanted)).ravel()
+    error = (-GAIN * (points - desired)).ravel()
     twist = least_squares_kernel(L, error, np.ones(len(L)), R)
     n = len(q)
     rest, none = np.zeros(n), np.empty((0, 0))
@@ -101,18 +101,18 @@ def one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance)
 
 
 @njit
-def repeat(count, chain, limits, q, wanted, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
+def repeat(count, chain, limits, q, desired, features, solids, R, settings, avoidance):  # type: ignore[no-untyped-def]
     q, total = q.copy(), 0.0
     for _ in range(count):
         q[0] += 1e-9
-        total += one_tick(chain, limits, q, wanted, features, solids, R, settings, avoidance)[0]
+        total += one_tick(chain, limits, q, desired, features, solids, R, settings, avoidance)[0]
     return total
 
 
 def arguments(tick: Tick) -> tuple[Any, ...]:
     arm, R = tick.arm, np.full(6, 1e-6)
     limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
-    before = (arm.chain, limits, tick.q, tick.wanted, tick.features, tick.solids, R)
+    before = (arm.chain, limits, tick.q, tick.desired, tick.features, tick.solids, R)
     return (*before, tick.settings, Avoidance(1e-3, 0.5, 50.0, 1e-6))
 
 

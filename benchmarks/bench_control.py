@@ -28,10 +28,10 @@ from vergence.control.objectives._tracking import (
 from vergence.robot import Arm
 
 POSE = np.array([-2.19, 0.75, -3.01, 0.1, -0.87, 0.2])
-WANTED = 0.1 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-SEEN = WANTED + np.array([0.05, -0.03])
+DESIRED = 0.1 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+SEEN = DESIRED + np.array([0.05, -0.03])
 DEPTH = np.array([0.60, 0.62, 0.63, 0.61])
-FEATURES = np.column_stack((SEEN, WANTED, DEPTH))
+FEATURES = np.column_stack((SEEN, DESIRED, DEPTH))
 
 
 def puma() -> Arm:

@@ -12,10 +12,10 @@ def main() -> None:
     q = driver.read().joints["gantry"].position
     now = driver.first_frame("eye").truth
     there = [-0.26443, 0.305428, 0.159083, 0.0751, 0.1157, -0.1297]  # m, rad: driven to once
-    wanted = driver.frame_at("eye", "gantry", there)
+    desired = driver.frame_at("eye", "gantry", there)
     assert now is not None
-    assert wanted.truth is not None
-    view = estimate_two_view(now.points_px, wanted.truth.points_px, camera)
+    assert desired.truth is not None
+    view = estimate_two_view(now.points_px, desired.truth.points_px, camera)
     if not view:
         raise SystemExit(str(view))
     distance_m = 0.615  # roughly, from the camera to the object: two images have no scale

@@ -97,8 +97,8 @@ def _table(laws: list[dict[str, Any]]) -> list[str]:
 
 def main() -> None:
     """Make what is named on the command line, or all."""
-    wanted = sys.argv[1:] or [*PAPERS, "laws"]
-    for name in wanted:
+    desired = sys.argv[1:] or [*PAPERS, "laws"]
+    for name in desired:
         if name == "laws":
             compare()
         else:

@@ -91,7 +91,7 @@ def outside(cell, record):
 
 
 def inside(record):
-    """Draw tracked and wanted points into the camera's image."""
+    """Draw tracked and desired points into the camera's image."""
     image = cv2.cvtColor(record.sample.frames[-1].image, cv2.COLOR_GRAY2BGR)
     for points_px, color, kind in (
         (record.reference.points_px, ORANGE, cv2.MARKER_CROSS),

@@ -84,7 +84,7 @@ def main() -> None:
         left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1.05))
     for axes, image, title in (
         (left, cell_view(cell, record), "the cell in MuJoCo"),
-        (middle, camera_view(record), "its wrist camera: tracked (square), wanted (cross)"),
+        (middle, camera_view(record), "its wrist camera: tracked (square), desired (cross)"),
     ):
         axes.imshow(image)
         axes.set_axis_off()

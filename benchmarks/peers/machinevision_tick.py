@@ -19,12 +19,12 @@ from timed_cases import Case, main
 
 def servo() -> IBVS:
     camera = CentralCamera.Default(pose=SE3.Trans(0.2, 0.1, -1.5) * SE3.Rz(0.2))
-    wanted = 200 * np.array([[-1, -1, 1, 1], [-1, 1, 1, -1]]) + np.c_[camera.pp]
+    desired = 200 * np.array([[-1, -1, 1, 1], [-1, 1, 1, -1]]) + np.c_[camera.pp]
     # eterm=0 and a tiny gain keep the simulated camera where it is, so that every step is alike.
     ibvs = IBVS(
         camera,
         P=mkgrid(2, side=0.5, pose=SE3.Tz(3)),
-        p_d=wanted,
+        p_d=desired,
         depth=4.0,
         lmbda=1e-9,
         eterm=0.0,

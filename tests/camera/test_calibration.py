@@ -356,7 +356,7 @@ def test_a_lens_that_is_known_stays_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("model", ["none", "k1", "k1k2", "k1k2p1p2"])
-def test_only_the_wanted_coefficients_are_estimated(model: str) -> None:
+def test_only_the_desired_coefficients_are_estimated(model: str) -> None:
     fit = lens(views(np.random.default_rng(14), 12)[0], model=model)
     np.testing.assert_array_equal(fit.deviations > 0, free_parameters(model) > 0)
     assert (fit.camera.distortion[free_parameters(model)[4:] == 0] == 0).all()

@@ -75,16 +75,16 @@ def closed_loop(scene, desired_px, ticks=240, q=None, **settings):
 
 
 def test_a_goal_inside_every_limit_is_reached(scene):
-    wanted = scene[2].points_px + (60.0, -40.0)
-    _, features, _ = closed_loop(scene, wanted)
-    assert np.abs(features[-1] - wanted).max() < 0.1
+    desired = scene[2].points_px + (60.0, -40.0)
+    _, features, _ = closed_loop(scene, desired)
+    assert np.abs(features[-1] - desired).max() < 0.1
 
 
 @pytest.mark.parametrize("depth_error", [0.3, 1.0, 3.0])
 def test_features_stay_in_view_although_the_goal_is_outside(scene, depth_error):
     arm, camera, truth, q = scene
     law_depth = truth.depth_m * depth_error
-    wanted = truth.points_px + (400.0, 0.0)
+    desired = truth.points_px + (400.0, 0.0)
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
     limits = Limits(depth_range=(0.3, 3.4), view_margin_px=10.0)
     law = Servo(arm, camera, ImageBased(gain=2.0), limits=limits, depth_m=law_depth)
@@ -94,7 +94,7 @@ def test_features_stay_in_view_although_the_goal_is_outside(scene, depth_error):
         points = project(arm, camera, q, corners)
         assert camera.contains(points, 5.0).all()
         rates = law.command(
-            observe(camera, points, time), Reference(time, wanted), JointState(time, q, rates)
+            observe(camera, points, time), Reference(time, desired), JointState(time, q, rates)
         ).velocity
         q = q + PERIOD * rates
     assert points[:, 0].max() > camera.width - 40
@@ -119,16 +119,16 @@ def test_distance_from_a_singularity_is_kept_until_it_alone_holds_the_arm_at_res
     corners = np.array(SQUARE) @ truth.T_world_target[:3, :3].T + truth.T_world_target[:3, 3]
     stretched = q + np.array([0.0, 0.3, -0.3, 0.0, 0.0, 0.0])
     lowest = 0.9 * yoshikawa_measure(arm.jacobian(q))
-    wanted = project(arm, camera, stretched, corners)
+    desired = project(arm, camera, stretched, corners)
     assert yoshikawa_measure(arm.jacobian(stretched)) < lowest
-    joints, features, active = closed_loop(scene, wanted, 700, manipulability_share=0.9)
+    joints, features, active = closed_loop(scene, desired, 700, manipulability_share=0.9)
     moved = np.abs(np.diff(joints, axis=0)) / (PERIOD * arm.rate_max)
     rest = int(np.flatnonzero((moved < 1e-3).all(axis=1))[0])
     measures = [yoshikawa_measure(arm.jacobian(row)) for row in joints]
     assert min(measures[:rest]) > 0.99 * lowest
     assert "singularity" in active[rest]
     assert measures[-1] < 0.99 * lowest
-    assert np.abs(features[-1] - wanted).max() < 1.0
+    assert np.abs(features[-1] - desired).max() < 1.0
 
 
 def test_a_start_outside_a_soft_limit_is_brought_back_smoothly(scene):

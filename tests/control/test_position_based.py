@@ -1,4 +1,4 @@
-"""The hand kept at a wanted pose relative to a moving target."""
+"""The hand kept at a desired pose relative to a moving target."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ from vergence.simulation import SimulatedDriver
 
 RATE, OUTER = 500, 26
 LATENCY_S = 1 / OUTER
-WANTED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
+DESIRED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def follow(
 
     Joints follow their set-points at once; images are late by one frame.
     """
-    T_target = se3_compose(arm.forward_kinematics(start), WANTED)
+    T_target = se3_compose(arm.forward_kinematics(start), DESIRED)
     target = MovingPose(T_target, twist)
     guard = Guard(arm, start, 1 / RATE)
     errors, positions = [], []
@@ -70,13 +70,13 @@ def follow(
         seen = MovingPose(moved(target, time - LATENCY_S), twist)
         observation = Observation(time - LATENCY_S, (), target_state(seen, time - LATENCY_S))
         joints = JointState(time, guard.position, np.zeros(arm.joint_count))
-        law.command(observation, Reference(time, T_camera_target=WANTED), joints)
+        law.command(observation, Reference(time, T_camera_target=DESIRED), joints)
         while tick < int((k + 1) * RATE / OUTER):
             guard.step(law.follow(guard.setpoint))
             tick += 1
         T_hand = arm.forward_kinematics(guard.position)
-        T_wanted = se3_compose(moved(target, tick / RATE), se3_inverse(WANTED))
-        errors.append(se3_log(se3_compose(se3_inverse(T_wanted), T_hand)))
+        T_desired = se3_compose(moved(target, tick / RATE), se3_inverse(DESIRED))
+        errors.append(se3_log(se3_compose(se3_inverse(T_desired), T_hand)))
         positions.append(guard.position)
     return np.array(errors), np.array(positions)
 
@@ -142,11 +142,11 @@ def test_without_a_target_the_arm_is_asked_to_stand(
     arm, start = arms["six"]
     law = law_of(arm)
     joints = JointState(0.0, start, np.zeros(6))
-    T_target = se3_compose(arm.forward_kinematics(start), WANTED)
+    T_target = se3_compose(arm.forward_kinematics(start), DESIRED)
     seen = Observation(0.0, (), target_state(MovingPose(T_target, np.ones(6)), 0.0))
-    law.command(seen, Reference(0.0, T_camera_target=WANTED), joints)
+    law.command(seen, Reference(0.0, T_camera_target=DESIRED), joints)
     assert law.follow(Setpoint(start, 0 * start)).any()
-    command = law.command(Observation(0.1, ()), Reference(0.1, T_camera_target=WANTED), joints)
+    command = law.command(Observation(0.1, ()), Reference(0.1, T_camera_target=DESIRED), joints)
     assert not command.velocity.any()
     assert not law.follow(Setpoint(start, 0 * start)).any()
 
@@ -158,15 +158,15 @@ def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> 
 def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seconds: float):
     """Bring what the hand holds to a pose before a fixed camera while it slips (6,), hand axes.
 
-    Returns the distance of the target from the wanted place, (K,) m, and its places, (K, 3).
+    Returns the distance of the target from the desired place, (K,) m, and its places, (K, 3).
     """
     T_world_camera = se3_compose(arm.forward_kinematics(start), np.diag([1.0, -1, -1, 1]))
     T_world_camera[:3, 3] += [0.3, 0.4, 0.5]
     offset = MovingPose(se3(so3_exp(np.array([0.1, 0.2, -0.1])), np.array([0.0, 0.02, 0.1])), slip)
     T_start = se3_compose(arm.forward_kinematics(start), offset.T)
-    T_wanted = T_start @ se3(so3_exp(np.array([0.3, -0.2, 0.2])), np.array([0.1, -0.1, 0.05]))
+    T_desired = T_start @ se3(so3_exp(np.array([0.3, -0.2, 0.2])), np.array([0.1, -0.1, 0.05]))
     law = law_of(arm, T_world_camera, **law_settings)
-    reference = Reference(0.0, T_camera_target=se3_compose(se3_inverse(T_world_camera), T_wanted))
+    reference = Reference(0.0, T_camera_target=se3_compose(se3_inverse(T_world_camera), T_desired))
     guard, tick, places, exposed = Guard(arm, start, 1 / RATE), 0, [], [start]
     for k in range(int(seconds * OUTER)):
         time = tick / RATE - LATENCY_S
@@ -182,7 +182,7 @@ def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seco
         exposed.append(guard.position)
         T_hand = arm.forward_kinematics(guard.position)
         places.append(se3_compose(T_hand, moved(offset, tick / RATE))[:3, 3])
-    return np.linalg.norm(np.array(places) - T_wanted[:3, 3], axis=1), np.array(places)
+    return np.linalg.norm(np.array(places) - T_desired[:3, 3], axis=1), np.array(places)
 
 
 @pytest.mark.parametrize("which", ["six", "seven"])

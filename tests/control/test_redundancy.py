@@ -1,4 +1,4 @@
-"""From a wanted twist of the hand to joint rates."""
+"""From a desired twist of the hand to joint rates."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def jacobian(rng: np.random.Generator, joints: int) -> np.ndarray:
 
 @pytest.mark.parametrize("joints", [6, 7, 9])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_hand_moves_as_wanted_whatever_the_spare_joints_do(joints: int, seed: int) -> None:
+def test_the_hand_moves_as_desired_whatever_the_spare_joints_do(joints: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     J, twist = jacobian(rng, joints), 1e-3 * rng.normal(size=6)
     rate_max = rng.uniform(0.5, 5.0, joints)
@@ -33,7 +33,7 @@ def test_no_joint_exceeds_its_rate_and_the_hand_stays_on_its_course(joints: int)
     assert achieved / np.linalg.norm(achieved) == pytest.approx(twist / np.linalg.norm(twist))
 
 
-def test_spare_joints_move_as_they_are_wanted_to_as_far_as_the_hand_allows() -> None:
+def test_spare_joints_move_as_they_are_desired_to_as_far_as_the_hand_allows() -> None:
     rng = np.random.default_rng(5)
     J = jacobian(rng, 7)
     spare = 1e-3 * rng.normal(size=7)

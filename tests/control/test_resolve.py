@@ -6,7 +6,7 @@ import pytest
 from vergence.control._rates import resolve_twist
 
 
-def test_without_limits_the_arm_moves_its_camera_as_wanted() -> None:
+def test_without_limits_the_arm_moves_its_camera_as_desired() -> None:
     rng = np.random.default_rng(24)
     J, v_camera = rng.normal(size=(6, 7)), rng.normal(size=6)
     rates, scale = resolve_twist(np.linalg.pinv(J), v_camera, np.full(7, np.inf))

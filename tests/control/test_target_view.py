@@ -20,7 +20,7 @@ from vergence.signals import JointState, Observation, Reference, TargetState
 from vergence.simulation import SimulatedDriver
 
 CORNERS = 0.05 * np.array([[1.0, 1, 1], [-1, 1, 0], [-1, -1, 1], [1, -1, -1]])
-WANTED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
+DESIRED = np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def scene():
     driver = SimulatedDriver(load_cell("lippiello2005"), images=False)
     q = driver.world.joint_position("slave")
     arm = driver.arms["slave"]
-    return arm, driver.cameras["hand"], q, se3_compose(arm.forward_kinematics(q), WANTED)
+    return arm, driver.cameras["hand"], q, se3_compose(arm.forward_kinematics(q), DESIRED)
 
 
 def camera_world(arm, q):
@@ -72,7 +72,7 @@ def test_a_corner_behind_the_camera_is_no_constraint_and_no_number_out_of_bounds
         arm, CameraMounting(camera), PositionBased(), corners=CORNERS, situation=Situation(2e-3)
     )
     state = TargetState(0.0, behind, np.zeros(6), np.eye(12), True)
-    reference = Reference(0.0, T_camera_target=WANTED)
+    reference = Reference(0.0, T_camera_target=DESIRED)
     joints = JointState(0.0, q, 0 * q)
     command = servo.command(Observation(0.0, (), state), reference, joints)
     assert command.active != ("no solution: braking",)
@@ -84,7 +84,7 @@ def test_corners_that_the_desired_pose_does_not_show_are_left_out(scene):
     x_min, x_max, y_min, y_max = camera.rectangle(10.5)
     low, high = np.array([x_min, y_min]), np.array([x_max, y_max])
     view = TargetView(CameraMounting(camera), CORNERS, low, high)
-    near = WANTED.copy()
+    near = DESIRED.copy()
     near[0, 3] = 0.1  # so far to the right that some corners are beyond the border
     view.see(TargetState(0.0, T, np.zeros(6), np.zeros((12, 12)), True), near, 0.0)
     assert 0 < len(view.features(arm.forward_kinematics(q))) < len(CORNERS)

@@ -21,7 +21,7 @@ class SpoiltImages:
 
     def __init__(self, driver: SimulatedDriver, spoil: Callable[[np.ndarray], np.ndarray]) -> None:
         self._driver, self._spoil = driver, spoil
-        self.speeds: list[tuple[float, float]] = []  # time, largest joint speed wanted
+        self.speeds: list[tuple[float, float]] = []  # time, largest joint speed desired
 
     def __getattr__(self, name: str):
         return getattr(self._driver, name)

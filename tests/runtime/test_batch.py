@@ -78,8 +78,8 @@ def drawn_run(seed: int) -> KinematicRun:
         depth_m=truth.depth_m * depth_factor,
         situation=Situation(1.0 / cell.rate_hz, MotionSettings(False, False)),
     )
-    wanted = truth.points_px + rng.normal(0, 30, 2)
-    return KinematicRun(cell, law, wanted, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
+    desired = truth.points_px + rng.normal(0, 30, 2)
+    return KinematicRun(cell, law, desired, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
 
 
 def check_same(trace: BatchTrace, run: Run) -> None:
@@ -92,10 +92,10 @@ def check_same(trace: BatchTrace, run: Run) -> None:
         "camera_m": camera.T_world_camera[:, :3, 3],
         "target_m": camera.T_world_target[:, :3, 3],
     }
-    for name, wanted in looped.items():
+    for name, desired in looped.items():
         given = getattr(trace, name)
-        if wanted.size or given.size:
-            np.testing.assert_allclose(given, wanted, rtol=1e-9, atol=1e-9, err_msg=name)
+        if desired.size or given.size:
+            np.testing.assert_allclose(given, desired, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 RUNS = [drawn_run(seed) for seed in range(120)]
@@ -136,4 +136,4 @@ def test_a_law_that_the_kernel_does_not_know_is_left_to_the_loop() -> None:
         situation=Situation(motion=MotionSettings(False, False)),
     )  # fmt: skip
     assert covers(run)
-    assert not covers(KinematicRun(run.cell, plain, run.wanted_px, 1.0))
+    assert not covers(KinematicRun(run.cell, plain, run.desired_px, 1.0))

@@ -24,13 +24,13 @@ def seen_through(cell: Cell, distortion: tuple[float, ...]) -> Cell:
 
 
 @pytest.mark.parametrize("distortion", [STRONG_BARREL, STRONG_CUSHION], ids=["barrel", "cushion"])
-def test_points_reach_where_they_are_wanted_in_the_distorted_image(
+def test_points_reach_where_they_are_desired_in_the_distorted_image(
     distortion: tuple[float, ...],
 ) -> None:
     ideal = load_cell("eye_to_hand")
     cell = seen_through(ideal, distortion)
-    wanted = intrinsics(ideal.cameras["stand"]).normalize(np.array(ideal.task.desired))
-    bent = intrinsics(cell.cameras["stand"]).to_pixels(wanted)
+    desired = intrinsics(ideal.cameras["stand"]).normalize(np.array(ideal.task.desired))
+    bent = intrinsics(cell.cameras["stand"]).to_pixels(desired)
     assert np.abs(bent - np.array(ideal.task.desired)).max() > 4.0
     result = run_cell(cell.replace(task={"desired": bent.tolist()}))
     assert result.outcome.succeeded

@@ -1,4 +1,4 @@
-"""A camera on a stand brings what the hand holds to where it is wanted in its image."""
+"""A camera on a stand brings what the hand holds to where it is desired in its image."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_by_pose_the_constrained_law_gets_there_too():
     assert result.summary["final_pose_error_deg"] < 0.3
 
 
-def test_the_recording_says_where_the_corners_are_wanted_and_that_they_got_there(tmp_path):
+def test_the_recording_says_where_the_corners_are_desired_and_that_they_got_there(tmp_path):
     recorder = Recorder(tmp_path)
     run_cell(load_cell("eye_to_hand_pose").replace(duration_s=4.0), [recorder], images=False)
     trace = Recording.open(tmp_path).cameras["front"]

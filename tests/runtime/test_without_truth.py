@@ -115,12 +115,12 @@ def test_points_that_the_file_names_are_tracked_from_there():
 
     class First(Commands):
         def begin(self, info):
-            self.wanted = None
+            self.desired = None
 
         def tick(self, record):
-            self.wanted = record.reference.points_px
+            self.desired = record.reference.points_px
 
     first, driver = First(), SimulatedDriver(cell)
     run_driver(cell, Bare(driver), [first], images=True)
     driver.close()
-    np.testing.assert_array_equal(first.wanted, points)
+    np.testing.assert_array_equal(first.desired, points)

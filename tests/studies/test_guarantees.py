@@ -34,9 +34,9 @@ def test_the_same_seed_is_the_same_run(known):
 
 
 def test_a_guard_that_lets_everything_through_is_noticed(known, monkeypatch):
-    def open_guard(self, wanted):
-        self._position = self._position + self._dt * 5 * wanted
-        self._velocity = 5 * wanted
+    def open_guard(self, desired):
+        self._position = self._position + self._dt * 5 * desired
+        self._velocity = 5 * desired
         return Setpoint(self._position, self._velocity)
 
     monkeypatch.setattr(guard.Guard, "step", open_guard)

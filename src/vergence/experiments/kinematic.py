@@ -67,8 +67,8 @@ class KinematicRuns:
         driver.restart_cameras()
         parts = assemble_parts(cell, driver, images=False, model=model)
         assert not isinstance(parts, Outcome)
-        wanted = parts.planner.reference(0.0).points_px
-        assert wanted is not None
+        desired = parts.planner.reference(0.0).points_px
+        assert desired is not None
         table = cell.cameras[camera]
         ideal = KinematicCell(
             driver.world.arm_to_camera(camera),
@@ -83,7 +83,7 @@ class KinematicRuns:
             sees=_eyesight(driver, arm, camera),
         )
         timeouts = Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s)
-        return KinematicRun(ideal, parts.law, wanted, cell.duration_s, timeouts=timeouts)
+        return KinematicRun(ideal, parts.law, desired, cell.duration_s, timeouts=timeouts)
 
     def _driver_of(self, cell: Cell) -> tuple[SimulatedDriver, CellModel]:
         key = as_built(cell).model_dump_json(exclude=_apart_from(cell))

@@ -95,7 +95,7 @@ def _of_batch(
         trace.times,
         trace.points_px,
         inside.reshape(count, -1),
-        np.broadcast_to(run.wanted_px, trace.points_px.shape),
+        np.broadcast_to(run.desired_px, trace.points_px.shape),
         trace.camera_m,
         trace.target_m,
     )

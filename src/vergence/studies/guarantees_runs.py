@@ -153,12 +153,12 @@ def run_ideal(
 
 def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray) -> Planner:
     """Return what a law aims at: points beside the first, those on the way on, or a pose."""
-    wanted = truth.points_px + offset_px
+    desired = truth.points_px + offset_px
     T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
     T_camera_target[:2, 3] += offset_px / CAMERA_MODEL.focal_px * T_camera_target[2, 3]
     if "path" in law:
-        return MovingGoal(wanted, offset_px, depth, T_camera_target)
-    return FixedReference(Reference(0.0, wanted, T_camera_target=T_camera_target))
+        return MovingGoal(desired, offset_px, depth, T_camera_target)
+    return FixedReference(Reference(0.0, desired, T_camera_target=T_camera_target))
 
 
 def build(law: str, cell: KinematicCell, depth: FloatArray) -> Law:

@@ -245,13 +245,13 @@ def position_based_on_object(scene: Scene) -> Steer:
     """
     T_goal_world = se3_inverse(scene.T_world_goal.copy())
     middle = scene.points_world.mean(axis=0, keepdims=True)
-    wanted = transform_points(T_goal_world, middle)[0]
+    desired = transform_points(T_goal_world, middle)[0]
 
     def steer(_time: float, q: FloatArray, _px: FloatArray) -> FloatArray:
         T_world_camera = scene.arm.forward_kinematics(q)
         turn = so3_log(np.ascontiguousarray((T_goal_world @ T_world_camera)[:3, :3]))
         place = transform_points(se3_inverse(T_world_camera), middle)[0]
-        twist = np.concatenate((wanted - place + np.cross(place, turn), turn))
+        twist = np.concatenate((desired - place + np.cross(place, turn), turn))
         return _resolved(scene.arm, q, -CLASSICAL_GAIN * twist)
 
     return steer
@@ -271,9 +271,9 @@ def tracking(law: Law, trajectory: Trajectory) -> Steer:
     def steer(time: float, q: FloatArray, px: FloatArray) -> FloatArray:
         # The command acts over the period that follows: feed forward for its middle.
         here, ahead = trajectory.reference(time), trajectory.reference(time + 0.5 * PERIOD)
-        wanted = Reference(time, here.points_px, ahead.velocity_px, here.depth_m)
+        desired = Reference(time, here.points_px, ahead.velocity_px, here.depth_m)
         state = JointState(time, q, np.zeros(len(q)))
-        return law.command(_seen(time, px), wanted, state).velocity
+        return law.command(_seen(time, px), desired, state).velocity
 
     return steer
 

@@ -114,11 +114,11 @@ class Studio:
 
         low, high = finite_range(self._tip, self._start)
         for _ in range(_TRIES):
-            wanted = self._view()
+            desired = self._view()
             goal = (
-                self.world.camera_pose(self.name) @ wanted
+                self.world.camera_pose(self.name) @ desired
                 if self.fixed
-                else self.world.target_pose() @ se3_inverse(wanted)
+                else self.world.target_pose() @ se3_inverse(desired)
             )
             q, _ = solve_pose(self._tip.chain, self._start.copy(), goal, low, high, 60)
             self.world.place_arm(self.arm, q)

@@ -85,11 +85,11 @@ def _ends(
     """Return the points to mark, each kind with its marker, name and style."""
     hollow = {"color": "#222", "markerfacecolor": "white", "markersize": 7, "zorder": 3}
     solid = {"color": "#222", "markersize": 5, "zorder": 3}
-    wanted = {"color": "#222", "markersize": 9, "markeredgewidth": 1.2, "zorder": 4}
+    desired = {"color": "#222", "markersize": 9, "markeredgewidth": 1.2, "zorder": 4}
     return [
         (_edge(paths, 0), "o", "start", hollow),
         (_edge(paths, -1), "s", "end", solid),
-        (_edge(trace.desired_px, -1), "+", "desired at the end", wanted),
+        (_edge(trace.desired_px, -1), "+", "desired at the end", desired),
     ]
 
 

@@ -76,22 +76,22 @@ def pose_error_figure(trace: CameraTrace) -> Panels | None:
     known &= np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
         return None
-    wanted = trace.T_camera_target_desired[known]
+    desired = trace.T_camera_target_desired[known]
     seen = np.linalg.inv(trace.T_world_camera[known]) @ trace.T_world_target[known]
-    distance = np.linalg.norm(seen[:, :3, 3] - wanted[:, :3, 3], axis=1)
-    angle = _angles(np.swapaxes(wanted[:, :3, :3], 1, 2) @ seen[:, :3, :3])
+    distance = np.linalg.norm(seen[:, :3, 3] - desired[:, :3, 3], axis=1)
+    angle = _angles(np.swapaxes(desired[:, :3, :3], 1, 2) @ seen[:, :3, :3])
     out = panels(2)
     rows = (("position (mm)", 1e3 * distance), ("rotation (deg)", np.degrees(angle)))
     for axes, (label, values) in zip(out.axes, rows, strict=True):
         axes.plot(trace.time[known], values, **curve(0))
-        axes.set_ylabel("off the wanted pose\n" + label)
+        axes.set_ylabel("off the desired pose\n" + label)
         axes.set_ylim(bottom=0.0)
     return out
 
 
-def _nearest(times: FloatArray, wanted: FloatArray) -> IntArray:
+def _nearest(times: FloatArray, desired: FloatArray) -> IntArray:
     """Return the row of the time nearest to each desired one."""
-    return np.asarray(np.abs(times[None, :] - wanted[:, None]).argmin(axis=1))
+    return np.asarray(np.abs(times[None, :] - desired[:, None]).argmin(axis=1))
 
 
 def _angles(rotations: FloatArray) -> FloatArray:

@@ -124,11 +124,11 @@ class Playback:
     def _pose_rows(self) -> Iterator[Row]:
         for trace in self._recording.cameras.values():
             for index in np.flatnonzero(np.isfinite(trace.T_camera_target_desired[:, 0, 0])):
-                wanted = trace.T_camera_target_desired[index]
+                desired = trace.T_camera_target_desired[index]
                 T = se3_inverse(trace.T_world_camera[index]) @ trace.T_world_target[index]
                 values = {
-                    "pose_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - wanted[:3, 3])]),
-                    "pose_deg": np.array([np.rad2deg(angle_between(T, wanted))]),
+                    "pose_mm": np.array([_MM * np.linalg.norm(T[:3, 3] - desired[:3, 3])]),
+                    "pose_deg": np.array([np.rad2deg(angle_between(T, desired))]),
                 }
                 yield row(float(trace.received[index]), self.plots, values)
 

@@ -28,7 +28,7 @@ class LoopInputs(NamedTuple):
     limits: FloatArray  # (4, n) q_min, q_max, rate_max, acceleration_max
     start: FloatArray  # (n,) joint positions
     features: FloatArray  # (M, 3) in the target's frame, m
-    wanted: FloatArray  # (M, 3) x and y in normalized coordinates, and the believed depth, m
+    desired: FloatArray  # (M, 3) x and y in normalized coordinates, and the believed depth, m
     camera: FloatArray  # (6,) width, height, fx, fy, cx, cy
     T_world_target: FloatArray  # (K, 4, 4) at the time of each image
     arrived: BoolArray  # (K,) whether an image ever arrives
@@ -73,7 +73,7 @@ def project(
 def look(
     points_px: FloatArray,
     noise_px: FloatArray,
-    wanted: FloatArray,
+    desired: FloatArray,
     camera: FloatArray,
     found: FloatArray,
 ) -> int:
@@ -85,7 +85,7 @@ def look(
             found[count, 0] = (u + noise_px[j, 0] - camera[4]) / camera[2]
             found[count, 1] = (v + noise_px[j, 1] - camera[5]) / camera[3]
             for i in range(3):
-                found[count, 2 + i] = wanted[j, i]
+                found[count, 2 + i] = desired[j, i]
             count += 1
     return count
 
@@ -138,7 +138,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
         if seen >= 0 and run.arrived[seen]:
             last_image = time
             image, noise = record.points_px[seen], run.noise_px[seen]
-            count = look(image, noise, run.wanted, run.camera, found)
+            count = look(image, noise, run.desired, run.camera, found)
             if count > 0:
                 last_seen = time
                 optimal_tracking_tick(run.weights, run.joints, q, found[:count], answer)
@@ -176,7 +176,7 @@ def run_one(runs: LoopInputs, records: LoopRecord, r: int) -> None:
         runs.limits[r],
         runs.start[r],
         runs.features[r],
-        runs.wanted[r],
+        runs.desired[r],
         runs.camera[r],
         runs.T_world_target[r],
         runs.arrived[r],

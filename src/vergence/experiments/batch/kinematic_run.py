@@ -19,7 +19,7 @@ class KinematicRun:
 
     cell: KinematicCell
     law: Law  # of its own: a law remembers
-    wanted_px: FloatArray  # (M, 2) where the features are to be
+    desired_px: FloatArray  # (M, 2) where the features are to be
     duration_s: float
     noise_px: float = 0.0  # standard deviation on each coordinate
     timeouts: Timeouts = field(default_factory=Timeouts)
@@ -36,7 +36,7 @@ class KinematicRun:
             driver,
             ARM,
             ExactPoints(CAMERA, self.noise_px, self.noise()),
-            FixedReference(Reference(0.0, self.wanted_px)),
+            FixedReference(Reference(0.0, self.desired_px)),
             self.law,
             outer_rate_hz=self.cell.rate_hz,
             listeners=[recorder],

@@ -113,7 +113,7 @@ def pack(runs: Sequence[KinematicRun]) -> LoopInputs:
         np.array([_limits(run) for run in runs]),
         np.array([run.cell.start for run in runs], dtype=np.float64),
         np.array([run.cell.features for run in runs], dtype=np.float64),
-        np.array([_wanted(run) for run in runs]),
+        np.array([_desired(run) for run in runs]),
         np.array([_camera(run) for run in runs]),
         poses,
         arrived,
@@ -147,10 +147,10 @@ def _limits(run: KinematicRun) -> FloatArray:
     return np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
 
 
-def _wanted(run: KinematicRun) -> FloatArray:
+def _desired(run: KinematicRun) -> FloatArray:
     assert isinstance(run.law, Servo)
-    depth = run.law.believed_depth(len(run.wanted_px))
-    return np.column_stack((run.cell.camera.normalize(run.wanted_px), depth))
+    depth = run.law.believed_depth(len(run.desired_px))
+    return np.column_stack((run.cell.camera.normalize(run.desired_px), depth))
 
 
 def _camera(run: KinematicRun) -> tuple[float, ...]:
