@@ -117,6 +117,7 @@ def test_the_runs_end_in_every_way(traces) -> None:
         OutcomeKind.COMPLETED,
         OutcomeKind.IMAGE_LATE,
         OutcomeKind.JOINT_LIMIT,
+        OutcomeKind.NOT_REACHED,
         OutcomeKind.SINGULARITY,
         OutcomeKind.TARGET_LOST,
     }
