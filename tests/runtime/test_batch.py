@@ -121,6 +121,7 @@ def test_the_runs_end_in_every_way(traces) -> None:
         OutcomeKind.SINGULARITY,
         OutcomeKind.TARGET_LOST,
     }
+    assert kinds.pop(OutcomeKind.NOT_REACHED) >= 1  # few stall in a time as short
     assert min(kinds.values()) >= 3
 
 
