@@ -78,7 +78,7 @@ def test_every_cell_runs_alike_with_and_without_truth(name, tmp_path):
         cell = cell.replace(duration_s=1.0)
     known, rates = run(cell, lambda driver: driver)
     bare, bare_rates = run(cell, Bare)
-    assert known.kind is OutcomeKind.COMPLETED
+    assert known.succeeded
     assert bare == known
     np.testing.assert_array_equal(bare_rates, rates)
 

@@ -1,8 +1,9 @@
 """A driver whose cameras have delivered their first images, with the clock of the run."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.robot import Arm
 from vergence.runtime.driver import Driver
@@ -14,8 +15,9 @@ _TIMEOUT_S = 5.0  # for a first image
 class StartedDriver:
     """Passes on to a driver, after it has waited for an image of each camera without a set-point.
 
-    What a task begins with is read off these images. Time 0 is the first `read` after that, however
-    long it took to assemble the loop; only what is exposed from then on is delivered.
+    What a task begins with is read off these images. The run begins with the first `read` after
+    that, however long it took to assemble the loop; only what is exposed from then on is delivered.
+    Samples keep the driver's time: the loop counts from its first one.
 
     Args:
         driver: of arms and cameras.
@@ -25,7 +27,6 @@ class StartedDriver:
         driver: the same.
         frames: the newest image of each camera that delivered one, by name, at times up to 0.
         missing: names of cameras that delivered none in time.
-        joints: newest positions by arm name, (n,), rad or m.
 
     Raises:
         DriverSilent: if the driver does not answer.
@@ -42,7 +43,7 @@ class StartedDriver:
             driver.step({})  # a watchdog that has heard a set-point would not wait for the rest
             sample = driver.read()
         self.missing = tuple(name for name in cameras if name not in first)
-        self.joints = {name: state.position for name, state in sample.joints.items()}
+        self._sample = sample  # the newest
         self.frames = {name: _since(sample.time, frame) for name, frame in first.items()}
         self._waited_until = sample.time
         self._begin: float | None = None
@@ -62,22 +63,25 @@ class StartedDriver:
         """How often `step` returns."""
         return self.driver.inner_rate_hz
 
+    @property
+    def joints(self) -> dict[str, FloatArray]:
+        """Newest positions by arm name, (n,), rad or m."""
+        return {name: state.position for name, state in self._sample.joints.items()}
+
     def read(self) -> Sample:
         """Return joints now and the images that arrived since the last call."""
-        sample = self.driver.read()
-        self.joints = {name: state.position for name, state in sample.joints.items()}
-        frames = sample.frames
+        sample = self._sample = self.driver.read()
         if self._begin is None:
             self._begin = sample.time
             if sample.time == self._waited_until:  # nothing moved: what was seen is of the run
-                known = {(frame.camera, frame.time) for frame in frames}
+                known = {(frame.camera, frame.time) for frame in sample.frames}
                 unread = (_since(-sample.time, frame) for frame in self.frames.values())
-                frames += tuple(f for f in unread if (f.camera, f.time) not in known)
-        return Sample(
-            sample.time - self._begin,
-            {n: replace(s, time=s.time - self._begin) for n, s in sample.joints.items()},
-            _in_run(_since(self._begin, frame) for frame in frames),
-        )
+                more = (f for f in unread if (f.camera, f.time) not in known)
+                sample = replace(sample, frames=(*sample.frames, *more))
+        if not sample.frames:
+            return sample
+        of_run = (frame for frame in sample.frames if not frame.time < self._begin)
+        return replace(sample, frames=tuple(sorted(of_run, key=lambda frame: frame.time)))
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
         """Hand set-points to the arms and wait for the next inner tick."""
@@ -90,7 +94,3 @@ class StartedDriver:
 
 def _since(begin: float, frame: Frame) -> Frame:
     return replace(frame, time=frame.time - begin) if begin else frame
-
-
-def _in_run(frames: Iterable[Frame]) -> tuple[Frame, ...]:
-    return tuple(sorted((f for f in frames if f.time >= 0), key=lambda frame: frame.time))
