@@ -14,6 +14,7 @@ class MyRobot(vg.Driver):
     def __init__(self, cell: vg.Cell, address: str) -> None:
         self._controller = vg.SimulatedDriver(cell)  # connect to `address`
         self.arms, self.cameras = self._controller.arms, self._controller.cameras
+        self.inner_rate_hz = self._controller.inner_rate_hz  # how often it takes set-points
 
     def read(self) -> vg.Sample:
         """Return joints now, and the images that arrived since the last call."""

@@ -58,10 +58,10 @@ class Robot(SimulatedDriver):
 
 
 def findings(robot: Robot, camera: bool = False) -> list[Finding]:
-    from vergence.app.bring_up import _carried
+    from vergence.app.bring_up import carried_camera
 
     rates = {"wrist": CELL.cameras["wrist"].rate_hz}
-    carried = _carried(CELL) if camera else None
+    carried = carried_camera(CELL) if camera else None
     found = list(bring_up(robot, "ur5", rates, carried, NUDGE, 0.005, 1.0))
     robot.close()
     return found

@@ -33,16 +33,17 @@ def check(
     as_json: bool,
 ) -> int:
     """Check a robot, print and write what was found; return the exit code."""
-    from vergence.assembly import open_driver
+    from vergence.assembly import open_driver, rehearse
     from vergence.cell import load_cell
     from vergence.drivers.bring_up import bring_up
 
     loaded = load_cell(cell, overrides(settings))
+    rehearse(loaded)
     opened = open_driver(loaded, driver)
     findings: list[Finding] = []
     try:
         rates = {name: loaded.cameras[name].rate_hz for name in loaded.watched}
-        camera = _carried(loaded)
+        camera = carried_camera(loaded)
         nudges = np.deg2rad(nudge_deg), 1e-3 * nudge_mm
         for found in bring_up(opened, loaded.task.arm, rates, camera, *nudges):
             findings.append(found)
@@ -61,7 +62,7 @@ def check(
     return SUCCESS if holds else FAILURE
 
 
-def _carried(cell: "Cell") -> "CarriedCamera | None":
+def carried_camera(cell: "Cell") -> "CarriedCamera | None":
     """Return the task's camera, if its arm carries it, with the depth of the target's placement."""
     from vergence.drivers.bring_up import CarriedCamera
     from vergence.simulation.cell_model import CellModel

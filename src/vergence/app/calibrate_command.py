@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from vergence.app import names
-from vergence.app.options import Json, Out
+from vergence.app.options import Driver, Json, Out, Settings
+from vergence.errors import InputError
 
 _EXAMPLE = "vergence calibrate photos/ --board 11x8 --square-mm 20 --marker-mm 15"
 
@@ -79,6 +80,16 @@ def calibrate(
         bool, typer.Option("--projected", help="Project corners instead of rendering images.")
     ] = False,
     noise_px: Annotated[float, typer.Option(min=0, help="Of projected corners.")] = 0.1,
+    latency: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CELL",
+            help="Measure how late the cell's images and servo are; needs --driver.",
+            autocompletion=names.cells,
+        ),
+    ] = None,
+    driver: Driver = None,
+    settings: Settings = None,
     out: Out = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a calibration that is in --out.")
@@ -89,8 +100,16 @@ def calibrate(
     """Find a camera's lens, and where it is mounted, from images of a board.
 
     Images alone give the lens. With the arm's pose at each image, lens and mounting are
-    refined together.
+    refined together. With --latency an arm swings one joint by 2°, and the delay of the camera's
+    images comes from their motion.
     """
+    if latency is not None:
+        from vergence.app.latency import latency as measure
+
+        raise typer.Exit(measure(latency, driver, settings or (), as_json))
+    for option, given in (("--driver", driver), ("--set", settings)):
+        if given:
+            raise InputError("calibrate", option, given, "it with --latency CELL")
     from vergence.app.calibrate import Request
     from vergence.app.calibrate import calibrate as command
 

@@ -106,7 +106,7 @@ def _image_finding(
 ) -> Finding:
     """Compare how points moved in the image with what the model says."""
     name = f"{joint_name} turns as in the model"
-    start, end = _followed(before, after)
+    start, end = followed(before, after)
     if len(start) < 4:
         return Finding(
             name, float("nan"), "cosine", "0.7 or more", True, "too little texture to tell"
@@ -131,7 +131,7 @@ def _untold(name: str, why: str) -> Finding:
     return Finding(name, float("nan"), "cosine", "0.7 or more", True, why)
 
 
-def _followed(before: ImageArray, after: ImageArray) -> tuple[FloatArray, FloatArray]:
+def followed(before: ImageArray, after: ImageArray) -> tuple[FloatArray, FloatArray]:
     """Return points of one image and where they are in another, (M, 2) each, px."""
     import cv2
 

@@ -72,6 +72,12 @@ class SlowMotion:
         """Step with the set-points at rest, or braking to it."""
         self._step(np.zeros(self._arm.joint_count))
 
+    def toward(self, joint: int, position: float) -> None:
+        """Step with a joint on its way to a position, rad or m."""
+        rates = np.zeros(self._arm.joint_count)
+        rates[joint] = (position - self._guard.position[joint]) / self._dt
+        self._step(rates)
+
     def drive(self, joint: int, by: float) -> float:
         """Move a joint by so much and let it come to rest, rad or m.
 
