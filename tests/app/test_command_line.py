@@ -29,6 +29,7 @@ COMMANDS = [
     "compare",
     "map",
     "watch",
+    "check",
     "bench",
     "cells",
 ]

@@ -27,6 +27,7 @@ README = DOCS.parent / "README.md"
 PAGES = [README, *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 SHOWN_ONLY = {"{literalinclude}", "{toctree}", "{eval-rst}", "{cell-file}", "{command-line}"}
 SHOWN_ONLY |= {"{figure}", "{image}", "{note}", "{checks}", "{include}"}
+SHOWN_ONLY |= {"console"}  # commands that need a robot
 
 
 class Block(NamedTuple):

@@ -1,6 +1,6 @@
 """The settings of an arm of Feetech servos."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from vergence.runtime.driver import Driver
 
 _Id = Annotated[int, Field(ge=0, le=252)]
 _Tick = Annotated[int, Field(ge=0, le=4095)]
-_Sign = Annotated[int, Field(ge=-1, le=1)]
+_Sign = Literal[-1, 1]
 
 
 @part("driver", "so101")
