@@ -12,7 +12,7 @@ SOURCE = Path(vergence.__file__).parent
 DOCS = Path(__file__).parents[2] / "docs"
 API = DOCS / "reference" / "api"
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:19|20)\d\d[a-z]?)\]")
-UNVERIFIED = {"Mezouar2001", "NelsonKhosla1994"}  # whose DOI could not be looked up
+UNVERIFIED = {"Mezouar2001"}  # whose DOI could not be looked up
 ENTRY = re.compile(r"^\(([A-Z]\w+)\)=\n(.*?)(?=^\(|\Z)", re.MULTILINE | re.DOTALL)
 
 
