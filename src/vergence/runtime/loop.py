@@ -49,7 +49,7 @@ class Loop:
         listeners: hear of every turn and event.
         timeouts: how long to hold before the run ends.
         following: how far the arm may be from its set-points.
-        goal: when the task counts as reached, and whether it ends there.
+        goal: when the task counts as reached, and whether it ends there; not judged if None.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Loop:
         self._border = Border(driver, lambda: not self._moving, age_s)
         self._listeners = Listeners(listeners)
         self._losses = LossReports(self._listeners)
-        self._arrival = Arrival(goal or Goal(), driver.arms[arm].rate_max)
+        self._arrival = None if goal is None else Arrival(goal, driver.arms[arm].rate_max)
         self._stalled = False  # as it was told last
         self._interrupt = Interrupt()
         self._part = "driver"  # the one at work, to be named if it raises
@@ -224,8 +224,7 @@ class Loop:
             return Outcome(*fault, self._now)
         self._command = command
         self._record(sample, observation, reference)
-        self._arrival.observe(observation, reference, command, sample.joints[self._arm].position)
-        self._tell_of_stall()
+        self._judge(observation, reference, command, sample)
         return None if command.fault is None else Outcome(*command.fault, self._now)
 
     def _step(self, sample: Sample) -> Outcome | None:
@@ -284,7 +283,14 @@ class Loop:
             reason = holding.reason if holding else f"{self._arm} follows again"
             self._listeners.event(self._now, kind or "following", reason)
 
-    def _tell_of_stall(self) -> None:
+    def _judge(
+        self, observation: Observation, reference: Reference, command: JointCommand, sample: Sample
+    ) -> None:
+        """See how near the goal is; tell where the arm comes to rest before it."""
+        if self._arrival is None:
+            return
+        q = sample.joints[self._arm].position
+        self._arrival.observe(observation, reference, command, q)
         stalled = self._arrival.stalled
         if stalled != self._stalled:
             self._stalled = stalled
@@ -309,6 +315,8 @@ class Loop:
             return Outcome(*hindered, self._now)
         if isinstance(self._planner, EndsTask):
             return self._planner.unfinished(self._now)
+        if self._arrival is None:
+            return endings.completed(duration_s, self._now)
         return self._arrival.outcome(duration_s, self._now)
 
     def _stopped(self) -> Outcome:
