@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.estimation.displacement import Displacement
 from vergence.estimation.goal_fit import GoalFit, Prior, points_in, pose_difference
 from vergence.geometry import se3_inverse
+from vergence.planning.approach.answers import Answer, Arrived, Told, in_words, view_of
 from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
 from vergence.planning.approach.recognition import (
@@ -17,7 +17,6 @@ from vergence.planning.approach.recognition import (
     ROUGH,
     ROUGH_M,
     UNKNOWN,
-    Confirmation,
     Recognition,
     confirm,
     length_ratio,
@@ -46,41 +45,6 @@ _LOOKS = 4  # in a row without success
 _NEAR_PX = 32.0  # of the photograph's points from their places, at which they are followed
 _SETTLE_S = 1.5  # after the path, before the photograph is looked for again
 _HALFWAY = 0.6  # share of the path at which the photograph is looked for again
-
-
-class Told(NamedTuple):
-    """Something that happened on the way."""
-
-    time: float  # s
-    name: str
-    text: str
-
-
-class _Answer(NamedTuple):
-    """What came of a job."""
-
-    recognition: Recognition | TwoViewFailure
-    path: Path | PlanFailure | None  # None if the plan holds
-    new_points: bool  # whether other points are to be followed
-
-
-class _Arrived(NamedTuple):
-    """What a last comparison says of a camera that seems to be at its goal."""
-
-    confirmation: Confirmation
-    reason: str  # where it stands, in words
-
-    def outcome(self, time: float) -> Outcome:
-        """Return the end of the run."""
-        found = self.confirmation
-        if found.holds:
-            return Outcome(OutcomeKind.REACHED, self.reason, time)
-        where = f"{found.in_place} of {found.recognised} points recognised"
-        reason = (
-            f"{self.reason} by the points followed, but only {where} are where the photograph "
-            "shows them: a part of what it shows was moved"
-        )
-        return Outcome(OutcomeKind.NOT_REACHED, reason, time)
 
 
 class Approach:
@@ -145,7 +109,7 @@ class Approach:
         path = self._plan(self._problem(found.fit, frame))
         if isinstance(path, PlanFailure):
             return path
-        self._take(_Answer(found, path, True), frame)
+        self._take(Answer(found, path, True), frame)
         assert self._trajectory is not None
         return self._trajectory
 
@@ -187,8 +151,8 @@ class Approach:
         """Return how the task ends if its time is over."""
         displacement = self._goal_points.displacement if self._goal_points else None
         if self._arriving and displacement is not None:
-            where = _in_words(displacement.distance_m, displacement.angle_rad)
-            far = _in_words(*self._at_most(displacement))
+            where = in_words(displacement.distance_m, displacement.angle_rad)
+            far = in_words(*self._at_most(displacement))
             reason = f"its time is over at {where} from the goal; sure within {far}"
         else:
             reason = "its time is over on the way"
@@ -227,7 +191,7 @@ class Approach:
             taken = answer is not None and self._take(answer, frame)
             if taken or self._arriving != arriving:
                 tracks = self._tracked(frame)
-        return _view_of(frame, tracks)
+        return view_of(frame, tracks)
 
     def _tracked(self, frame: Frame) -> Tracks:
         assert frame.image is not None
@@ -281,7 +245,7 @@ class Approach:
         image = tracked_image(self._goal, T, tracks.points_px, tracks.covariance_px, tracks.found)
         self._recognition = known.with_image(image)
 
-    def _look(self, frame: Frame) -> _Answer:
+    def _look(self, frame: Frame) -> Answer:
         """Look for the photograph again."""
         assert self._recognition is not None
         assert frame.image is not None
@@ -292,16 +256,16 @@ class Approach:
         T, count = self._camera_pose(frame), self._settings.points
         found = recognise(self._goal, frame.image, T, count, prior, known.fit)
         if isinstance(found, TwoViewFailure):
-            return _Answer(found, None, False)
+            return Answer(found, None, False)
         return self._checked(found, frame, True)
 
-    def _checked(self, known: Recognition, frame: Frame, new_points: bool) -> _Answer:
+    def _checked(self, known: Recognition, frame: Frame, new_points: bool) -> Answer:
         """Plan anew if the path leads elsewhere, or other points are followed."""
         assert self._trajectory is not None
         contradicted = self._contradicted(known, frame)
         if not (contradicted or new_points):
-            return _Answer(known, None, False)
-        return _Answer(known, self._plan(self._problem(known.fit, frame)), new_points)
+            return Answer(known, None, False)
+        return Answer(known, self._plan(self._problem(known.fit, frame)), new_points)
 
     def _contradicted(self, known: Recognition, frame: Frame) -> bool:
         assert self._trajectory is not None
@@ -312,9 +276,9 @@ class Approach:
         far = float(np.linalg.norm(off[:3])) > max(_OFF * rest, _OFF_M)
         return bool(sure and (far or np.linalg.norm(off[3:]) > _OFF_RAD))
 
-    def _take(self, answer: _Answer | _Arrived, frame: Frame) -> bool:
+    def _take(self, answer: Answer | Arrived, frame: Frame) -> bool:
         """Go by the answer of a job; return whether other points are followed from now on."""
-        if isinstance(answer, _Arrived):
+        if isinstance(answer, Arrived):
             self._outcome = answer.outcome(frame.time)
             return False
         found = answer.recognition
@@ -397,12 +361,12 @@ class Approach:
         ):
             return
         far_m, far_rad = self._at_most(displacement)
-        where = _in_words(displacement.distance_m, displacement.angle_rad)
-        reason = f"{where} from the goal; sure within {_in_words(far_m, far_rad)}"
+        where = in_words(displacement.distance_m, displacement.angle_rad)
+        reason = f"{where} from the goal; sure within {in_words(far_m, far_rad)}"
         if far_m <= settings.tolerance_m and far_rad <= settings.tolerance_rad:
             image = frame.image
             assert image is not None
-            self._worker.ask(lambda: _Arrived(confirm(self._goal, image), reason))
+            self._worker.ask(lambda: Arrived(confirm(self._goal, image), reason))
         elif self._stays >= _LOOKS:
             self._outcome = Outcome(OutcomeKind.NOT_REACHED, f"at rest at {reason}", frame.time)
         elif frame.time - self._looked >= _AGAIN_S:
@@ -418,19 +382,3 @@ class Approach:
 
     def _tell(self, time: float, name: str, text: str) -> None:
         self._told.append(Told(time, name, text))
-
-
-def _view_of(frame: Frame, tracks: Tracks) -> ImagePoints:
-    return ImagePoints(
-        frame.camera,
-        frame.time,
-        tracks.points_px,
-        tracks.covariance_px,
-        tracks.found,
-        tracks.reasons,
-        tracks.windows,
-    )
-
-
-def _in_words(distance_m: float, angle_rad: float) -> str:
-    return f"{1e3 * distance_m:.2f} mm and {np.rad2deg(angle_rad):.2f}°"
