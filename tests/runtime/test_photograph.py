@@ -11,6 +11,7 @@ from vergence.geometry import se3_inverse, so3_log
 from vergence.signals import OutcomeKind
 from vergence.simulation import SimulatedDriver
 
+TOLERANCE_M, TOLERANCE_DEG = 0.003, 0.2  # asked for, so what `reached` promises
 GOAL_DEG = np.array([1.5, -1.0, 2.0, 3.0, -2.0, 40.0])  # from the start
 
 
@@ -34,7 +35,7 @@ def run_to(cell, image, folder, name="goal.png"):
     """Run the cell to a photograph; return the run and where its camera ended."""
     path = folder / name
     assert cv2.imwrite(str(path), image)
-    cell = with_goal(cell, path).replace(task={"tolerance_m": 0.003})
+    cell = with_goal(cell, path).replace(task={"tolerance_m": TOLERANCE_M})
     driver = SimulatedDriver(cell)
     try:
         run = run_driver(cell, driver, (), images=True)
@@ -54,8 +55,8 @@ def test_a_photograph_alone_brings_the_camera_where_it_was_taken(cell, taken, tm
     run, T_end, _ = run_to(cell, image, tmp_path)
     assert run.outcome.kind is OutcomeKind.REACHED
     distance, angle = apart(T_end, T_goal)
-    assert distance < 0.5e-3
-    assert angle < 0.1
+    assert distance < TOLERANCE_M
+    assert angle < TOLERANCE_DEG
     names = [event.name for event in run.events]
     assert names.count("path planned") >= 2
     assert "arriving" in names
@@ -68,8 +69,8 @@ def test_other_light_and_a_hidden_part_do_not_keep_it_from_arriving(cell, taken,
     run, T_end, _ = run_to(cell, changed, tmp_path)
     assert run.outcome.kind is OutcomeKind.REACHED
     distance, angle = apart(T_end, T_goal)
-    assert distance < 1e-3
-    assert angle < 0.2
+    assert distance < TOLERANCE_M
+    assert angle < TOLERANCE_DEG
 
 
 def test_a_photograph_by_another_camera_leads_to_its_place(cell, taken, tmp_path):
@@ -86,8 +87,8 @@ def test_a_photograph_by_another_camera_leads_to_its_place(cell, taken, tmp_path
     run, T_end, _ = run_to(cell, photograph, tmp_path, "phone.jpg")
     assert run.outcome.kind is OutcomeKind.REACHED
     distance, angle = apart(T_end, T_goal)
-    assert distance < 1e-3
-    assert angle < 0.2
+    assert distance < TOLERANCE_M
+    assert angle < TOLERANCE_DEG
 
 
 @pytest.mark.parametrize(

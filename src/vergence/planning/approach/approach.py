@@ -83,6 +83,7 @@ class Approach:
         self._began = 0.0  # s, when the trajectory began
         self._goal_points: GoalPoints | None = None
         self._arriving = False  # whether the photograph's own points are followed
+        self._scale_deviation = 1.0  # relative, of all lengths; the least so far
         self._looked = 0.0  # s, when the photograph was looked for last
         self._failures = 0  # looks in a row that found nothing
         self._stays = 0  # looks because the camera is at rest, but not surely at the goal
@@ -290,6 +291,7 @@ class Approach:
                 self._outcome = Outcome(OutcomeKind.NOT_REACHED, reason, frame.time)
             return False
         self._failures = 0
+        self._scale_deviation = min(self._scale_deviation, found.depth_deviation)
         if isinstance(answer.path, PlanFailure):
             self._outcome = replace(answer.path.outcome(frame.time), kind=OutcomeKind.NOT_REACHED)
             return False
@@ -323,7 +325,7 @@ class Approach:
         rivals = "" if found.certain else f"; {len(found.fits)} motions possible"
         return (
             f"{length:.3f} m in {self._trajectory.duration:.1f} s, by {count} points, "
-            f"scale known to {100 * found.depth_deviation:.0f} %{rivals}"
+            f"scale known to {100 * self._scale_deviation:.0f} %{rivals}"
         )
 
     def _follow(self, path: Path, frame: Frame) -> None:
@@ -376,9 +378,8 @@ class Approach:
 
     def _at_most(self, displacement: Displacement) -> tuple[float, float]:
         """Return the largest distance, m, and angle, rad, that the camera may be off, for sure."""
-        assert self._recognition is not None
         far_m, far_rad = displacement.at_most()
-        return far_m * (1.0 + 3.0 * self._recognition.depth_deviation), far_rad
+        return far_m * (1.0 + 3.0 * self._scale_deviation), far_rad
 
     def _tell(self, time: float, name: str, text: str) -> None:
         self._told.append(Told(time, name, text))
