@@ -15,7 +15,7 @@ class PolarPoints(Feature):
     """Distance ρ and direction θ of each point: s = (ρ1, θ1, ρ2, θ2, …).
 
     A turn about the optical axis changes θ alone, so that it does not take the camera backwards
-    as it does with Cartesian coordinates [Iwatsuki2005]. θ is not known at the middle of the image.
+    as it does with Cartesian coordinates. θ is not known at the middle of the image.
     """
 
     def value(self) -> FloatArray:

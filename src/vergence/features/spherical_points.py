@@ -9,7 +9,7 @@ from vergence.parts import as_part
 
 @as_part("feature", "spherical_points")
 class SphericalPoints(Feature):
-    """Directions of the lines of sight, as unit vectors: s = (u1, u2, …) [Hamel2002].
+    """Directions of the lines of sight, as unit vectors: s = (u1, u2, …).
 
     A turn of the camera rotates them as it is, wherever in the image they are.
     """
