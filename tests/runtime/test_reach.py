@@ -1,12 +1,15 @@
 """Reaching an image taken beforehand: planned and tracked, or refused before anything moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from vergence.assembly import run_cell
+from vergence.assembly import reach, run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.signals import OutcomeKind
+from vergence.vision.two_view import estimate_two_view
 
 
 def test_the_gantry_gets_where_the_image_was_taken_and_keeps_the_marks_in_view():
@@ -29,6 +32,20 @@ def test_rendered_marks_lead_there_too():
     assert result.outcome.succeeded
     assert result.summary["max_error_px"] < 5.0
     assert result.summary["max_drift_px"] < 0.6
+
+
+def test_a_mark_that_two_views_leave_out_is_left_out_of_the_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def leaves_one_out(*arguments):
+        view = estimate_two_view(*arguments)
+        return replace(view, inliers=view.inliers & (np.arange(len(view.inliers)) != 2))
+
+    monkeypatch.setattr(reach, "estimate_two_view", leaves_one_out)
+    cell = load_cell("gantry").replace(task={"camera_speed_m_s": 0.6})
+    run = run_cell(cell, images=False)
+    assert run.outcome.kind is OutcomeKind.REACHED
+    assert (np.isfinite(run.cameras["eye"].error_px).sum(axis=1) == 8).all()  # of nine marks
 
 
 def test_a_way_that_takes_too_long_is_an_outcome_before_anything_moves():

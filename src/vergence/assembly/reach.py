@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import FloatArray, IntArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.own_parts import planned_path, started_tracker
@@ -15,7 +15,7 @@ from vergence.camera.image_file import read_image_file
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
-from vergence.estimation import TrackedPoints
+from vergence.estimation import SelectedPoints, TrackedPoints
 from vergence.geometry import transform_points
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.path import Path
@@ -34,9 +34,16 @@ _START, _GOAL = "the start", "task.goal_deg"
 class TwoImages(NamedTuple):
     """The marks as the camera sees them now, and as it should see them."""
 
-    points_px: FloatArray  # (N, 2)
+    points_px: FloatArray  # (N, 2) px
     desired_px: FloatArray  # (N, 2)
     perception: Perception  # goes on from the first
+
+    def only(self, kept: BoolArray) -> "TwoImages":
+        """Return the marks that are kept, (N,)."""
+        if kept.all():
+            return self
+        perception = SelectedPoints(self.perception, kept)
+        return TwoImages(self.points_px[kept], self.desired_px[kept], perception)
 
 
 def reach_parts(
@@ -46,11 +53,13 @@ def reach_parts(
     pair = measure_twice(context, task, driver, images)
     if isinstance(pair, PlanFailure):
         return pair.outcome(0.0)
+    view = estimate_two_view(pair.points_px, pair.desired_px, context.cameras[task.camera])
+    if not isinstance(view, TwoView):
+        return Outcome(OutcomeKind.INFEASIBLE, str(view), 0.0)
+    pair = pair.only(view.inliers)
     context = context.with_points({task.camera: pair.points_px})
     law = build_law(context)
-    plan = plan_reach(context, task, pair)
-    if isinstance(plan, TwoViewFailure):
-        return Outcome(OutcomeKind.INFEASIBLE, str(plan), 0.0)
+    plan = _plan(context, task, view)
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
     trajectory = Trajectory.of(plan, task.camera_speed_m_s)
@@ -65,10 +74,12 @@ def plan_reach(
     context: LawContext, task: ReachTable, pair: TwoImages
 ) -> Path | PlanFailure | TwoViewFailure:
     """Reconstruct the object from two images, up to the believed d*, and plan a path."""
+    view = estimate_two_view(pair.points_px, pair.desired_px, context.cameras[task.camera])
+    return _plan(context, task, view) if isinstance(view, TwoView) else view
+
+
+def _plan(context: LawContext, task: ReachTable, view: TwoView) -> Path | PlanFailure:
     camera = context.cameras[task.camera]
-    view = estimate_two_view(pair.points_px, pair.desired_px, camera)
-    if not isinstance(view, TwoView):
-        return view
     if task.distance_m is None:
         raise InputError(
             str(context.cell.path), "task.distance_m", "nothing", "the distance at the goal, m"

@@ -20,6 +20,7 @@ from vergence.estimation.recovery import NoPose, PoseFit, pose_from_points
 from vergence.estimation.rig import CameraRig
 from vergence.estimation.rpy_belief import RpyBelief
 from vergence.estimation.rpy_filter import RpyPoseFilter
+from vergence.estimation.selected_points import SelectedPoints
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
@@ -64,6 +65,7 @@ __all__ = [
     "TargetBelief",
     "TargetFilter",
     "TargetShape",
+    "SelectedPoints",
     "TrackedPoints",
     "Update",
     "Verdict",
