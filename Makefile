@@ -62,6 +62,7 @@ test-drivers: $(DRIVERS:%=test-driver-%)
 test-driver-%: .drivers/%/.installed $(RENDERS)
 	.drivers/$*/bin/python -m pytest tests/drivers/protocol_$*.py $(PYTEST_ARGS)
 
+.PRECIOUS: .drivers/%/.installed
 .drivers/%/.installed: $(INSTALLED) scripts/make-driver-venv
 	@scripts/make-driver-venv $* $(VENV)
 	@touch $@

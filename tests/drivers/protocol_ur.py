@@ -93,8 +93,8 @@ class Motion:
         self.guard = Guard(ARM, self.sample.joints["ur5"].position, 1.0 / driver.inner_rate_hz)
 
     def go(self, rate: float, seconds: float) -> Sample:
-        end = self.sample.time + seconds
-        while self.sample.time < end:
+        """Make as many ticks as there are in so many seconds, however late each is."""
+        for _ in range(round(seconds * self.driver.inner_rate_hz)):
             self.driver.step({"ur5": self.guard.step(np.array([0, 0, 0, 0, 0, rate]))})
             self.sample = self.driver.read()
         return self.sample
