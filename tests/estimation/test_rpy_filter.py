@@ -60,7 +60,7 @@ def test_start_keeps_pose_and_twist():
 def test_zero_start_makes_the_first_two_gains_zero():
     # [Lippiello2005] section V starts with P = 0; Q enters the rates only.
     rng = np.random.default_rng(4)
-    filter_ = RpyPoseFilter()
+    filter_ = RpyPoseFilter(gate=1e12)  # the paper has none
     belief = filter_.start(0.0, np.eye(4), covariance=np.zeros((12, 12)))
     moved = moving(1.0)
     belief = filter_.update(belief, view(rng, 0.0, moved, noise_px=3.0)).belief

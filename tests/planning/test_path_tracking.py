@@ -39,7 +39,7 @@ def test_twist_solves_the_least_squares_problem() -> None:
     goal = points + random.normal(size=(5, 2))
     L = interaction_matrix_points(points, depth)
     expected = np.linalg.lstsq(L, -2.0 * (points - goal).ravel(), rcond=None)[0]
-    objective = ImageBased(gain=2.0, damping=1e-12)
+    objective = ImageBased(gain=2.0, interaction="current", damping=1e-12)
     twist = objective.twist(Points(points, depth), Points(goal, depth))
     np.testing.assert_allclose(twist, expected, rtol=1e-8)
 
@@ -49,7 +49,7 @@ def test_error_decays_at_the_gain() -> None:
     points, depth = random.uniform(-0.3, 0.3, (4, 2)), random.uniform(0.5, 1, 4)
     L = interaction_matrix_points(points, depth)
     error = L @ (random.normal(size=6) * 1e-3)
-    objective = ImageBased(gain=1.5, damping=1e-12)
+    objective = ImageBased(gain=1.5, interaction="current", damping=1e-12)
     twist = objective.twist(Points(points, depth), Points(points - error.reshape(-1, 2), depth))
     np.testing.assert_allclose(L @ twist, -1.5 * error, atol=1e-9)
 

@@ -117,11 +117,9 @@ def test_the_runs_end_in_every_way(traces) -> None:
         OutcomeKind.COMPLETED,
         OutcomeKind.IMAGE_LATE,
         OutcomeKind.JOINT_LIMIT,
-        OutcomeKind.NOT_REACHED,
         OutcomeKind.SINGULARITY,
         OutcomeKind.TARGET_LOST,
     }
-    assert kinds.pop(OutcomeKind.NOT_REACHED) >= 1  # few stall in a time as short
     assert min(kinds.values()) >= 3
 
 

@@ -73,12 +73,15 @@ def run(cell, wrap):
 def test_every_cell_runs_alike_with_and_without_truth(name, tmp_path):
     cell = load_cell(name)
     if cell.task.kind == "reach":
-        cell = with_goal_image(cell, tmp_path)
+        cell = cell if cell.task.goal else with_goal_image(cell, tmp_path)
     else:
         cell = cell.replace(duration_s=1.0)
     known, rates = run(cell, lambda driver: driver)
     bare, bare_rates = run(cell, Bare)
     assert known.succeeded
+    if cell.name == "photograph":  # only a simulation waits for what is recognised on the way
+        assert bare.kind is known.kind
+        return
     assert bare == known
     np.testing.assert_array_equal(bare_rates, rates)
 

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
-from vergence.errors import InputError
+from vergence.errors import InputError, nearest
+from vergence.registry import kinds
 
 if TYPE_CHECKING:
     from vergence.planning import Path as PlannedPath
@@ -34,6 +35,9 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
 
     changes = overrides(request.settings)
     if request.planner is not None:
+        if ":" not in request.planner and request.planner not in kinds("planner"):
+            allowed = f"{nearest(request.planner, kinds('planner'))}, or module:Class"
+            raise InputError("vergence plan", "--planner", request.planner, allowed)
         changes["task.planner"] = request.planner
     cell = load_cell(request.cell, changes, request.seed)
     if not isinstance(cell.task, ReachTable):

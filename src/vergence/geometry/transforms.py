@@ -10,9 +10,10 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import vergence.geometry as kernels
-from vergence.arrays import as_floats
+from vergence.arrays import FloatArray, as_floats
 
 
 def _checked(kernel: Any, *shapes: tuple[int | None, ...]) -> Callable[..., Any]:
@@ -51,5 +52,12 @@ so3_left_jacobian = _checked(kernels.so3_left_jacobian, _VECTOR)
 so3_left_jacobian_inverse = _checked(kernels.so3_left_jacobian_inverse, _VECTOR)
 so3_log = _checked(kernels.so3_log, _ROTATION)
 transform_points = _checked(kernels.transform_points, _POSE, (None, 3))
+
+
+def flat_normal(points: ArrayLike) -> FloatArray | None:
+    """Return the unit normal (3,) of the plane that points (N, 3) lie in; None if they do not."""
+    normal: FloatArray | None = kernels.flat_normal(as_floats(points, (None, 3), "points"))
+    return normal
+
 
 __all__ = list(kernels.__all__)

@@ -198,7 +198,7 @@ def build(law: str, cell: KinematicCell, depth: FloatArray) -> Law:
     }
     return Servo(
         arm, camera, objectives[law], limits=LIMITS, solver=QuadraticProgram(S=1e-3), depth_m=depth,
-        situation=Situation(period),
+        situation=Situation(period, MotionSettings(feed_forward=True)),
     )  # fmt: skip
 
 

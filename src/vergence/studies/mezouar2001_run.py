@@ -105,7 +105,7 @@ def plan_section6(cell: Cell, images: bool) -> Section6:
         if isinstance(pair, PlanFailure):
             raise VergenceError(f"{cell.name}: {pair}")
         plans = {
-            name: plan_reach(context, task.model_copy(update={"planner": planner}), pair)
+            name: plan_reach(context, _with_planner(cell, planner), pair)
             for name, planner in PLANNERS.items()
         }
         goal = goal_positions(cell, driver.arms[task.arm])
@@ -125,6 +125,12 @@ def plan_section6(cell: Cell, images: bool) -> Section6:
         "visibility_only": PotentialFieldPlanner(gain_joint=0.0).walk(problem),
     }
     return Section6(Scene.of(cell), shown, {**broken, **kept}, {})
+
+
+def _with_planner(cell: Cell, planner: str) -> ReachTable:
+    task = cell.replace(task={"planner": planner}).task
+    assert isinstance(task, ReachTable)
+    return task
 
 
 def run_section6(cell: Cell, planned: Section6, name: str, images: bool) -> Realised:

@@ -19,12 +19,8 @@ from vergence.experiments.batch.closed_loop import (
 )
 from vergence.experiments.batch.kinematic_run import KinematicRun
 from vergence.runtime import endings
-from vergence.runtime.arrival import Arrival, Goal
-from vergence.signals import ImagePoints, JointCommand, Observation, Outcome, Reference
+from vergence.signals import Outcome
 from vergence.simulation.exact_points import OUT_OF_SIGHT
-from vergence.simulation.kinematic_driver import CAMERA
-
-_WINDOW_S = 1.5  # before the end: longer than arrival is judged by
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +163,7 @@ def _trace(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -
     images = int(records.end[r, 2])
     shown = np.flatnonzero(inputs.arrived[r, : max(images, 0)])
     return BatchTrace(
-        _outcome(run, inputs, records, r),
+        _outcome(run, records, r),
         records.position[r, : images + run.cell.latency_frames],
         _times(run, len(records.position[r]))[shown],
         records.points_px[r, shown],
@@ -176,31 +172,12 @@ def _trace(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -
     )
 
 
-def _at_the_end(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -> Arrival:
-    """Return what the loop would know of arrival when the time is over, from the last images."""
-    arrival, cell = Arrival(Goal(), run.cell.arm.rate_max), run.cell
-    images = max(int(records.end[r, 2]), 0)
-    times = _times(run, images)
-    shown = np.flatnonzero(inputs.arrived[r, :images])
-    at_rest = JointCommand(np.zeros(len(cell.start)), np.zeros(6))
-    for k in shown[times[shown] >= times[-1:] - _WINDOW_S]:
-        seen = cell.camera.contains(records.points_px[r, k])
-        points_px = np.where(seen[:, None], records.points_px[r, k] + inputs.noise_px[r, k], np.nan)
-        if seen.any():
-            covariance = np.zeros((len(seen), 2, 2))
-            view = ImagePoints(CAMERA, times[k], points_px, covariance, seen, ("",) * len(seen))
-            reference = Reference(times[k], run.desired_px)
-            q = records.position[r, k + cell.latency_frames]
-            arrival.observe(Observation(times[k], (view,)), reference, at_rest, q)
-    return arrival
-
-
-def _outcome(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -> Outcome:
+def _outcome(run: KinematicRun, records: LoopRecord, r: int) -> Outcome:
     code, tick, _, value = records.end[r].tolist()
     time = tick / run.cell.inner_rate_hz
     match code:
         case closed_loop.COMPLETED:
-            return _at_the_end(run, inputs, records, r).outcome(run.duration_s, time)
+            return endings.completed(run.duration_s, time)
         case closed_loop.IMAGE_LATE:
             return endings.image_late(value, time)
         case closed_loop.SINGULAR:
