@@ -20,11 +20,13 @@ class CentralMoments(NamedTuple):
         size: what scales with the square of the distance: a polygon's area, or the sum of
             squared distances of points from their centre.
         mu: μ_pq, (4, 4); zero where p + q > 3.
+        dense: whether they are those of the inside of a polygon, and not of points.
     """
 
     centre: FloatArray
     size: float
     mu: FloatArray
+    dense: bool
 
 
 def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
@@ -39,7 +41,7 @@ def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
     size = float(mu[2, 0] + mu[0, 2])
     if not size > 0.0:
         raise InputError(name, "points", "points at one place", "points that differ")
-    return CentralMoments(centre, size, mu)
+    return CentralMoments(centre, size, mu, dense=False)
 
 
 def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
@@ -57,7 +59,7 @@ def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
     middle = np.array([raw[1, 0], raw[0, 1]]) / raw[0, 0]
     mu = _polygon_integrals(corners - about - middle)
     mu *= np.sign(raw[0, 0])  # corners may come either way round
-    return CentralMoments(about + middle, float(mu[0, 0]), mu)
+    return CentralMoments(about + middle, float(mu[0, 0]), mu, dense=True)
 
 
 def orientation(name: str, mu: FloatArray) -> float:
@@ -72,22 +74,18 @@ def orientation(name: str, mu: FloatArray) -> float:
     return float(0.5 * np.arctan2(across, along))
 
 
-def tilt_invariants(moments: CentralMoments, dense: bool) -> FloatArray:
+def tilt_invariants(moments: CentralMoments) -> FloatArray:
     """Return s_x and s_y, (2,), [Tahri2005].
 
     They do not change with shifts, size and turns in the image; turns of the camera about its x
     and y axes change them.
-
-    Args:
-        moments: of the set.
-        dense: whether it is the inside of a polygon, and not points.
     """
     mu = moments.mu
     c1, s1 = mu[2, 0] - mu[0, 2], 2.0 * mu[1, 1]
     c2, s2 = mu[0, 3] - 3.0 * mu[2, 1], mu[3, 0] - 3.0 * mu[1, 2]
     c3, s3 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
     scale = (c1 * c1 + s1 * s1) * (mu[2, 0] + mu[0, 2]) ** 1.5
-    if dense:
+    if moments.dense:
         scale /= np.sqrt(moments.size)
     invariants: FloatArray = np.array([c2 * c3 + s2 * s3, s2 * c3 - c2 * s3]) / scale
     return invariants

@@ -29,7 +29,7 @@ class Moments(Feature):
         """Return s, (6,); α in rad, known up to half a turn."""
         moments = self._moments()
         a_n = 1.0 / np.sqrt(moments.size)
-        tilt = tilt_invariants(moments, dense=isinstance(self, RegionMoments))
+        tilt = tilt_invariants(moments)
         turn = orientation(self._name, moments.mu)
         return np.array([*(moments.centre * a_n), a_n, *tilt, turn])
 
