@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 RENDERS := $(VENV)/.renders
 
 # Drivers whose robots' packages are tried, each in an environment of its own.
-DRIVERS := so101 ur
+DRIVERS := franka gige realsense ros2 so101 ur
 
 PYTEST_ARGS ?=
 
@@ -15,11 +15,12 @@ PYTEST_ARGS ?=
 export MUJOCO_GL ?= egl
 
 .PHONY: help setup test-drivers test-images test-browser demo test docs bench peers format clean
-.PHONY: check kernels wheel test-wheel lint lint-format lint-rules lint-types lint-page fuzz soak
+.PHONY: check kernels wheel test-wheel lint lint-format lint-rules lint-types lint-page bounds fuzz soak
 
 help:
 	@echo "make demo     set up, then servo a Puma 560 on rendered images and write a report"
 	@echo "make test     set up, then run the whole test suite (PYTEST_ARGS='-k name' for a part)"
+	@echo "make bounds   run the test suite with kernels that check every index they use (slow)"
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
 	@echo "make test-drivers  test the drivers of real robots with the robots' own packages"
 	@echo "make soak     run the loop at 500 Hz for an hour (MINUTES=5 for less), watch its time and memory"
@@ -49,7 +50,7 @@ test-images:
 	@scripts/ensure-test-images
 
 test-browser:
-	@scripts/ensure-browser
+	@scripts/ensure-browser $(VENV)
 
 demo: setup
 	$(BIN)/vergence run puma560
@@ -66,6 +67,11 @@ test-driver-%: .drivers/%/.installed $(RENDERS)
 .drivers/%/.installed: $(INSTALLED) scripts/make-driver-venv
 	@scripts/make-driver-venv $* $(VENV)
 	@touch $@
+
+bounds: setup
+	@caches=$$(mktemp -d) && NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$$caches \
+	    $(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS); \
+	    status=$$?; rm -rf $$caches; exit $$status
 
 fuzz: setup
 	VERGENCE_FUZZ=long $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)

@@ -134,10 +134,10 @@ def numpy_descend(field: Field, arm: Arm, upsilon: FloatArray, q: FloatArray) ->
         q = q + np.linalg.pinv(J) @ (M @ (after - upsilon))
         T, J = kinematics(q)
         R = Rotation.from_rotvec(after[3:]).as_matrix()
-        wanted = field.T_world_star[:3, :3] @ R
+        desired = field.T_world_star[:3, :3] @ R
         place_wanted = field.T_world_star[:3, :3] @ (field.distance * after[:3])
         place_wanted += field.T_world_star[:3, 3]
-        turn = Rotation.from_matrix(T[:3, :3].T @ wanted).as_rotvec()
+        turn = Rotation.from_matrix(T[:3, :3].T @ desired).as_rotvec()
         missing = np.concatenate((T[:3, :3].T @ (place_wanted - T[:3, 3]), turn))
         q = q + np.linalg.pinv(J) @ missing
         upsilon, taken = after, taken + 1

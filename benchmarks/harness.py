@@ -34,10 +34,14 @@ class Timing:
 
     @property
     def quartiles(self) -> tuple[float, float]:
-        if len(self.seconds) < 2:
-            return self.median, self.median
-        low, _, high = statistics.quantiles(self.seconds, n=4, method="inclusive")
-        return low, high
+        return quartiles(self.seconds)
+
+
+def quartiles(figures: Sequence[float]) -> tuple[float, float]:
+    if len(figures) < 2:
+        return figures[0], figures[0]
+    low, _, high = statistics.quantiles(figures, n=4, method="inclusive")
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -126,13 +130,13 @@ def idlest_core() -> int:
 
 
 @contextmanager
-def on_one_core(wanted: bool) -> Iterator[None]:
+def on_one_core(one_core: bool) -> Iterator[None]:
     """Keeps this thread on one idle core meanwhile, if desired; peer programs follow it there.
 
     Cores differ in speed on a busy machine, so a ratio is fair only on one.
     """
     before = os.sched_getaffinity(0)
-    if wanted:
+    if one_core:
         os.sched_setaffinity(0, {idlest_core()})
     try:
         yield
@@ -167,8 +171,9 @@ def row(
 
     Returns:
         A row with the keys `name`, `value`, `low`, `high` (quartiles), `unit`, `peer`,
-        `peer_value`, `ratio` (median of the rounds' ratios), `aim` (words) and `holds`
-        (None without an aim, or when the peer that the aim names is missing).
+        `peer_value`, `ratio` (median of the rounds' ratios), `ratio_low`, `ratio_high` (their
+        quartiles), `aim` (words) and `holds` (None without an aim, or when the peer that the aim
+        names is missing).
     """
     blocks = {"ours": ours}
     if isinstance(peer, Peer):
@@ -178,11 +183,12 @@ def row(
     scale = UNITS[unit]
     low, high = timings["ours"].quartiles
     value = scale * timings["ours"].median
-    peer_value = ratio = None
+    peer_value = ratio = ratio_low = ratio_high = None
     if "peer" in timings:
         peer_value = scale * timings["peer"].median
         pairs = zip(timings["ours"].seconds, timings["peer"].seconds, strict=True)
-        ratio = statistics.median(own / other for own, other in pairs)
+        ratios = [own / other for own, other in pairs]
+        ratio, (ratio_low, ratio_high) = statistics.median(ratios), quartiles(ratios)
     return {
         "name": name,
         "value": value,
@@ -192,6 +198,8 @@ def row(
         "peer": peer_words(peer),
         "peer_value": peer_value,
         "ratio": ratio,
+        "ratio_low": ratio_low,
+        "ratio_high": ratio_high,
         "aim": aim_words(ratio_aim, value_aim, unit),
         "holds": holds([(ratio, ratio_aim), (value, value_aim)]),
     }
@@ -210,6 +218,8 @@ def measured(
         "peer": None,
         "peer_value": None,
         "ratio": None,
+        "ratio_low": None,
+        "ratio_high": None,
         "aim": None if at_least is None else f"at least {at_least:g} {unit}".rstrip(),
         "holds": None if at_least is None else value >= at_least,
     }

@@ -4,6 +4,7 @@
 """
 
 import atexit
+import json
 import os
 import subprocess
 from functools import cache
@@ -18,12 +19,15 @@ THREAD_COUNTS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ONE_THREAD = dict.fromkeys(THREAD_COUNTS, "1")
 
 
+NO_VISP = Missing("ViSP", "apt-get install libvisp-dev g++, then make peers")
+
+
 class Program:
     """A peer program that answers `CASE CALLS` with the seconds per call."""
 
     def __init__(self, command: tuple[str, ...]) -> None:
         self._process = subprocess.Popen(
-            [*command, "serve"],
+            command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -40,11 +44,15 @@ class Program:
             raise RuntimeError(f"peer program {self._process.args}: {line or 'it ended'}")
         return line
 
-    def seconds_per_call(self, case: str, count: int) -> float:
+    def ask(self, line: str) -> str:
+        """Its answer to a line, worked out on our core."""
         assert self._process.stdin is not None
         os.sched_setaffinity(self._process.pid, os.sched_getaffinity(0))
-        self._process.stdin.write(f"{case} {count}\n")
-        return float(self._answer())
+        self._process.stdin.write(f"{line}\n")
+        return self._answer()
+
+    def seconds_per_call(self, case: str, count: int) -> float:
+        return float(self.ask(f"{case} {count}"))
 
 
 @cache
@@ -54,16 +62,14 @@ def program(*command: str) -> Program:
 
 
 def peer(case: str, *command: str) -> Peer:
-    running = program(*command)
+    running = program(*command, "serve")
     return Peer(running.name, lambda count: running.seconds_per_call(case, count))
 
 
 def visp(case: str) -> Peer | Missing:
     """A case of `peers/visp_tick.cpp`."""
     built = BUILT / "visp_tick"
-    if not built.is_file():
-        return Missing("ViSP", "apt-get install libvisp-dev g++, then make peers")
-    return peer(case, str(built))
+    return peer(case, str(built)) if built.is_file() else NO_VISP
 
 
 def machinevision(case: str) -> Peer | Missing:
@@ -74,6 +80,22 @@ def machinevision(case: str) -> Peer | Missing:
 def mink() -> Peer | Missing:
     """The tick of `peers/mink_tick.py`."""
     return python_peer("mink", SOURCES / "mink_tick.py", "tick")
+
+
+def mink_collision() -> Peer | Missing:
+    """The tick of `peers/mink_collision.py`."""
+    return python_peer("mink", SOURCES / "mink_collision.py", "tick")
+
+
+def mink_penetrations(paths: Path) -> list[float] | Missing:
+    """How near bodies come on the paths of a file, see `peers/mink_collision.py`, m."""
+    python, script = BUILT / "venv" / "bin" / "python", SOURCES / "mink_collision.py"
+    if not python.is_file():
+        return Missing("mink", "make peers")
+    command = [str(python), str(script), "penetrations", str(paths)]
+    said = subprocess.run(command, stdout=subprocess.PIPE, check=True, env=os.environ | ONE_THREAD)
+    found: list[float] = json.loads(said.stdout)
+    return found
 
 
 def pink() -> Peer | Missing:

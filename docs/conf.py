@@ -22,6 +22,7 @@ extensions = [
     "cell_file",
     "command_line",
     "docstrings",
+    "gallery",
     "mathml",
     "references",
 ]

@@ -1,6 +1,6 @@
 """Make what the documentation shows of our own runs: figures, checks, the table of the laws.
 
-    scripts/make_docs_figures.py [nelson1995 lippiello2005 mezouar2001 guarantees laws]
+    scripts/make_docs_figures.py [nelson1995 … guarantees honesty photograph defaults laws]
 
 It runs `vergence reproduce` and `vergence compare` in full, which takes about half an hour, and
 writes images into docs/images and tables into docs/papers and docs/guide. What is already in
@@ -19,7 +19,15 @@ DOCS = PROJECT / "docs"
 BUILD = PROJECT / "build" / "docs"
 VERGENCE = Path(sys.executable).with_name("vergence")
 
-PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees")
+PAPERS = (
+    "nelson1995",
+    "lippiello2005",
+    "mezouar2001",
+    "guarantees",
+    "honesty",
+    "photograph",
+    "defaults",
+)
 LAWS = "image_based,image_based_desired,image_based_mean,optimal_tracking,constrained"
 STARTS = 100
 COMPARED = (("ur5", 0.2), ("panda", 0.2), ("ur5", 0.5), ("panda", 0.5))  # share of joints' ranges

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from vergence.simulation import choose_renderer
@@ -19,12 +20,17 @@ import cv2  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 
+from vergence.app.recorded_images import camera_images  # noqa: E402
+from vergence.app.robot_film import robot_film  # noqa: E402
 from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
+from vergence.places import built_in_cells  # noqa: E402
+from vergence.runtime.recording import Recording  # noqa: E402
 from vergence.simulation.world import World  # noqa: E402
 
 DOCS = Path(__file__).parents[1] / "docs"
 VERGENCE = Path(sys.executable).with_name("vergence")
+SLOW = ("gantry", "photograph")  # cells whose task has an end, which is what their image shows
 GREEN, ORANGE, WHITE = (115, 158, 0), (0, 159, 230), (255, 255, 255)  # BGR
 
 
@@ -73,6 +79,24 @@ def own_object() -> None:
         shutil.copy(Path(folder, "tracked", "frame-000014.jpg"), DOCS / "images/own-object.jpg")
 
 
+def gallery(*names: str) -> None:
+    """Built-in cells, from outside and through the camera of their task; all without names."""
+    for name in names or built_in_cells():
+        with tempfile.TemporaryDirectory() as folder:
+            run = ("run", name, "--set", "duration_s=60" if name in SLOW else "duration_s=6")
+            subprocess.run([VERGENCE, *run, "--out", folder], stdout=subprocess.DEVNULL)
+            recording = Recording.open(folder)
+            seen = camera_images(recording, recording.info.task_camera).film[-1]
+            both = [decoded(robot_film(recording)[-1].jpeg), decoded(seen.jpeg)]
+        pair = np.hstack([cv2.resize(image, (400, 300), interpolation=3) for image in both])
+        path = str(DOCS / "images" / "cells" / f"{name}.jpg")
+        cv2.imwrite(path, pair, [cv2.IMWRITE_JPEG_QUALITY, 84])
+
+
+def decoded(jpeg: bytes):
+    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+
+
 def outside(cell, record):
     """Render the cell as it stood."""
     world = World(cell)
@@ -109,7 +133,7 @@ def report() -> None:
     with tempfile.TemporaryDirectory() as folder:
         run = ("run", "puma560", "--set", "duration_s=4", "--out", folder)
         subprocess.run([VERGENCE, *run], check=True)
-        screenshot(f"file://{folder}/report.html", (1100, 1010), "report.jpg")
+        screenshot(f"file://{folder}/report.html", (1100, 1330), "report.jpg")
 
 
 def watch() -> None:
@@ -119,6 +143,7 @@ def watch() -> None:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as served:
             assert served.stdout
             served.stdout.readline()
+            time.sleep(20.0)  # until it has loaded its kernels and moved a little
             try:
                 screenshot("http://localhost:8246/", (1400, 900), "watch.jpg", wait_ms=12000)
             finally:
@@ -146,3 +171,4 @@ if __name__ == "__main__":
     own_object()
     report()
     watch()
+    gallery()

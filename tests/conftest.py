@@ -2,7 +2,9 @@
 
 import signal
 
-# Tests press Ctrl-C on commands of their own. In a shell's background SIGINT is ignored, and what
-# is started there would inherit that.
+# Tests press Ctrl-C on commands of their own, and hang up. In a shell's background SIGINT is
+# ignored, and under nohup SIGHUP; what is started there would inherit that.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

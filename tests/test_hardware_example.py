@@ -20,13 +20,13 @@ from vergence.cell import load_cell
 from vergence.drivers import Equipment
 from vergence.drivers.socket_robot import SocketRobot
 from vergence.errors import DriverSilent
-from vergence.runtime import Driver, Recording
+from vergence.runtime import Driver, Recording, outputs_of
 from vergence.signals import OutcomeKind
 from vergence.simulation import SimulatedDriver
 
 FOLDER = Path(__file__).parents[1] / "examples" / "hardware"
 TIMEOUT_S = 2.0  # of a machine that has other things to do
-SLOW = {"inner_rate_hz": "125"}
+SLOW = {"inner_rate_hz": "125", "outputs": '{grip = {arm = "puma"}}'}
 CREEPING = "target.motion.velocity_m_s=[0.03, 0, 0]"
 
 
@@ -47,6 +47,10 @@ class Noted(SimulatedDriver):
     def step(self, setpoints) -> None:
         vars(self).setdefault("steps", []).append(setpoints["puma"])
         super().step(setpoints)
+
+    def set_output(self, name, value) -> None:
+        vars(self).setdefault("outputs_set", []).append((name, value))
+        super().set_output(name, value)
 
 
 class Robot(Thread):
@@ -99,6 +103,20 @@ def connected(
     equipment = Equipment("", model.arms, model.cameras, model.inner_rate_hz)
     host, port = address[:2]
     return SocketRobot(f"{host}:{port}", timeout_s=timeout_s).open(equipment)
+
+
+def test_outputs_of_the_robot_are_known_and_set_over_the_socket(
+    example: Callable[[str], object], model: SimulatedDriver
+) -> None:
+    robot = Robot(example, False, TIMEOUT_S)
+    driver = connected(robot.address, model)
+    assert outputs_of(driver) == ("grip",)
+    driver.set_output("grip", 1.0)
+    for _ in range(5):
+        driver.step({})
+    driver.close()
+    robot.join(60)
+    assert robot.driver.outputs_set == [("grip", 1.0)]
 
 
 @contextmanager

@@ -48,13 +48,20 @@ def test_a_planner_beside_the_cell_plans_and_runs(tmp_path: Path) -> None:
 
 
 def test_a_planner_is_named_on_the_command_line(tmp_path: Path, capsys, monkeypatch) -> None:
-    from vergence.app.plan import Request, plan
+    from vergence.app.options import PlanOptions
+    from vergence.app.plan import plan
 
     own(tmp_path, "gantry", {})
     monkeypatch.chdir(tmp_path / "gantry")  # a part is found in the current folder, too
     settings = [f"{key}={value}" for key, value in NEAR.items()]
-    request = Request("gantry", "my_planner:Straight", False, None, settings)
-    assert plan(request, tmp_path / "out", False) == 0
+    options = PlanOptions(
+        cell="gantry",
+        planner="my_planner:Straight",
+        images=False,
+        settings=settings,
+        out=tmp_path / "out",
+    )
+    assert plan(options) == 0
     assert "found by the straight planner" in capsys.readouterr().out
 
 
@@ -266,7 +273,7 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("gantry", "task.planner", "optimized", "did you mean optimised"),
         ("puma560", "task.tracker", "bad:NoTracker", "whose start returned str"),
         ("puma560", "task.tracker", "sdd", "did you mean ssd"),
-        ("puma560", "task.planner", "optimised", "a key that is not known"),
+        ("puma560", "task.planner", "optimised", "does not have; allowed"),
         ("lippiello2005", "perception.filter", "bad:Halves", "has no method update"),
         ("lippiello2005", "perception.filter", "kalman", "pose, rpy, or module:Class"),
     ],

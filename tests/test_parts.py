@@ -55,8 +55,8 @@ def test_an_objective_beside_the_cell_runs_and_is_compared(folder: Path) -> None
     [
         ("law.gain", "30", "law.gain: given 30; allowed: at most 20"),
         ("law.gian", "1", "did you mean gain?"),
-        ("law.kind", "mine:Center", "mine has no Center"),
-        ("law.kind", "nowhere:Centre", "cannot be imported"),
+        ("law.kind", "mine:Center", "mine has no Center; its parts: Centre (did you mean Centre?)"),
+        ("law.kind", "nowhere:Centre", "but no nowhere.py is in "),
         ("law.kind", "mine:vg", "is no class"),
         ("law.kind", "pathlib:Path", "declared as nothing"),
         ("law.solver", "mine:Centre", "declared as objective"),
@@ -126,20 +126,23 @@ ROBOT = (Path(__file__).parents[1] / "examples" / "my_robot.py").read_text()
 
 
 def test_a_cell_runs_with_a_driver_of_ones_own(folder: Path, capsys, monkeypatch) -> None:
+    from vergence.app.options import RunOptions
     from vergence.app.run import run
 
     (folder / "my_robot.py").write_text(ROBOT)
     monkeypatch.chdir(folder)
     settings = ["law={ kind = 'image_based' }", "duration_s=0.3"]
-    ended = run("cell.toml", folder / "out", None, True, 2, settings, False, "my_robot:MyRobot:x")
-    assert ended == 0
+    options = RunOptions(
+        cell="cell.toml", out=folder / "out", settings=settings, driver="my_robot:MyRobot:x"
+    )
+    assert run(options) == 0
     assert "completed at 0.30 s" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("named", "said"),
     [
-        ("nowhere:Robot", "cannot be imported"),
+        ("nowhere:Robot", "but no nowhere.py is in "),
         ("no_such_robot", "module:Class"),
         ("mine:Centre", "declared as objective"),
         ("broken_robot:MyRobot", "which raised OSError: no robot answers"),

@@ -1,9 +1,8 @@
 """A robot in a process of its own that is reached over a socket.
 
-The arm is simulated; a real controller does the same things in the same order. Every period it
-says where its joints are, takes the set-point that comes back, and hands it to its servos through
-a watchdog. When nothing usable comes back any more, the watchdog brakes the arm. The servo waits
-for a client no longer than its period lasts, whatever the client does.
+The arm is simulated; a real controller does the same in the same order. Every period it says where
+its joints are, hands the set-point that comes back to its servos through a watchdog, which brakes
+the arm when none comes, and sets outputs, such as a gripper. It waits for no client beyond that.
 """
 
 import socket
@@ -22,8 +21,7 @@ from vergence.drivers.socket_robot import (
     read_answer,
     said_by_robot,
 )
-from vergence.robot import Arm
-from vergence.runtime import Driver
+from vergence.runtime import Driver, HasOutputs, outputs_of
 from vergence.runtime.hardware import Metronome, Watchdog
 from vergence.simulation import SimulatedDriver
 
@@ -41,10 +39,10 @@ def serve(robot: Driver, clients: Clients, timeout_s: float = 0.5) -> str:
     metronome, period, answered, gone = Metronome(robot.inner_rate_hz), 0, 0, ""
     while not gone or not all(dog.at_rest for dog in dogs.values()):
         if not gone and (period - answered) * dt <= timeout_s:  # else it is busy: do not pile up
-            outbox.put(said_by_robot(period, sample))
+            outbox.put(said_by_robot(period, sample, outputs_of(robot)))
         try:
             if not gone:
-                answered = max(answered, listen(link, period, metronome, robot.arms, dogs))
+                answered = max(answered, listen(link, period, metronome, robot, dogs))
         except LinkBrokenError as error:
             gone = f"{client} {error}"
             outbox.put([encode({"refused": gone})])
@@ -73,7 +71,7 @@ def listen(
     link: Link,
     period: int,
     metronome: Metronome,
-    arms: Mapping[str, Arm],
+    robot: Driver,
     dogs: Mapping[str, Watchdog],
 ) -> int:
     """Hand set-points to the watchdogs until this period is answered or over; return the last."""
@@ -82,9 +80,13 @@ def listen(
         message = link.receive(left_s)
         if message is None:
             break
-        answered, setpoints = read_answer(message, period, arms)
-        for name, setpoint in setpoints.items():
+        answer = read_answer(message, period, robot.arms, outputs_of(robot))
+        answered = answer.period
+        for name, setpoint in answer.setpoints.items():
             dogs[name].hear(setpoint, age_s=metronome.period_s * (period - answered))
+        if isinstance(robot, HasOutputs):
+            for name, value in answer.outputs.items():
+                robot.set_output(name, value)
     return answered
 
 

@@ -5,6 +5,7 @@ that the import itself takes milliseconds; `__init__.pyi` says what each of them
 """
 
 from vergence.prebuilt import use_prebuilt_kernels as _use_prebuilt_kernels
+from vergence.stale_kernels import forget_stale_kernels as _forget_stale_kernels
 
 _ROOMS = {
     "app.report": ("report",),
@@ -44,6 +45,7 @@ _PLACES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = sorted(_PLACES)
 
 _use_prebuilt_kernels()
+_forget_stale_kernels()
 
 
 def __getattr__(name: str) -> object:

@@ -16,8 +16,17 @@ class ShapeError(VergenceError, ValueError):
 
     def __init__(self, name: str, given: tuple[int, ...], allowed: tuple[int | None, ...]) -> None:
         self.name, self.given, self.allowed = name, given, allowed
-        wanted = "(" + ", ".join("any" if n is None else str(n) for n in allowed) + ")"
-        super().__init__(f"{name} has shape {given}; it must have shape {wanted}")
+        shape = "(" + ", ".join("any" if n is None else str(n) for n in allowed) + ")"
+        super().__init__(f"{name} has shape {given}; it must have shape {shape}")
+
+
+class Absent(str):
+    """Words of ours, not of the user, for something that is not there, such as "no such file"."""
+
+    __slots__ = ()
+
+
+NOTHING = Absent("nothing")  # where a value should stand
 
 
 class InputError(VergenceError, ValueError):
@@ -26,14 +35,21 @@ class InputError(VergenceError, ValueError):
     Attributes:
         source: the file, command or argument it stands in.
         key: where in it, such as ``arms.puma.start_deg``; empty if all of it is meant.
-        given: what stands there.
+        given: what stands there; `Absent` where something is missing.
         allowed: what may stand there.
     """
 
     def __init__(self, source: str, key: str, given: object, allowed: str) -> None:
         self.source, self.key, self.given, self.allowed = source, key, given, allowed
         where = f"{echo(source)}: {echo(key)}" if key else echo(source)
-        super().__init__(f"{where}: given {echo(given)}; allowed: {allowed}")
+        super().__init__(f"{where}: {_told(given, allowed)}")
+
+
+def _told(given: object, allowed: str) -> str:
+    """Tell what is wrong; what is missing was not given."""
+    if not isinstance(given, Absent):
+        return f"given {echo(given)}; allowed: {allowed}"
+    return f"{'missing' if given == NOTHING else echo(given)}; needed: {allowed}"
 
 
 class KeyConflict(InputError):

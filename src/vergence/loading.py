@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vergence.errors import InputError, VergenceError
+from vergence.errors import NOTHING, InputError, VergenceError
 from vergence.parts import Slot, field_names, is_part, kind_of, slots_of
 from vergence.registry import find, kinds
 
@@ -43,9 +43,7 @@ def load_part(role: str, given: Any, place: Place, usual: str = "") -> Any:
     if "kind" not in table and (usual or len(kinds(role)) == 1):
         table = {"kind": usual or kinds(role)[0], **table}
     if "kind" not in table:
-        raise InputError(
-            place.source, f"{place.key}.kind", "nothing", "a value; this key is required"
-        )
+        raise InputError(place.source, f"{place.key}.kind", NOTHING, "a value")
     rest = {key: value for key, value in table.items() if key != "kind"}
     return make_part(part_class(role, table["kind"], place), rest, place)
 

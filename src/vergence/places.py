@@ -1,8 +1,9 @@
 """Where cells and recordings are found by the names that people type."""
 
+from itertools import takewhile
 from pathlib import Path
 
-from vergence.errors import InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 
 CELLS = Path(__file__).parent / "cells"  # those that come with vergence
 CELL = "cell.toml"
@@ -12,6 +13,13 @@ RECORDING = "recording.mcap"
 def built_in_cells() -> tuple[str, ...]:
     """Return the names of the cells that come with vergence."""
     return tuple(sorted(folder.name for folder in CELLS.iterdir() if (folder / CELL).is_file()))
+
+
+def cell_description(name: str) -> str:
+    """Return what a built-in cell is about: the comment that its file begins with."""
+    text = (CELLS / name / CELL).read_text(encoding="utf-8")
+    lines = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    return " ".join(line.removeprefix("#").strip() for line in lines)
 
 
 def find_cell(name_or_path: str | Path) -> Path:
@@ -50,4 +58,6 @@ def find_recording(path: str | Path) -> Path:
     for file in (Path(path), Path(path) / RECORDING):
         if file.is_file():
             return file
-    raise InputError(str(path), "", "no recording there", f"a run folder with a {RECORDING}")
+    raise InputError(
+        str(path), "", Absent("no recording there"), f"a run folder with a {RECORDING}"
+    )

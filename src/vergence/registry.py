@@ -18,10 +18,12 @@ ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.cent
 
 _CONTROL = "vergence.control"
 _MOTIONS = "vergence.simulation.motions"
+_ENDS = "vergence.runtime.task_ends"
 _PLANNING, _ESTIMATION, _VISION = "vergence.planning", "vergence.estimation", "vergence.vision"
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "feature": {
         "centre": "vergence.features:Centre",
+        "ellipse": "vergence.features:Ellipse",
         "lines": "vergence.features:Lines",
         "log_depth": "vergence.features:LogDepth",
         "moments": "vergence.features:Moments",
@@ -36,6 +38,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "vanishing_point": "vergence.features:VanishingPoint",
     },
     "objective": {
+        "camera_velocity": f"{_CONTROL}.objectives:CameraVelocity",
         "image_based": f"{_CONTROL}.objectives:ImageBased",
         "optimal_tracking": f"{_CONTROL}.objectives:OptimalTracking",
         "position_based": f"{_CONTROL}.objectives:PositionBased",
@@ -44,11 +47,17 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     },
     "limit": {},
     "driver": {
+        "franka": "vergence.drivers.franka:Franka",
+        "ros2": "vergence.drivers.ros2:Ros2",
         "socket": "vergence.drivers.socket_robot:SocketRobot",
         "so101": "vergence.drivers.so101:So101",
         "ur": "vergence.drivers.ur:Ur",
     },
-    "camera_source": {"video": "vergence.drivers.cameras:Video"},
+    "camera_source": {
+        "gige": "vergence.drivers.cameras:Gige",
+        "realsense": "vergence.drivers.cameras:RealSense",
+        "video": "vergence.drivers.cameras:Video",
+    },
     "matcher": {"sift": f"{_VISION}.matching:Sift"},
     "planner": {
         "optimised": f"{_PLANNING}:OptimisedPlanner",
@@ -59,6 +68,9 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "ssd": f"{_VISION}:SsdTracking",
         "round_marks": f"{_VISION}.marks:MarkTracking",
         "tags": f"{_VISION}.marks:TagTracking",
+        "ellipse": f"{_VISION}.curves:EllipseTracking",
+        "lines": f"{_VISION}.curves:LineTracking",
+        "region": f"{_VISION}.curves:RegionTracking",
     },
     "motion": {
         "stationary": f"{_MOTIONS}:Stationary",
@@ -68,8 +80,16 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "random": f"{_MOTIONS}:Random",
         "poses": f"{_MOTIONS}:PoseMotion",
     },
+    "task_end": {
+        "joint": f"{_ENDS}:JointPosition",
+        "pose": f"{_ENDS}:CameraPosition",
+        "reached": f"{_ENDS}:Reached",
+        "seen": f"{_ENDS}:TargetSeen",
+        "time": f"{_ENDS}:TimeOver",
+    },
     "arm_motion": {"joints": f"{_MOTIONS}:JointMotion", "poses": f"{_MOTIONS}:PoseMotion"},
     "depth": {
+        "from_camera": f"{_CONTROL}.depth:DepthFromCamera",
         "from_features": f"{_CONTROL}.depth:DepthFromFeatures",
         "from_pose": f"{_CONTROL}.depth:DepthFromPose",
         "from_motion": f"{_CONTROL}.depth:DepthFromMotion",
@@ -97,6 +117,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "planner": ("plan",),
     "filter": ("start", "predict", "update"),
     "tracker": ("start",),
+    "task_end": ("bind",),
     "camera_source": ("open",),
     "matcher": ("describe", "match"),
 }
@@ -134,6 +155,11 @@ def find(
 
     try:
         module = _own_module(name, folder, Path.cwd()) or importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name not in (name, name.partition(".")[0]):
+            raise refuse(f"whose module needs {error.name}, which is not installed") from None
+        places = " or ".join(str(each) for each in dict.fromkeys((folder, Path.cwd())) if each)
+        raise refuse(f"but no {name}.py is in {places}, and no such package is installed") from None
     except ImportError as error:
         raise refuse(f"which cannot be imported ({error})") from None
     except Exception as error:
@@ -141,7 +167,8 @@ def find(
         raise refuse(why) from error
     found = getattr(module, attribute, None)
     if found is None:
-        raise refuse(f"but {name} has no {attribute}")
+        known = [each for each, value in vars(module).items() if hasattr(value, "__part_roles__")]
+        raise refuse(f"but {name} has no {attribute}; its parts: {nearest(attribute, known)}")
     if not isinstance(found, type):
         raise refuse("which is no class")
     declared = getattr(found, "__part_roles__", ())

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 
 KINDS = (".toml", ".json", ".yaml", ".yml")
 _MOST_BYTES = 1_000_000
 _MOST_VALUES = 100_000
 _DEEPEST = 16  # tables in tables
+_MOST_BITS = 1000  # of a whole number: what is larger is no float
 
 
 def read_table(path: Path, what: str) -> dict[str, Any]:
@@ -68,7 +69,7 @@ def read_text(path: Path, what: str, most_bytes: int = _MOST_BYTES) -> str:
         InputError: if it is not there, too large, or no text.
     """
     if not path.is_file():
-        raise InputError(str(path), "", "no such file", f"{what} in a file that exists")
+        raise InputError(str(path), "", Absent("no such file"), f"{what} in a file that exists")
     with path.open("rb") as stream:
         raw = stream.read(most_bytes + 1)
     if len(raw) > most_bytes:
@@ -97,7 +98,7 @@ def _parsed(text: str, kind: str, source: str) -> list[Any]:
 
 
 def _require_bounded(root: dict[str, Any], source: str) -> None:
-    """Raise InputError if a table is too deep, has too many values, or keys that are no words.
+    """Raise InputError if a table is too deep, has too many or too large values, or odd keys.
 
     Values that YAML aliases repeat count each time.
     """
@@ -114,8 +115,13 @@ def _require_bounded(root: dict[str, Any], source: str) -> None:
             for key in value:
                 if not isinstance(key, str):
                     raise InputError(source, str(key), f"a key that is {key!r}", "a word as key")
-        inside = value.values() if isinstance(value, dict) else value
-        left += [(entry, depth + 1) for entry in inside if isinstance(entry, dict | list)]
+        inside = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, entry in inside:
+            if isinstance(entry, int) and entry.bit_length() > _MOST_BITS:
+                given = "a whole number of hundreds of digits"
+                raise InputError(source, str(key), given, "a finite number")
+            if isinstance(entry, dict | list):
+                left.append((entry, depth + 1))
 
 
 def require_known(table: Mapping[str, Any], known: tuple[str, ...], source: str) -> None:
@@ -138,7 +144,7 @@ def numbers(
     try:
         array = np.array(table[key], dtype=np.float64)
     except KeyError:
-        raise InputError(source, key, "nothing", f"{expected}; this key is required") from None
+        raise InputError(source, key, NOTHING, expected) from None
     except (TypeError, ValueError, OverflowError):
         raise InputError(source, key, table[key], expected) from None
     fits = array.ndim == len(shape) and all(

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, InputError, nearest
 
 
 def explain(
@@ -32,13 +32,12 @@ def explain(
         )
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         parts = [str(part) for part in first["loc"]]
-        return InputError(
-            source, key, "a key that is not known", nearest(parts[-1], known_keys(parts[:-1]))
-        )
+        given = f"a key that {_kind_at(values, parts[:-1])} does not have"
+        return InputError(source, key, given, nearest(parts[-1], known_keys(parts[:-1])))
     without_kind = first["type"] == "union_tag_not_found" and isinstance(first["input"], Mapping)
     if first["type"] in ("missing", "missing_argument") or without_kind:
         key += ".kind" if without_kind else ""
-        return InputError(source, key, "nothing", "a value; this key is required")
+        return InputError(source, key, NOTHING, "a value")
     if first["type"] == "union_tag_invalid":
         given, tags = first["ctx"]["tag"], first["ctx"]["expected_tags"].replace("'", "")
         return InputError(source, f"{key}.kind", given, nearest(given, tags.split(", ")))
@@ -46,6 +45,15 @@ def explain(
         choices = re.findall(r"'([^']*)'", first["ctx"]["expected"])
         return InputError(source, key, first["input"], nearest(str(first["input"]), choices))
     return InputError(source, key, first["input"], _allowed(first))
+
+
+def _kind_at(values: Any, place: list[str]) -> str:
+    """Return the kind of the table at a place, as the file names it; else what stands for one."""
+    for part in place:
+        if isinstance(values, Mapping) and part in values:
+            values = values[part]
+    kind = values.get("kind") if isinstance(values, Mapping) else None
+    return f"kind {kind}" if isinstance(kind, str) else "this table"
 
 
 def _allowed(complaint: ErrorDetails) -> str:
@@ -57,6 +65,14 @@ def _allowed(complaint: ErrorDetails) -> str:
             return "a list"
         case "path_type":
             return "a file's path"
+        case "string_type":
+            return "text in quotes"
+        case "float_type" | "float_parsing":
+            return "a number"
+        case "int_type" | "int_parsing" | "int_from_float":
+            return "a whole number"
+        case "bool_type" | "bool_parsing":
+            return "true or false"
         case "greater_than":
             return f"greater than {complaint['ctx']['gt']:g}"
         case "greater_than_equal":

@@ -29,6 +29,8 @@ _ARGUMENTS = (
     "--remote-debugging-port=0",
 )
 _PATIENCE_S = 60.0
+_ARROWS = ("ArrowLeft", "ArrowUp", "ArrowRight", "ArrowDown")
+_KEYS = {"Tab": 9, "Enter": 13, "Escape": 27, **{name: 37 + k for k, name in enumerate(_ARROWS)}}
 
 
 class Browser:
@@ -92,7 +94,10 @@ class Browser:
 
     def click(self, selector: str) -> None:
         """Click the middle of an element, as a mouse does."""
-        x, y = self.middle(selector)
+        self.click_at(*self.middle(selector))
+
+    def click_at(self, x: float, y: float) -> None:
+        """Click a place of the window."""
         self.mouse("mouseMoved", x, y)
         self.mouse("mousePressed", x, y)
         self.mouse("mouseReleased", x, y)
@@ -128,6 +133,30 @@ class Browser:
             self.mouse("mouseMoved", x, y, held=True)
             time.sleep(0.05)
         self.mouse("mouseReleased", *end)
+
+    def key(self, name: str) -> None:
+        """Press a key and let it go."""
+        self.press(name)
+        self.release(name)
+
+    def press(self, name: str, text: str = "", alt: bool = False, shift: bool = False) -> None:
+        """Press a key, or let it repeat; with the text that it types."""
+        self._key("keyDown" if text else "rawKeyDown", name, text, alt + 8 * shift)
+
+    def release(self, name: str) -> None:
+        """Let go of a key."""
+        self._key("keyUp", name)
+
+    def _key(self, kind: str, name: str, text: str = "", modifiers: int = 0) -> None:
+        code = _KEYS.get(name, ord(name[0]))
+        self.call(
+            "Input.dispatchKeyEvent",
+            type=kind,
+            key=name,
+            text=text,
+            windowsVirtualKeyCode=code,
+            modifiers=modifiers,
+        )
 
     def image(self, selector: str) -> Any:
         """Return how an element looks, (height, width, 3)."""

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,8 +13,9 @@ from types import ModuleType
 
 import made_up_run
 import pytest
+from typer.main import get_command
 
-from vergence.app.main import main
+from vergence.app.main import app, main
 from vergence.app.output import new_folder
 from vergence.runtime.recording import Recording
 from vergence.signals import OutcomeKind
@@ -79,8 +81,25 @@ def test_help_loads_nothing_heavy() -> None:
 def test_a_run_leaves_recording_report_and_summary(command: Command, tmp_path: Path) -> None:
     assert command(*QUICK_RUN, "--out", "here") == 0
     files = {path.name for path in (tmp_path / "here").iterdir()}
-    assert files == {"cell.toml", "recording.mcap", "report.html", "summary.json"}
+    assert files == {"cell.toml", "recording.mcap", "report.html", "signals.csv", "summary.json"}
     assert Recording.open("here").outcome.kind is OutcomeKind.COMPLETED
+
+
+def test_the_outcome_is_told_before_the_report_is_made(
+    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = []
+
+    def write_report(folder: Path) -> Path:
+        told.append(capsys.readouterr().out)
+        return folder / "report.html"
+
+    monkeypatch.setattr("vergence.app.report.write_report", write_report)
+    assert command(*QUICK_RUN, "--out", "here") == 0
+    assert "completed at 0.50 s" in told[0]
+    assert "final error" in told[0]
+    assert "report.html" not in told[0]
+    assert "report.html" in capsys.readouterr().out
 
 
 def test_json_is_one_object_and_nothing_else(command: Command, capsys: object) -> None:
@@ -102,6 +121,14 @@ def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> N
     assert "report" in capsys.readouterr().out
 
 
+def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: object) -> None:
+    quick = ("--no-images", "--set", "duration_s=0.2", "--out", "here")
+    assert command("run", "so100", *quick) == 0
+    said = "With 5 joints so100 cannot move camera side in every direction: at the start it can "
+    assert f"{said}move along x and turn about y only in combination" in capsys.readouterr().out
+    assert "unserved directions" in Path("here", "report.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -117,6 +144,9 @@ def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> N
         (["map", "puma560", "--extent", "0"], "above zero"),
         (["map", "puma560", "--speeds", "nan"], "above zero"),
         (["calibrate", "--synthetic", "puma560", "--lens", "k1k3"], "did you mean k1k2?"),
+        (["run", "puma560", "--set", "law.Q=abc"], "law.Q: given abc; allowed: a number"),
+        (["calibrate", "nowhere"], "nowhere: no such folder; needed: a folder of images"),
+        (["run", sys.executable], "not TOML"),
         (["run", "puma560", "--out", sys.executable], f"{sys.executable}: File exists"),
     ],
 )
@@ -128,6 +158,14 @@ def test_a_mistake_is_one_message_and_exit_code_two(
     assert words in written.err
     assert "Traceback" not in written.err
     assert written.out == ""
+
+
+def test_a_driver_without_address_is_told_before_the_rehearsal(
+    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vergence.assembly.rehearse", lambda cell: pytest.fail("rehearsed"))
+    assert command("run", "ur5", "--driver", "ur") == 2
+    assert "ur:ADDRESS" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -151,7 +189,7 @@ def test_a_mistake_is_told_before_anything_heavy_is_loaded(arguments: list[str])
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
-    assert "given" in done.stderr
+    assert done.stderr.startswith("vergence: ")
     assert not {"numba", "cv2", "mujoco", "matplotlib", "foxglove"} & set(done.stdout.split())
 
 
@@ -165,16 +203,18 @@ def test_a_folder_that_cannot_be_written_is_a_mistake(
     assert "Traceback" not in written
 
 
-def test_a_recording_is_neither_written_over_nor_taken_for_a_cell(
+def test_a_recording_is_replaced_only_if_asked_and_is_not_taken_for_a_cell(
     command: Command, capsys: object, tmp_path: Path
 ) -> None:
     (tmp_path / "before").mkdir()
     (tmp_path / "before" / "recording.mcap").write_bytes(b"what was recorded")
     assert command(*QUICK_RUN, "--out", "before") == 2
-    assert "which holds a recording" in capsys.readouterr().err
+    assert "which holds a recording; allowed: another folder, or --over" in capsys.readouterr().err
     assert (tmp_path / "before" / "recording.mcap").read_bytes() == b"what was recorded"
     assert command("run", "before") == 2
     assert "vergence watch before" in capsys.readouterr().err
+    assert command(*QUICK_RUN, "--out", "before", "--overwrite") == 0
+    assert Recording.open("before").complete
 
 
 def test_an_interrupted_run_leaves_a_recording_and_says_where(
@@ -212,7 +252,8 @@ def test_ctrl_c_ends_a_run_with_a_whole_recording(tmp_path: Path) -> None:
     run.send_signal(signal.SIGINT)
     said, error = run.communicate(timeout=60)
     assert run.returncode == 1
-    assert error == ""
+    progress = re.compile(r"(prepare:|puma560: [\d.]+ / 30\.0 s) .*so far.*")
+    assert all(progress.fullmatch(line) for line in error.splitlines()), error
     assert said.startswith("stopped at")
     assert "stopped by the user" in said
     kept = Recording.open(recording)
@@ -265,7 +306,12 @@ def test_tab_completes(tmp_path: Path, line: str, expected: list[str]) -> None:
 
 def test_built_in_cells_are_listed(command: Command, capsys: object) -> None:
     assert command("cells", "--json") == 0
-    assert "puma560" in json.loads(capsys.readouterr().out)["cells"]
+    told = json.loads(capsys.readouterr().out)
+    assert "puma560" in told["cells"]
+    assert all(told["descriptions"][name].endswith(".") for name in told["cells"])
+    assert command("cells") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == told["cells"]
 
 
 @pytest.fixture(params=[True, False])
@@ -313,3 +359,13 @@ def test_run_folders_never_collide(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         folders.append(new_folder("cell"))
         folders[-1].mkdir(parents=True)
     assert len(set(folders)) == 3
+
+
+def test_the_help_of_every_option_is_a_sentence_of_its_own() -> None:
+    for name, one in get_command(app).commands.items():
+        for option in one.params:
+            text = option.help or ""
+            assert text, f"{name} {option.name} says nothing"
+            assert text[0].isupper(), f"{name} {option.name}: {text}"
+            assert text.endswith("."), f"{name} {option.name}: {text}"
+            assert not text.startswith(("Of ", "As ")), f"{name} {option.name}: {text}"

@@ -9,8 +9,16 @@ from pathlib import Path
 import cv2
 import pytest
 
+from vergence.app.campaign import reasons_table
 from vergence.app.main import main
-from vergence.experiments import Executor, ResultsFile, Trial, TrialResult, WorkersLostError
+from vergence.experiments import (
+    Ending,
+    Executor,
+    ResultsFile,
+    Trial,
+    TrialResult,
+    WorkersLostError,
+)
 
 Command = Callable[..., int]
 QUICK = ["--workers", "1", "--set", "task.feature_count=4", "--set", "duration_s=0.6"]
@@ -52,7 +60,15 @@ def test_laws_are_compared_in_one_table(command: Command, capsys: object) -> Non
     assert command(*COMPARE, "--json", "--out", "c") == 0
     answer = json.loads(capsys.readouterr().out)
     assert [law["law"] for law in answer["laws"]] == ["image_based", "constrained"]
-    counts = ("converged", "off_goal", "joint_limit", "out_of_view", "singular", "lost")
+    counts = (
+        "converged",
+        "off_goal",
+        "joint_limit",
+        "collision",
+        "out_of_view",
+        "singular",
+        "lost",
+    )
     for law in answer["laws"]:
         assert sum(law[name] for name in counts) == law["starts"] == 2
     rows = rows_of(answer["data"])
@@ -89,7 +105,7 @@ def test_what_is_done_is_kept_when_the_user_stops_it(
 
     monkeypatch.setattr(ResultsFile, "add", stop_at_the_third)
     assert command(*COMPARE, "--out", "c") == 1
-    assert "--out c goes on from here" in capsys.readouterr().err
+    assert "--out c to resume" in capsys.readouterr().err
     assert len(Path("c/results.jsonl").read_text().splitlines()) == 3
     monkeypatch.setattr(ResultsFile, "add", add)
     assert command(*COMPARE, "--out", "c") == 0
@@ -105,8 +121,8 @@ def test_workers_that_die_end_in_a_message(
     monkeypatch.setattr(Executor, "run", lose)
     assert command(*COMPARE, "--out", "c") == 1
     said = capsys.readouterr().err
-    assert "run own/3: something killed 4 workers; the same command" in said
-    assert "--out c goes on from here" in said
+    assert "run own/3: something killed 4 workers; repeat the command" in said
+    assert "--out c to resume" in said
 
 
 @pytest.mark.parametrize(
@@ -155,3 +171,13 @@ def test_a_mistake_is_one_message(
 def test_the_help_has_an_example(command: Command, capsys: object, name: str) -> None:
     assert command(name, "--help") == 0
     assert f"Example: vergence {name}" in capsys.readouterr().out
+
+
+def test_a_run_that_ends_off_the_goal_says_how_far_off() -> None:
+    result = TrialResult(
+        "own/1", {"law": "own"}, Ending.OFF_GOAL, "ran for 2 s with the target in view", 2.0, None,
+        12.345, 20.0, 0.1, 0.0, False, (0, 0, 0), (0, 0, 0), (0, 0), (0, 0),
+    )  # fmt: skip
+    table = reasons_table([result], "{law}")
+    assert "the farthest feature is 12.3 px off at the end" in table
+    assert "in view" not in table

@@ -1,86 +1,115 @@
-"""Figures name their units, keep legends off the data, and draw what was recorded."""
+"""Charts name their units, draw what was recorded, and have room for every label."""
 
+import re
 from dataclasses import replace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from vergence.app.figures import (
-    Panels,
-    camera_figure,
-    error_figure,
-    estimate_figure,
-    joints_figure,
-    mark_events,
-    measures_figure,
-    paths_figure,
-    svg,
-    target_figure,
-    twist_figure,
+    Chart,
+    Curve,
+    Panel,
+    camera_chart,
+    chart_svg,
+    constraints_chart,
+    error_chart,
+    estimate_chart,
+    event_lines,
+    joints_chart,
+    measures_chart,
+    paths_chart,
+    target_chart,
+    twist_chart,
 )
-from vergence.app.figures.arm import drawn_positions, normalized
+from vergence.app.figures.arm import normalized
+from vergence.app.figures.axis import range_of, thinned, ticks
+from vergence.app.figures.chart_svg import LEFT, RIGHT, WIDTH
 from vergence.geometry import se3_exp
 from vergence.runtime import ArmInfo
 from vergence.runtime.recording import Recording
 from vergence.runtime.results import Event, TargetTrace
 
-FIGURES = ["error", "paths", "joints", "twist", "measures", "camera", "target"]
+CHARTS = ["error", "paths", "joints", "twist", "measures", "camera", "target", "constraints"]
 
 
-def figure(name: str, recording: Recording) -> Panels:
+def chart(name: str, recording: Recording) -> Chart:
     camera, arm = recording.cameras["wrist"], recording.arms["puma"]
     made = {
-        "error": lambda: error_figure(camera),
-        "paths": lambda: paths_figure(recording.info.cameras["wrist"], camera),
-        "joints": lambda: joints_figure(recording.info.arms["puma"], arm),
-        "twist": lambda: twist_figure(arm),
-        "measures": lambda: measures_figure(arm),
-        "camera": lambda: camera_figure(camera),
-        "target": lambda: target_figure(camera, recording.target),
+        "error": lambda: error_chart(camera),
+        "paths": lambda: paths_chart(recording.info.cameras["wrist"], camera),
+        "joints": lambda: joints_chart(recording.info.arms["puma"], arm),
+        "twist": lambda: twist_chart(arm),
+        "measures": lambda: measures_chart(arm),
+        "camera": lambda: camera_chart(camera),
+        "target": lambda: target_chart(camera, recording.target),
+        "constraints": lambda: constraints_chart(arm),
     }[name]()
     assert made is not None
-    return made
+    return made.until(6.0, event_lines(recording.events, 6.0))
 
 
-@pytest.mark.parametrize("name", FIGURES)
+def drawing(made: Chart) -> ET.Element:
+    html = chart_svg(made, "a chart")
+    return ET.fromstring(html[html.index('<svg class="chart"') :])
+
+
+def curve_points(path: ET.Element) -> np.ndarray:
+    numbers = re.findall(r"-?[\d.]+", path.attrib["d"])
+    return np.array(numbers, dtype=float).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("name", CHARTS)
 def test_every_axis_says_what_and_in_which_unit(name: str, recording: Recording) -> None:
-    made = figure(name, recording)
-    assert all("(" in axes.get_ylabel() for axes in made.axes)
-    assert "(" in made.axes[-1].get_xlabel()
+    made = chart(name, recording)
+    assert all("(" in panel.title or panel.rows for panel in made.panels)
+    assert "(" in made.x_title
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_legends_lie_beside_the_data(name: str, recording: Recording) -> None:
-    made = figure(name, recording)
-    made.figure.draw_without_rendering()
-    for axes in made.axes:
-        if (legend := axes.get_legend()) is not None:
-            beside = legend.get_window_extent().x0 >= axes.get_window_extent().x1
-            inside = legend.get_window_extent().x1 <= made.figure.bbox.x1
-            assert beside
-            assert inside
+@pytest.mark.parametrize("name", CHARTS)
+def test_no_label_is_cut_off(name: str, recording: Recording) -> None:
+    svg = drawing(chart(name, recording))
+    _, _, width, height = map(float, svg.attrib["viewBox"].split())
+    for text in svg.iter("text"):
+        x, y, kind = float(text.attrib["x"]), float(text.attrib["y"]), text.attrib["class"]
+        length = 7.5 * len(text.text or "")  # more than any font at this size takes
+        left = x - length * {"end": 1.0, "middle": 0.5}.get(kind, 0.0)
+        assert left >= 0.0
+        assert left + length <= width
+        assert 9.0 <= y <= height - 2.0
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_the_same_figure_is_the_same_file(name: str, recording: Recording) -> None:
-    first, second = (svg(figure(name, recording).figure) for _ in range(2))
-    assert first == second
-    assert b"<svg" in first
+@pytest.mark.parametrize("name", CHARTS)
+def test_all_values_lie_between_the_axes(name: str, recording: Recording) -> None:
+    svg = drawing(chart(name, recording))
+    _, _, width, height = map(float, svg.attrib["viewBox"].split())
+    curves = [one for one in svg.iter("path") if one.attrib["class"].startswith("curve")]
+    assert curves or name == "constraints"
+    for path in curves:
+        x, y = curve_points(path).T
+        assert x.min() >= LEFT
+        assert x.max() <= width - RIGHT + 0.1
+        assert y.min() >= 0.0
+        assert y.max() <= height
 
 
 def test_error_and_drift_are_drawn_in_pixels(recording: Recording) -> None:
-    error, drift = figure("error", recording).axes
+    error, drift = chart("error", recording).panels
     trace = recording.cameras["wrist"]
-    np.testing.assert_array_equal(error.lines[0].get_ydata(), trace.error_px[:, 0])
-    np.testing.assert_array_equal(drift.lines[3].get_ydata(), trace.drift_px[:, 3])
+    np.testing.assert_array_equal(error.curves[0].y, trace.error_px[:, 0])
+    np.testing.assert_array_equal(drift.curves[3].y, trace.drift_px[:, 3])
 
 
 def test_paths_lie_in_an_image_with_v_downwards(recording: Recording) -> None:
-    [axes] = figure("paths", recording).axes
-    left, right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    assert left < -0.5 < 319.5 < right
-    assert top < -0.5 < 239.5 < bottom
+    svg = drawing(chart("paths", recording))
+    [frame] = [one for one in svg.iter("rect") if one.attrib["class"] == "frame"]
+    left, top, width, height = (float(frame.attrib[k]) for k in ("x", "y", "width", "height"))
+    assert width / height == pytest.approx(320 / 240, rel=1e-3)
+    first = next(one for one in svg.iter("path") if one.attrib["class"].startswith("curve"))
+    u, v = recording.cameras["wrist"].points_px[0, 0]
+    expected = left + (u + 0.5) / 320 * width, top + (v + 0.5) / 240 * height
+    np.testing.assert_allclose(curve_points(first)[0], expected, atol=0.11)
 
 
 def test_joint_limits_are_at_one() -> None:
@@ -91,7 +120,7 @@ def test_joint_limits_are_at_one() -> None:
     assert np.isnan(normalized(arm, np.zeros(3))[2])
 
 
-def test_a_joint_without_limits_is_drawn_in_half_turns(recording: Recording) -> None:
+def test_a_joint_without_limits_is_drawn_past_half_a_turn(recording: Recording) -> None:
     info, trace = recording.info.arms["puma"], recording.arms["puma"]
     endless = ArmInfo(
         info.names,
@@ -100,26 +129,28 @@ def test_a_joint_without_limits_is_drawn_in_half_turns(recording: Recording) -> 
         info.rate_max,
     )
     q = trace.position.copy()
-    q[:, 5] = np.deg2rad(np.linspace(27.0, 387.0, len(q)))
-    made = joints_figure(endless, replace(trace, position=q))
+    turned = np.deg2rad(np.linspace(27.0, 387.0, len(q)))
+    q[:, 5] = np.remainder(turned + np.pi, 2 * np.pi) - np.pi  # as an encoder of one turn has it
+    made = joints_chart(endless, replace(trace, position=q))
     assert made is not None
-    drawn = made.axes[0].lines[5]
-    assert drawn.get_label() == "joint6 (half turns)"
-    assert drawn.get_ydata()[0] == pytest.approx(27 / 180)
-    assert drawn.get_ydata()[-1] == pytest.approx(27 / 180)
-    assert np.abs(drawn.get_ydata()).max() <= 1.0
-    np.testing.assert_array_equal(
-        made.axes[0].lines[0].get_ydata(), drawn_positions(info, trace.position)[:, 0]
-    )
+    shares, degrees, _ = made.panels
+    assert [curve.label for curve in shares.curves] == list(info.names[:5])
+    [drawn] = degrees.curves
+    assert drawn.label == "joint6"
+    np.testing.assert_allclose(drawn.y, np.linspace(27.0, 387.0, len(q)))
 
 
 def test_events_are_marked_in_every_panel(recording: Recording) -> None:
-    made = figure("twist", recording)
-    before = [len(axes.lines) for axes in made.axes]
-    mark_events(made, recording.events)
-    after = [len(axes.lines) for axes in made.axes]
-    assert after == [count + len(recording.events) for count in before]
-    assert [text.get_text() for text in made.axes[0].texts] == ["1", "2"]
+    svg = drawing(chart("twist", recording))
+    lines = [one for one in svg.iter("path") if one.attrib["class"] == "event"]
+    assert len(lines) == 2 * len(recording.events)
+    scale = (WIDTH - LEFT - RIGHT) / 6.0
+    assert lines[0].attrib["d"].startswith(f"M{LEFT + scale * recording.events[0].time:.1f} ")
+    ones = [text for text in svg.iter("text") if text.text == "1"]
+    first = min(ones, key=lambda text: float(text.attrib["y"]))
+    assert float(first.attrib["x"]) == pytest.approx(LEFT + scale * 2.0, abs=0.1)
+    tops = [float(line.attrib["d"].split()[1].split("V")[0]) for line in lines]
+    assert float(first.attrib["y"]) < min(tops)
 
 
 def test_a_filters_error_is_its_distance_from_the_truth(recording: Recording) -> None:
@@ -130,25 +161,82 @@ def test_a_filters_error_is_its_distance_from_the_truth(recording: Recording) ->
     count = len(camera.time)
     covariance = np.tile(1e-6 * np.eye(12), (count, 1, 1))
     sure = np.ones(count, dtype=bool)
-    made = estimate_figure(
+    made = estimate_chart(
         camera,
         TargetTrace(camera.time, camera.received, poses, np.zeros((count, 6)), covariance, sure),
     )
     assert made is not None
-    position, rotation = made.axes
-    np.testing.assert_allclose(position.lines[0].get_ydata(), 5.0)
-    np.testing.assert_allclose(position.lines[1].get_ydata(), np.sqrt(3.0))
-    np.testing.assert_allclose(rotation.lines[0].get_ydata(), np.degrees(0.1))
+    position, rotation = made.panels
+    np.testing.assert_allclose(position.curves[0].y, 5.0)
+    np.testing.assert_allclose(position.curves[1].y, np.sqrt(3.0))
+    np.testing.assert_allclose(rotation.curves[0].y, np.degrees(0.1))
 
 
-def test_events_at_one_time_share_a_number(recording: Recording) -> None:
-    made = figure("twist", recording)
-    events = [Event(time, "lost", "") for time in (1.0, 1.01, 1.02, 4.0)]
-    mark_events(made, events)
-    assert [text.get_text() for text in made.axes[0].texts] == ["1–3", "4"]
+def test_events_at_one_time_share_a_number() -> None:
+    events = [Event(time, "lost", "") for time in (1.0, 1.01, 1.02, 4.0, 9.0)]
+    assert event_lines(events, 6.0) == ((1.0, "1–3"), (4.0, "4"))
 
 
-def test_nothing_known_gives_no_figure(recording: Recording) -> None:
+def test_a_legend_names_every_curve_once_beside_the_drawing(recording: Recording) -> None:
+    html = chart_svg(chart("joints", recording), "joints")
+    legend = html[: html.index('<svg class="chart"')]
+    for name in recording.info.arms["puma"].names:
+        assert legend.count(f"</svg>{name}</span>") == 1
+
+
+def test_names_cannot_break_a_chart() -> None:
+    sly = "<script>alert(1)</script>"
+    x = np.arange(3.0)
+    made = Chart((Panel(sly, (Curve(sly, x, x),)),), x_title=sly, events=((1.0, sly),))
+    assert sly not in chart_svg(made, sly)
+
+
+def test_a_curve_is_broken_where_it_is_not_known() -> None:
+    y = np.array([0.0, 1.0, np.nan, 1.0, 0.0])
+    svg = drawing(Chart((Panel("y (m)", (Curve("", np.arange(5.0), y),)),), x_high=4.0))
+    [path] = [one for one in svg.iter("path") if one.attrib["class"].startswith("curve")]
+    assert path.attrib["d"].count("M") == 2
+    assert path.attrib["d"].count("L") == 2
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "names"),
+    [
+        (0.0, 2.0, ["0.0", "0.5", "1.0", "1.5", "2.0"]),
+        (-0.011, 0.012, ["−0.010", "−0.005", "0.000", "0.005", "0.010"]),
+        (0.0, 1.1, ["0.00", "0.25", "0.50", "0.75", "1.00"]),
+        (980.0, 12_000.0, ["2500", "5000", "7500", "10000"]),
+        (0.0, 3e-9, ["0", "1e−09", "2e−09", "3e−09"]),
+    ],
+)
+def test_ticks_are_round_numbers(low: float, high: float, names: list[str]) -> None:
+    places, shown = ticks(low, high, 5)
+    assert shown == names
+    assert places[0] >= low - 1e-12
+    assert places[-1] <= high + 1e-12
+
+
+@pytest.mark.parametrize("values", [[], [0.0], [3.0, 3.0], [np.nan], [-1e-9, 1e-9], [1e12, 2e12]])
+def test_any_values_have_an_axis(values: list[float]) -> None:
+    low, high = range_of(np.array(values))
+    assert low < high
+    assert all(low < value < high for value in values if np.isfinite(value))
+    assert len(ticks(low, high, 5)[0])
+
+
+def test_a_long_curve_keeps_its_peaks_and_gaps() -> None:
+    x = np.linspace(0.0, 600.0, 18_000)
+    y = np.sin(x)
+    y[4321], y[10_000:10_500] = 5.0, np.nan
+    few_x, few_y = thinned(x, y, 800)
+    assert len(few_x) == len(few_y) <= 1600
+    assert np.nanmax(few_y) == 5.0
+    assert np.nanmin(few_y) == pytest.approx(-1.0, abs=1e-3)
+    gap = (few_x > x[10_050]) & (few_x < x[10_450])
+    assert np.isnan(few_y[gap]).all()
+
+
+def test_nothing_known_gives_no_chart(recording: Recording) -> None:
     camera, arm = recording.cameras["wrist"], recording.arms["puma"]
     unknown = np.full_like(camera.points_px, np.nan)
     blind = replace(
@@ -164,12 +252,12 @@ def test_nothing_known_gives_no_figure(recording: Recording) -> None:
         manipulability=np.full_like(arm.manipulability, np.nan),
         penalty=np.full_like(arm.penalty, np.nan),
     )
-    assert error_figure(blind) is None
-    assert paths_figure(recording.info.cameras["wrist"], blind) is None
-    assert camera_figure(blind) is None
-    assert target_figure(replace(blind, T_world_target=blind.T_world_camera), None) is None
-    assert twist_figure(still) is None
-    assert measures_figure(still) is None
+    assert error_chart(blind) is None
+    assert paths_chart(recording.info.cameras["wrist"], blind) is None
+    assert camera_chart(blind) is None
+    assert target_chart(replace(blind, T_world_target=blind.T_world_camera), None) is None
+    assert twist_chart(still) is None
+    assert measures_chart(still) is None
 
 
 def test_many_features_are_summed_up(recording: Recording) -> None:
@@ -181,6 +269,6 @@ def test_many_features_are_summed_up(recording: Recording) -> None:
         true_px=np.tile(camera.true_px, (1, 5, 1)),
         found=np.tile(camera.found, (1, 5)),
     )
-    made = error_figure(crowd)
+    made = error_chart(crowd)
     assert made is not None
-    assert [line.get_label() for line in made.axes[0].lines] == ["largest of 20", "median"]
+    assert [curve.label for curve in made.panels[0].curves] == ["largest of 20", "median"]

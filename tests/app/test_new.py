@@ -50,6 +50,17 @@ def test_an_arm_the_project_has_never_seen_follows_a_board(command, capsys, join
     assert result.summary["max_error_px"] < 20
 
 
+def test_the_robots_part_of_the_cell_is_there_to_be_uncommented(command, tmp_path: Path) -> None:
+    model, body = ARMS[6]
+    assert command("new", model, "--body", body, "--out", "mine") == 0
+    path = tmp_path / "mine" / "cell.toml"
+    before, mark, robot = path.read_text().partition("# [driver]")
+    path.write_text(before + "\n".join(line.lstrip("# ") for line in (mark + robot).splitlines()))
+    cell = load_cell("mine")
+    assert cell.driver.kind == "ur"
+    assert cell.driver.cameras["wrist"]["latency_s"] == 0.03
+
+
 def test_features_are_found_on_its_board_in_rendered_images(command) -> None:
     assert command("new", ARMS[6][0], "--body", ARMS[6][1]) == 0
     result = run_cell(load_cell("puma560", {"duration_s": "1"}))
@@ -65,6 +76,23 @@ def test_the_board_faces_the_camera_above_the_floor(command) -> None:
     assert world.target_pose()[2, 3] > 0.05
 
 
+WEDGE = """v -30 -20 0\nv 50 -20 0\nv 50 40 0\nv -30 40 0\nv -30 -20 30\nv -30 40 30
+f 4 3 2 1\nf 1 2 5\nf 2 3 6 5\nf 3 4 6\nf 4 1 5 6\n"""  # in millimetres
+
+
+def test_an_object_takes_the_boards_place(command, capsys, tmp_path: Path) -> None:
+    (tmp_path / "wedge.obj").write_text(WEDGE)
+    arm = ("new", ARMS[6][0], "--body", ARMS[6][1], "--out", "mine", "--target", "wedge.obj")
+    assert command(*arm) == 2
+    assert "an object 80 m wide" in capsys.readouterr().err
+    assert command(*arm, "--target-scale", "0.001") == 0
+    cell = load_cell("mine", {"duration_s": "1"})
+    driver = SimulatedDriver(cell, images=False)
+    T_camera_target = np.linalg.inv(driver.world.camera_pose("wrist")) @ driver.world.target_pose()
+    np.testing.assert_allclose(T_camera_target[:3, 3], [0.0, 0.0, 0.04 / 0.35], atol=1e-3)
+    assert run_cell(cell).outcome.succeeded  # four features are found on it and followed
+
+
 def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsys) -> None:
     (tmp_path / "puma560").mkdir()
     (tmp_path / "puma560" / "cell.toml").write_text("mine")
@@ -76,7 +104,9 @@ def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsy
 @pytest.mark.parametrize("body", ["", "flang"])
 def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsys, body) -> None:
     assert command("new", ARMS[6][0], "--body", body) == 2
-    assert "flange" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "the last of each branch: flange" in said
+    assert ("no body is named; needed" in said) == (body == "")
 
 
 def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:

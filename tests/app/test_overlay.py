@@ -1,5 +1,7 @@
 """Marks are where they should be, to a fraction of a pixel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ def marks(tracked: object = NOWHERE, found: bool = True, **others: object) -> Ma
         "windows": SearchWindows(NOWHERE, NOWHERE),
         "desired_px": NOWHERE,
         "true_px": NOWHERE,
+        "joined": np.zeros(1, dtype=bool),
     } | others
     return Marks(np.asarray(tracked), np.array([found]), **points)
 
@@ -95,3 +98,26 @@ def test_a_point_nobody_looked_for_does_not_look_lost() -> None:
     at = [[50.0, 40.0]]
     lost, unasked = marks(at, found=False), marks(at, found=False, asked=np.array([False]))
     assert (draw(GREY, lost) != draw(GREY, unasked)).any()
+
+
+def test_points_that_stand_for_a_curve_are_drawn_as_that_curve() -> None:
+    corners = np.array([[30.0, 20.0], [70.0, 20.0], [70.0, 60.0], [30.0, 60.0]])
+    nowhere = np.full((4, 2), np.nan)
+    curve = Marks(
+        corners,
+        np.ones(4, dtype=bool),
+        np.ones(4, dtype=bool),
+        SearchWindows(nowhere, nowhere),
+        nowhere,
+        nowhere,
+        np.ones(4, dtype=bool),
+    )
+    closed = draw(GREY, curve) != 128
+    assert closed[20, 50].any()
+    assert closed[40, 30].any()  # from the last point back to the first
+    assert not closed[40, 50].any()
+    pairs = draw(GREY, replace(curve, joined=np.array([True, False, True, False]))) != 128
+    assert pairs[20, 50].any()
+    assert pairs[60, 50].any()
+    assert not pairs[40, 30].any()
+    assert (draw(GREY, replace(curve, found=np.zeros(4, dtype=bool))) == 128).all()

@@ -1,4 +1,4 @@
-"""Films play, key frames show the run."""
+"""A report's film has every kept image, and its key frames span the run."""
 
 from pathlib import Path
 
@@ -7,62 +7,48 @@ import made_up_run
 import numpy as np
 import pytest
 
-from vergence.app.recorded_images import encode, film, key_frames
+from vergence.app.recorded_images import CameraImages, camera_images
 from vergence.runtime.recording import Recording
 
 
-def decoded(data: bytes, folder: Path) -> tuple[list[object], float]:
-    path = folder / "film.webm"
-    path.write_bytes(data)
-    reader = cv2.VideoCapture(str(path))
-    rate = reader.get(cv2.CAP_PROP_FPS)
-    frames = []
-    while (read := reader.read())[0]:
-        frames.append(read[1])
-    reader.release()
-    return frames, rate
+@pytest.fixture(scope="module")
+def images(recording: Recording) -> CameraImages:
+    return camera_images(recording, "wrist")
 
 
-def test_a_film_plays_every_kept_image_in_real_time(recording: Recording, tmp_path: Path) -> None:
-    data = film(recording, "wrist")
-    assert data is not None
-    frames, rate = decoded(data, tmp_path)
-    assert len(frames) == len(list(recording.images("wrist")))
-    assert rate == pytest.approx(15.0, rel=0.02)
-    assert frames[0].shape == (300, 400, 3)
+def decoded(jpeg: bytes) -> object:
+    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
 
 
-def test_a_film_shows_the_image_it_was_given(tmp_path: Path) -> None:
-    ramp = np.add.outer(np.arange(64), np.arange(96)).astype(np.uint8)
-    frame = np.repeat(ramp[..., None], 3, axis=2)
-    data = encode([frame] * 5, 10.0)
-    assert data is not None
-    frames, _ = decoded(data, tmp_path)
-    assert np.abs(frames[-1].astype(float) - frame).mean() < 4.0
+def test_a_film_has_every_kept_image_at_its_time(
+    images: CameraImages, recording: Recording
+) -> None:
+    kept = list(recording.images("wrist"))
+    assert [frame.time for frame in images.film] == [time for time, _ in kept]
+    assert decoded(images.film[0].jpeg).shape == (300, 400, 3)
+    texture = cv2.resize(kept[40][1], (400, 300), interpolation=cv2.INTER_LINEAR)
+    drawn = decoded(images.film[40].jpeg).mean(axis=2)
+    assert np.median(np.abs(drawn - texture)) < 3.0
 
 
-def test_odd_images_lose_a_row_and_a_column(tmp_path: Path) -> None:
-    data = encode([np.zeros((63, 95, 3), dtype=np.uint8)] * 3, 10.0)
-    assert data is not None
-    assert decoded(data, tmp_path)[0][0].shape == (62, 94, 3)
+def test_a_long_run_has_a_film_of_bounded_size(tmp_path: Path) -> None:
+    long = Recording.open(made_up_run.record(tmp_path, duration=12.0, rate_hz=60.0))
+    film = camera_images(long, "wrist").film
+    times = [frame.time for frame in film]
+    assert len(film) <= 160
+    assert times[-1] > 11.8
+    np.testing.assert_allclose(np.diff(times), times[1] - times[0], atol=1e-6)
 
 
-def test_encoding_says_nothing_on_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
-    encode([np.zeros((64, 96, 3), dtype=np.uint8)] * 3, 10.0)
-    assert capfd.readouterr().err == ""
-
-
-def test_key_frames_span_the_run(recording: Recording) -> None:
-    frames = key_frames(recording, "wrist")
+def test_key_frames_span_the_run(images: CameraImages, recording: Recording) -> None:
     times = [time for time, _ in recording.images("wrist")]
+    frames = images.key_frames
     assert frames[0].time == times[0]
     assert frames[-1].time == times[-1]
     assert len(frames) == 4
-    image = cv2.imdecode(np.frombuffer(frames[0].jpeg, np.uint8), cv2.IMREAD_COLOR)
-    assert image.shape == (480, 640, 3)
+    assert decoded(frames[0].jpeg).shape == (480, 640, 3)
 
 
 def test_a_run_without_images_has_neither(tmp_path: Path) -> None:
     bare = Recording.open(made_up_run.record(tmp_path, images=False, duration=0.5))
-    assert film(bare, "wrist") is None
-    assert key_frames(bare, "wrist") == []
+    assert camera_images(bare, "wrist") == CameraImages((), ())

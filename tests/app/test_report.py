@@ -1,5 +1,6 @@
 """A report says how the run went, and needs nothing but itself."""
 
+import csv
 import re
 import shutil
 from dataclasses import replace
@@ -9,7 +10,7 @@ import made_up_run
 import numpy as np
 import pytest
 
-from vergence.app.report import make_report, write_report
+from vergence.app.report import make_report, report, write_report
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.errors import InputError
 from vergence.runtime.recording import Recording
@@ -35,14 +36,45 @@ def test_the_page_tells_the_outcome_and_every_part(page: str) -> None:
     for heading in ("Camera wrist", "Target", "Arm puma", "Events", "Cell file"):
         assert f"<h2>{heading}</h2>" in page
     assert "the residual is too large" in page
-    assert "data:video/webm" in page
-    assert page.count('<img src="data:image/jpeg') == 4
-    assert page.count("data:image/svg+xml") == 8
+    assert page.count('class="film"') == 1
+    assert page.count('<img src="data:image/jpeg') == 5  # the film's first, and the key frames
+    assert page.count('<svg class="chart"') == 8
 
 
-def test_every_image_says_what_it_shows(page: str) -> None:
-    assert all(re.findall(r'alt="([^"]*)"', page))
-    assert page.count("<img") == page.count("<figcaption>")
+def test_every_image_and_chart_says_what_it_shows(page: str) -> None:
+    assert all(re.findall(r'(?:alt|aria-label)="([^"]*)"', page))
+    charts = page.count('<svg class="chart"')
+    assert page.count("<img") + charts == page.count("<figcaption>")
+
+
+def test_the_numbers_lie_beside_the_page(recording: Recording, tmp_path: Path) -> None:
+    page = report(recording, tmp_path / "report.html")
+    assert "signals.csv" in page.read_text(encoding="utf-8")
+    with (tmp_path / "signals.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    joint3 = [float(row["puma.position.joint3"]) for row in rows]
+    np.testing.assert_allclose(joint3, recording.arms["puma"].position[:, 2], rtol=1e-8)
+    trace = recording.cameras["wrist"]
+    lost = np.isnan(trace.error_px[:, 3])
+    assert [row["wrist.error_px.3"] == "" for row in rows] == lost.tolist()
+    assert [row["wrist.found.3"] for row in rows] == ["0" if gone else "1" for gone in lost]
+    assert rows[62]["puma.slack"] == "view=0.103333"
+    assert [row["puma.active"] for row in rows] == [
+        "; ".join(names) for names in recording.arms["puma"].active
+    ]
+
+
+def test_a_final_error_behind_a_moving_target_is_explained(recording: Recording) -> None:
+    trace = recording.cameras["wrist"]
+    stationary = np.tile(trace.T_world_target[:1], (len(trace.time), 1, 1))
+    moving = stationary.copy()
+    moving[:, 0, 3] += 0.1 * trace.time
+    told = [
+        {row.name: row.note for row in camera_rows(replace(trace, T_world_target=poses))}
+        for poses in (stationary, moving)
+    ]
+    assert told[0]["final error"] == "farthest point, last image"
+    assert "moves at 0.1 m/s" in told[1]["final error"]
 
 
 def test_the_numbers_are_those_of_the_recording(recording: Recording) -> None:

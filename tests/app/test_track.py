@@ -199,14 +199,14 @@ def test_points_found_by_hand_are_a_start(track: Track, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"images": "nowhere"}, "nowhere: given no such folder or file"),
-        ({"model": "gone.obj"}, "gone.obj: given no such file"),
+        ({"images": "nowhere"}, "nowhere: no such folder or file"),
+        ({"model": "gone.obj"}, "gone.obj: no such file"),
         ({"model": "flat.obj"}, "no corner"),
-        ({"camera": "gone.toml"}, "gone.toml: given no such file"),
+        ({"camera": "gone.toml"}, "gone.toml: no such file"),
         ({"camera": "small.toml"}, "small.toml: width: given 640; allowed: 320"),
         ({"camera": "typo.toml"}, "did you mean fx"),
         ({"camera": "aside.toml"}, "aside.toml: cx: given 900.0; allowed: 0 … 319"),
-        ({"camera": None}, "--fx: given nothing"),
+        ({"camera": None}, "--fx: missing"),
         ({"camera": None, "fx": "nan"}, "--fx: given nan; allowed: a finite number"),
         ({"fx": "300"}, "either --camera or intrinsics"),
         ({"start": "1,2,3"}, "6 finite numbers"),

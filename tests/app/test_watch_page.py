@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import accessibility
 import numpy as np
 import pytest
 from browser import Browser
@@ -23,6 +24,10 @@ POINT = (
     f"(() => {{ const v = {VIEW}, b = v.canvas.getBoundingClientRect();"
     "const [x, y] = v.header.points[0];"
     "return [b.left + (x + 0.5) * b.width / 320, b.top + (y + 0.5) * b.height / 240] })()"
+)
+BOX = (
+    f"(() => {{ const b = {VIEW}.canvas.getBoundingClientRect();"
+    "return [b.left, b.top, b.width, b.height] })()"
 )
 TARGET = (
     "(() => { const s = watch.scene, o = s.outline, b = s.stage.getBoundingClientRect();"
@@ -75,7 +80,9 @@ def test_the_page_shows_a_running_cell(browser: Browser) -> None:
         "[...document.querySelectorAll('.plot figcaption')].map(c => c.innerText)"
     )
     assert [
-        part for title in titles for part in re.findall(r"\((?:px|±1 = limit|SI units)\)", title)
+        part
+        for title in titles
+        for part in re.findall(r"\((?:px|±1 = limits|0 = singular)\)", title)
     ]
     assert "joint1" in titles[1]
     assert "joint6" in titles[1]
@@ -103,6 +110,32 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
     browser.wait("JSON.stringify(watch.scene.outline)", lambda text: text != outline)
     changed = np.abs(browser.image("#stage").astype(float) - before).max(axis=2) > 30
     assert changed.mean() > 0.02
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_to_complain_of(browser: Browser, scheme: str) -> None:
+    assert accessibility.complaints(browser, scheme) == []
+
+
+def test_every_control_is_reached_by_the_keyboard_and_has_a_name(browser: Browser) -> None:
+    controls = (
+        "[...document.querySelectorAll('button, input, select')]"
+        ".filter((e) => !e.disabled && e.checkVisibility({visibilityProperty: true}))"
+    )
+    count = browser.value(f"{controls}.length")
+    assert count > 20
+    browser.value("document.activeElement.blur()")
+    reached = set()
+    for _ in range(2 * count):
+        browser.key("Tab")
+        index = browser.value(f"{controls}.indexOf(document.activeElement)")
+        reached.add(index)
+    assert reached >= set(range(count))
+
+
+def test_the_limits_that_shape_the_motion_are_named(browser: Browser) -> None:
+    text = browser.value("document.getElementById('limits').textContent")
+    assert text.startswith("Limits that shape the motion now: ")
 
 
 def test_marks_are_drawn_where_the_points_are(browser: Browser) -> None:
@@ -164,6 +197,8 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
     browser.wait(TIME, lambda time: time > before + 0.5)  # and the old one goes on
     assert "law changed" in browser.value(log)
     settled(browser)
+    browser.click(".knob[data-key=gain] .undo")
+    browser.wait("document.getElementById('settings').textContent", lambda t: "gain" not in t)
 
 
 def test_the_arm_follows_the_target_that_the_mouse_drags_in_an_image(
@@ -197,6 +232,41 @@ def test_the_target_can_be_dragged_in_space_too(browser: Browser) -> None:
     settled(browser)
 
 
+def test_points_that_are_clicked_are_tracked_from_there(browser: Browser) -> None:
+    browser.click("#pick")
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
+    (u0, v0), *_ = browser.value(f"{VIEW}.header.points")
+    browser.middle(".image canvas")
+    left, top, width, height = browser.value(BOX)
+    meant = []
+    for u, v in ((u0, v0), (u0 + 24, v0), (u0, v0 + 20)):
+        x = round(left + (u + 0.5) * width / 320)  # the mouse is at whole pixels of the window
+        y = round(top + (v + 0.5) * height / 240)
+        browser.click_at(x, y)
+        meant.append(((x - left) * 320 / width - 0.5, (y - top) * 240 / height - 0.5))
+    picked = browser.value("watch.picking.points")
+    np.testing.assert_allclose(picked, meant, atol=1e-3)
+    browser.click("#track-points")
+    seen = browser.wait(f"{VIEW}?.header?.points", lambda points: points and len(points) == 3)
+    np.testing.assert_allclose(seen, picked, atol=1.5)
+    before = browser.value(TIME)
+    browser.wait(TIME, lambda time: time > before + 0.5)
+    assert browser.value("document.getElementById('badge').textContent") == "running"
+    np.testing.assert_allclose(browser.value(f"{VIEW}.header.desired"), picked, atol=1e-3)
+    settled(browser)
+
+
+def test_a_goal_is_taken_where_the_arm_is(browser: Browser, watched: Watched) -> None:
+    browser.click("#take-goal")
+    text = browser.wait(
+        "document.getElementById('log').innerText", lambda text: "goal taken" in text
+    )
+    goal = Path(re.search(r"--goal (\S+)", text)[1])
+    assert {goal.name, "goal-1.toml", "goal-1.camera.yaml"} <= {
+        path.name for path in goal.parent.iterdir()
+    }
+
+
 def test_a_reset_begins_again_from_the_start(browser: Browser) -> None:
     before = browser.value(TIME)
     browser.click("#reset")
@@ -220,10 +290,13 @@ def test_ctrl_c_stops_the_arm_though_it_is_paused_and_leaves_a_recording(
     browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
     answer = watched.stop()
     assert answer["outcome"]["kind"] == "stopped"
-    second = Path(answer["run"])
-    assert second.name == "run-2"
-    first, last = Recording.open(second.with_name("run")), Recording.open(second)
-    for recording in (first, last):
+    third = Path(answer["run"])
+    assert third.name == "run-3"
+    first, picked, last = (
+        Recording.open(third.with_name(name)) for name in ("run", "run-2", "run-3")
+    )
+    assert picked.cameras["wrist"].points_px.shape[1] == 3
+    for recording in (first, picked, last):
         assert recording.complete
         assert np.abs(recording.arms["puma"].velocity[-1]).max() < 0.5
     assert "law changed" in {event.name for event in first.events}

@@ -4,6 +4,7 @@ import http.client
 import json
 import socket
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,13 @@ from websockets.sync.client import connect
 
 from vergence.app.watch.camera_view import CameraView
 from vergence.app.watch.commands import Command, Pause, parse
-from vergence.app.watch.drag import Drag
+from vergence.app.watch.drag import Drag, TargetDrag
 from vergence.app.watch.inbox import Inbox
 from vergence.app.watch.knobs import knobs, law_choices
+from vergence.app.watch.limits_now import LimitsNow
 from vergence.app.watch.moved_target import MovedTarget
 from vergence.app.watch.pace import Pace
+from vergence.app.watch.plots import drawn_errors, live_plots
 from vergence.app.watch.protocol import Request
 from vergence.app.watch.rate_limit import RateLimit
 from vergence.app.watch.server import Server, listen
@@ -26,6 +29,7 @@ from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.cell import built_in_cells, load_cell
 from vergence.errors import InputError
 from vergence.geometry import se3, so3_exp
+from vergence.runtime import ArmInfo
 
 TURNED = so3_exp(np.array([0.3, -0.2, 0.5]))
 
@@ -35,7 +39,13 @@ def own_motion(time: float) -> Any:
 
 
 class TestDrag:
-    DRAG = Drag(se3(TURNED, np.array([1.0, 2.0, 3.0])), 0.8, (0.1, -0.05), np.array([0.0, 0.1, 0]))
+    DRAG = Drag(
+        se3(TURNED, np.array([1.0, 2.0, 3.0])),
+        0.8,
+        (0.1, -0.05),
+        np.array([0.0, 0.1, 0]),
+        np.array([0.2, 0.0, 0.0]),
+    )
 
     def test_a_mouse_that_rests_moves_nothing(self) -> None:
         np.testing.assert_allclose(self.DRAG.shift(0.1, -0.05, False), [0.0, 0.1, 0.0])
@@ -49,6 +59,39 @@ class TestDrag:
     def test_along_the_axis_up_is_away(self) -> None:
         shift = self.DRAG.shift(0.3, -0.15, True) - [0.0, 0.1, 0.0]
         np.testing.assert_allclose(TURNED.T @ shift, [0.0, 0.0, 0.08], atol=1e-12)
+
+    def test_turning_the_near_side_follows_the_mouse(self) -> None:
+        np.testing.assert_allclose(self.DRAG.turn(0.1, -0.05, False), [0.2, 0.0, 0.0])
+        before = so3_exp(np.array([0.2, 0.0, 0.0]))
+        turned = so3_exp(self.DRAG.turn(0.12, -0.04, False)) @ before.T
+        near = TURNED @ np.array([0.0, 0.0, -0.05])  # of the target's origin
+        dx, dy, _ = TURNED.T @ (turned @ near - near)
+        np.testing.assert_allclose([dx / dy, dx > 0.0], [2.0, 1.0], rtol=0.05)
+
+    def test_turning_about_the_axis_keeps_it(self) -> None:
+        before = so3_exp(np.array([0.2, 0.0, 0.0]))
+        turned = so3_exp(self.DRAG.turn(0.3, 0.0, True)) @ before.T
+        axis = TURNED[:, 2]
+        np.testing.assert_allclose(turned @ axis, axis, atol=1e-12)
+
+
+class TestTargetDrag:
+    def test_a_key_pressed_in_the_middle_of_a_drag_moves_nothing_by_itself(self) -> None:
+        target = MovedTarget(own_motion)
+        world = SimpleNamespace(target_pose=lambda: own_motion(0.0))
+        driver: Any = SimpleNamespace(target=target, world=world, cameras={})
+        drag = TargetDrag(driver, ViewState())
+        drag.grab("", 0.0, 0.0, ViewerCamera.around(np.zeros(3), 2.0, 90.0, -20.0, 45.0))
+        drag.move("", 0.3, 0.1, False, False)
+        shift = target.shift_m
+        drag.move("", 0.3, 0.1, False, True)
+        np.testing.assert_array_equal(target.turn_rad, np.zeros(3))
+        drag.move("", 0.4, 0.1, False, True)
+        turn = target.turn_rad
+        assert np.linalg.norm(turn) == pytest.approx(0.3)
+        drag.move("", 0.4, 0.1, False, False)
+        np.testing.assert_allclose(target.shift_m, shift)
+        assert drag.release() == f"by {1e3 * np.linalg.norm(shift):.0f} mm, by 17°"
 
 
 class TestMovedTarget:
@@ -72,6 +115,14 @@ class TestMovedTarget:
         places = np.array([target.pose(time)[:3, 3] for time in np.arange(0.0, 4.0, 0.002)])
         assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() <= 0.3 * 0.002 + 1e-12
         np.testing.assert_allclose(places[-1], [0.0, 0.4, 0.5], atol=1e-6)
+
+    def test_it_turns_as_far_as_the_mouse_asks_and_stays_where_it_is(self) -> None:
+        target = MovedTarget(own_motion)
+        target.held = True
+        target.turn_rad = np.array([0.0, 0.0, 0.5])
+        poses = [target.pose(time) for time in np.arange(0.0, 2.0, 0.002)]
+        np.testing.assert_allclose(poses[-1][:3, :3], so3_exp(target.turn_rad), atol=1e-6)
+        np.testing.assert_array_equal(poses[-1][:3, 3], own_motion(0.0)[:3, 3])
 
 
 class TestPace:
@@ -128,6 +179,13 @@ class TestKnobs:
             assert knobs(changed.law)
         first = next(iter(law_choices(cell).values()))
         assert load_cell(name, {"law": first}).law == cell.law
+
+
+def test_with_two_cameras_each_plot_of_an_error_names_its_camera() -> None:
+    cell = load_cell("wrist_and_wall")
+    arm = ArmInfo(("joint1",), -np.ones(1), np.ones(1), np.ones(1))
+    titles = [plot.title for plot in live_plots(cell, 2, arm)]
+    assert titles[:2] == [f"error of the image points in {name}" for name in ("wrist", "wall")]
 
 
 class TestViewState:
@@ -345,3 +403,29 @@ def _own_address() -> str:
         except OSError:  # no network: any address that is not ours is refused as well
             return "192.0.2.1"
         return str(probe.getsockname()[0])
+
+
+def test_a_limit_is_named_while_it_acts_and_a_moment_longer() -> None:
+    limits = LimitsNow()
+    view = {"name": "view", "relaxed": False}
+    assert limits.at(1.0, ("view",), {"view": 0.0}) == [view]
+    both = [{"name": "joint margin", "relaxed": True}, view]
+    assert limits.at(1.4, (), {"joint margin": 0.1}) == both
+    assert limits.at(1.8, (), {}) == both[:1]
+    assert limits.at(3.0, (), {}) == []
+    limits.at(4.0, ("view",), {})
+    assert limits.at(0.0, (), {}) == []  # begun again
+
+
+def test_points_that_change_on_the_way_are_drawn_as_the_farthest_and_the_mean() -> None:
+    arm = ArmInfo(("j",), np.array([-1.0]), np.array([1.0]), np.array([1.0]))
+    error = live_plots(load_cell("photograph"), 0, arm)[0]
+    assert (error.key, error.series) == ("error_px", ("farthest", "mean"))
+    drawn = drawn_errors(np.array([1.0, np.nan, 4.0]), error)
+    np.testing.assert_allclose(drawn, [4.0, 2.5])
+    assert np.isnan(drawn_errors(np.array([np.nan]), error)).all()
+    keys = [plot.key for plot in live_plots(load_cell("pick"), 4, arm)]
+    assert keys == ["error_px", "pose_mm", "pose_deg", "target_mm", "joints", "manipulability"]
+    one = live_plots(load_cell("puma560"), 1, arm)[0]
+    assert one.series == ("point 0",)
+    np.testing.assert_allclose(drawn_errors(np.array([3.0]), one), [3.0])

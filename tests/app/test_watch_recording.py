@@ -9,11 +9,11 @@ import pytest
 from browser import Browser
 from watched import Watched
 
+from vergence.app.recorded_world import RecordedWorld
 from vergence.app.watch.playback import Playback
-from vergence.app.watch.recorded_world import RecordedWorld
 from vergence.assembly import run_cell
 from vergence.cell import load_cell
-from vergence.runtime import Recorder
+from vergence.runtime import Recorder, RunInfo
 from vergence.runtime.recording import Recording
 
 SMALL = {
@@ -99,6 +99,11 @@ class TestRecordedWorld:
     ) -> None:
         changed = replace(puma_run.info, text=puma_run.info.text + "\nseed = 9")
         assert "not what it was" in str(RecordedWorld.of(changed))
+
+    def test_a_run_of_a_cell_as_it_is_in_its_file_is_shown(self) -> None:
+        cell = load_cell("ur5")
+        info = RunInfo(cell.name, cell.text, cell.seed, path=str(cell.path))
+        assert isinstance(RecordedWorld.of(info), RecordedWorld)
 
     def test_a_cell_that_is_not_here_is_said_to_be_missing(self, recording: Recording) -> None:
         assert "not on this machine" in str(RecordedWorld.of(recording.info))

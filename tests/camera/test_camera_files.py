@@ -76,7 +76,7 @@ def test_opencv_and_we_project_a_written_camera_alike(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "key", "words"),
     [
-        ("width = 640\n", "", "width", "given nothing"),
+        ("width = 640\n", "", "width", "missing"),
         ("width = 640", "width = 640.5", "width", "a whole number"),
         ("fx = 611.25", "fxx = 611.25", "fxx", "did you mean fx"),
         ("fx = 611.25", "fx = 6.1", "fx", "a focal length in pixels"),

@@ -191,7 +191,7 @@ def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:
         ("target.position_m", "[nan, 0, 0]", "target.position_m.0", "a finite number"),
         ("task", "[]", "task", "a table"),
         ("law", "3", "law", "a table"),
-        ("laws.other", "{}", "laws.other.kind", "this key is required"),
+        ("laws.other", "{}", "laws.other.kind", "a value"),
         ("name", '"../elsewhere"', "name", "letters, digits"),
         ("law.axes", "[]", "law.axes", "at least 1 value"),
         ("law.R", "[1, -1]", "law.R.1", "greater than 0"),
@@ -237,6 +237,7 @@ def test_a_file_that_is_no_toml(folder: Path) -> None:
     (folder / "cell.toml").write_text("name = \n")
     error = complaint(folder)
     assert error.allowed == "a TOML file"
+    assert "cell.toml: not TOML: Invalid value" in str(error)
 
 
 def test_a_table_that_is_missing(folder: Path) -> None:
@@ -244,7 +245,7 @@ def test_a_table_that_is_missing(folder: Path) -> None:
     (folder / "cell.toml").write_text(text[: text.index("[task]")])
     error = complaint(folder)
     assert error.key == "task"
-    assert "required" in error.allowed
+    assert "task: missing; needed: a value" in str(error)
 
 
 def test_a_cell_that_does_not_exist_is_answered_with_those_that_do() -> None:

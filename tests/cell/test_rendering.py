@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from vergence.cell import Cell, load_cell
 from vergence.errors import InputError
+from vergence.geometry import transform_points
 from vergence.simulation import SimulatedDriver
 from vergence.simulation.build import intrinsics
 
@@ -107,16 +109,33 @@ def centroid(image: np.ndarray) -> np.ndarray:
     return np.array([(weight * u).sum(), (weight * v).sum()]) / weight.sum()
 
 
+def disc_centroid(cell: Cell, radius: float) -> np.ndarray:
+    """Where the middle of a disc's image is: not quite where the disc's middle projects."""
+    driver = SimulatedDriver(cell, images=False)
+    try:
+        truth, camera = driver.first_frame("eye").truth, driver.cameras["eye"]
+    finally:
+        driver.close()
+    assert truth is not None
+    angles = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+    rim = radius * np.column_stack((np.cos(angles), np.sin(angles), np.zeros(720)))
+    T_camera_target = np.linalg.inv(truth.T_world_camera) @ truth.T_world_target
+    m = cv2.moments(camera.project(transform_points(T_camera_target, rim)).astype(np.float32))
+    return np.array([m["m10"], m["m01"]]) / m["m00"]
+
+
 @pytest.mark.parametrize("lens", LENSES)
 def test_a_disc_is_drawn_around_the_place_it_projects_to(tmp_path: Path, lens: str) -> None:
     rng = np.random.default_rng(36)
     disc = {"kind": "cylinder", "size": "0.02 0.0001"}
     gaps = []
-    for x, y in rng.uniform(-0.1, 0.1, (5, 2)):
+    for x, y in rng.uniform(-0.1, 0.1, (8, 2)):
         cell = spot_cell(tmp_path, disc, turn=0.0, x=x, y=y, **LENSES[lens])
-        image, true_px = first_image(cell)
-        gaps.append(centroid(image) - true_px)
-    assert np.abs(gaps).max() < 0.1
+        image, _ = first_image(cell)
+        gaps.append(centroid(image) - disc_centroid(cell, 0.02))
+    # Whole pixels are in the disc or not, which shifts a disc so small by 0.06 px rms.
+    assert np.abs(np.mean(gaps, axis=0)).max() < 0.06
+    assert np.std(gaps) < 0.08
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, -135.0])

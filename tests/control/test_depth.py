@@ -98,7 +98,7 @@ def test_flow_is_fed_forward_by_default_only_where_the_depth_follows_a_moving_ta
     feeding = {
         kind for kind in kinds("depth") if MotionSettings(depth=find("depth", kind)()).feeds_forward
     }
-    assert feeding == {"from_features", "from_pose"}
+    assert feeding == {"from_camera", "from_features", "from_pose"}
 
 
 def test_a_wrong_held_depth_feigns_no_motion_of_a_stationary_target() -> None:

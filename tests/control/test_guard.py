@@ -1,4 +1,4 @@
-"""The guard: whatever is wanted, no set-point passes a position, rate or acceleration limit."""
+"""The guard: whatever is asked, no set-point passes a position, rate or acceleration limit."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def drawn_start(arm: Arm, rng: np.random.Generator) -> np.ndarray:
     return np.clip(low + share * (high - low), arm.q_min, arm.q_max)
 
 
-def wanted_rates(rng: np.random.Generator, n: int) -> np.ndarray:
+def any_rates(rng: np.random.Generator, n: int) -> np.ndarray:
     wild = rng.normal(size=n) * 10 ** rng.uniform(-3, 6, n)
     strange = rng.choice([np.nan, np.inf, -np.inf, 0.0], n)
     return np.where(rng.random(n) < 0.1, strange, wild)
@@ -47,11 +47,11 @@ def test_no_set_point_ever_passes_a_limit(seed: int, dt: float) -> None:
     rng = np.random.default_rng(seed)
     arm = drawn_arm(rng)
     guard = Guard(arm, drawn_start(arm, rng), dt)
-    velocity, wanted = np.zeros(6), wanted_rates(rng, 6)
+    velocity, asked = np.zeros(6), any_rates(rng, 6)
     for _ in range(150):
         if rng.random() < 0.05:
-            wanted = wanted_rates(rng, 6)
-        setpoint = guard.step(wanted)
+            asked = any_rates(rng, 6)
+        setpoint = guard.step(asked)
         assert (setpoint.position >= arm.q_min).all()
         assert (setpoint.position <= arm.q_max).all()
         assert (abs(setpoint.velocity) <= arm.rate_max).all()
@@ -66,9 +66,9 @@ def test_from_any_state_it_can_stop_within_the_limits(seed: int) -> None:
     rng, dt = np.random.default_rng(seed), 2e-3
     arm = drawn_arm(rng)
     guard = Guard(arm, drawn_start(arm, rng), dt)
-    wanted = wanted_rates(rng, 6)
+    asked = any_rates(rng, 6)
     for _ in range(int(rng.integers(1, 300))):
-        velocity = guard.step(wanted).velocity
+        velocity = guard.step(asked).velocity
     steps = int(np.ceil(np.max(abs(velocity) / (arm.acceleration_max * dt)))) + 1
     for _ in range(steps):
         before, velocity = velocity, guard.step(np.zeros(6)).velocity
@@ -102,17 +102,17 @@ def test_starting_at_a_limit_it_can_leave_but_not_pass() -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-@pytest.mark.parametrize("wanted", [-2.0, 0.0, 2.0, np.nan])
+@pytest.mark.parametrize("asked", [-2.0, 0.0, 2.0, np.nan])
 @pytest.mark.parametrize("outside", [1e-7, 1e-3, 0.5])
 def test_a_start_beyond_a_limit_is_brought_back_within_rate_and_acceleration(
-    side: float, wanted: float, outside: float
+    side: float, asked: float, outside: float
 ) -> None:
     arm, dt = arm_with([-1.0], [1.0], [2.0], [8.0]), 2e-3
     start = np.array([side * (1.0 + outside)])
     guard = Guard(arm, start, dt)
     before, velocity = start, np.zeros(1)
     for _ in range(1000):
-        setpoint = guard.step(np.array([wanted]))
+        setpoint = guard.step(np.array([asked]))
         assert (side * setpoint.position <= np.maximum(side * before, 1.0)).all()
         assert abs(setpoint.velocity) <= 2.0
         assert abs(setpoint.velocity - velocity) <= 8.0 * dt * (1 + ROUNDING)
@@ -129,12 +129,12 @@ def test_a_start_that_is_no_position_is_refused() -> None:
         Guard(arm, np.zeros(2), 2e-3)
 
 
-@pytest.mark.parametrize("wanted", [np.zeros(0), np.zeros(5), np.zeros(7), np.zeros((6, 1)), 0.0])
-def test_rates_of_another_length_make_no_set_point(wanted) -> None:
+@pytest.mark.parametrize("asked", [np.zeros(0), np.zeros(5), np.zeros(7), np.zeros((6, 1)), 0.0])
+def test_rates_of_another_length_make_no_set_point(asked) -> None:
     n = 6
     guard = Guard(arm_with([-1.0] * n, [1.0] * n, [2.0] * n, [8.0] * n), np.zeros(n), 2e-3)
     with pytest.raises(ShapeError, match="rates"):
-        guard.step(wanted)
+        guard.step(asked)
     np.testing.assert_array_equal(guard.position, 0.0)
 
 
@@ -183,9 +183,9 @@ def test_the_stoppable_speed_stops_within_its_room_and_no_slower_than_needed(a: 
 
 
 def test_the_kernel_leaves_what_it_is_given_alone() -> None:
-    position, velocity, wanted = np.zeros(1), np.zeros(1), np.ones(1)
+    position, velocity, asked = np.zeros(1), np.zeros(1), np.ones(1)
     limits = np.array([[-1.0], [1.0], [2.0], [8.0]])
-    step = guarded_step(position, velocity, wanted, limits, 2e-3)
+    step = guarded_step(position, velocity, asked, limits, 2e-3)
     assert position[0] == velocity[0] == 0.0
     assert step.position[0] > 0.0
 
@@ -199,13 +199,13 @@ def test_many_steps_at_once_are_those_steps_one_by_one(seed: int, dt: float) -> 
     guard = Guard(arm, drawn_start(arm, rng), dt)
     setpoint, stuck = guard.step(np.zeros(6)), np.empty(6, dtype=np.bool_)
     for _ in range(30):
-        wanted, count = wanted_rates(rng, 6), int(rng.integers(1, 40))
+        asked, count = any_rates(rng, 6), int(rng.integers(1, 40))
         position, velocity = setpoint.position.copy(), setpoint.velocity.copy()
         held_back = np.ones(6, dtype=np.bool_)
         for _ in range(count):
-            setpoint = guard.step(wanted)
+            setpoint = guard.step(asked)
             held_back &= guard.at_limit
-        guarded_steps(position, velocity, wanted, limits, dt, count, stuck)
+        guarded_steps(position, velocity, asked, limits, dt, count, stuck)
         np.testing.assert_allclose(position, setpoint.position, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(velocity, setpoint.velocity, rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(stuck, held_back)

@@ -98,7 +98,7 @@ def before_a_stand():
 def lag_px(
     scene, law: Callable[[Arm, CameraMounting, FloatArray], Law], seconds: float = 4.0
 ) -> float:
-    """Return how far the features are from where they are wanted when all has settled.
+    """Return how far the features are from where they should be when all has settled.
 
     The arm obeys at once, images come late, the target moves uniformly in its own frame.
     """

@@ -8,6 +8,7 @@ from servo_scene import CAMERA, SQUARE, START, in_view, observed, puma, seen
 
 from vergence.control import (
     CameraMounting,
+    CameraVelocity,
     DampedPseudoInverse,
     ImageBased,
     Limits,
@@ -23,7 +24,7 @@ from vergence.control import (
     Term,
 )
 from vergence.errors import InputError
-from vergence.features import Feature, Points
+from vergence.features import Centre, Feature, Lines, Points
 from vergence.geometry import se3_exp
 from vergence.parts import as_part, knob, part
 from vergence.signals import JointState, Observation, OutcomeKind, Reference
@@ -227,6 +228,34 @@ def test_an_objective_that_returns_nonsense_ends_the_task():
     assert command.fault is not None
     assert command.fault[0] is OutcomeKind.INFEASIBLE
     assert not command.velocity.any()
+
+
+def test_points_that_make_no_feature_lose_the_target_with_a_reason():
+    """A line that passes through the optical centre is a point in the image."""
+    points, depth = seen(ARM, START, WORLD)
+    servo = Servo(ARM, CAMERA, ImageBased(feature=Lines), depth_m=depth)
+    end_on = points.copy()
+    end_on[1] = end_on[0]
+    command = commanded(servo, end_on, points)
+    assert command.fault is not None
+    assert command.fault[0] is OutcomeKind.TARGET_LOST
+    assert command.fault[1] == "lines: two ends at one place; needs ends that differ"
+    assert not command.velocity.any()
+
+
+def test_a_camera_velocity_is_kept_along_its_axes_and_leaves_the_others():
+    points, depth = seen(ARM, START, WORLD)
+    moved = points + [4.0, 0.0]
+    alone = ImageBased(feature=Centre)
+    both = [alone, CameraVelocity((0.0, 0.0, 0.03))]
+    servos = [Servo(ARM, CAMERA, what, depth_m=depth) for what in (alone, both)]
+    before, after = (commanded(servo, moved, points).v_camera for servo in servos)
+    assert abs(before[2]) < 0.01
+    assert after[2] == pytest.approx(0.03, abs=1e-3)
+    L = Centre(CAMERA.normalize(moved), depth).interaction()
+    np.testing.assert_allclose(L @ after, L @ before, atol=1e-3)
+    with pytest.raises(InputError, match="linear_m_s"):
+        CameraVelocity((1.0, 2.0))
 
 
 def test_without_any_features_the_arm_is_asked_to_stand():

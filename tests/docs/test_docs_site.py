@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 from cell_file import reference
+from gallery import gallery
 
 import vergence
+from vergence.places import built_in_cells
 
 SOURCE = Path(vergence.__file__).parent
 DOCS = Path(__file__).parents[2] / "docs"
@@ -44,3 +46,23 @@ def test_every_room_is_in_the_api(room):
 
 def test_every_key_of_a_cell_file_says_what_it_means():
     assert "`view_margin_px`" in "".join(reference())  # it raises where a comment is missing
+
+
+def test_the_gallery_has_every_cell_with_its_image():
+    shown = "\n".join(gallery())
+    for name in built_in_cells():
+        assert f"## {name}\n" in shown
+        assert (DOCS / "images" / "cells" / f"{name}.jpg").is_file()
+
+
+def pages() -> list[str]:
+    """Return the pages that a reader may open first, as seen from the documentation's folder."""
+    files = (path.relative_to(DOCS) for path in DOCS.rglob("*.md") if path.parent != API)
+    return sorted(str(path) for path in files if not path.name.startswith("_"))
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if not page.startswith("_build")])
+def test_the_first_screen_of_a_page_says_who_it_is_for_and_shows_an_image(page):
+    first = (DOCS / page).read_text().splitlines()[:16]
+    assert any(re.match(r"For [a-z]", line) for line in first), "who it is for"
+    assert any(re.match(r"!\[.+\]\(.+\)|```\{gallery\}", line) for line in first), "an image"

@@ -25,8 +25,15 @@ from vergence.app.main import main
 DOCS = Path(__file__).parents[2] / "docs"
 README = DOCS.parent / "README.md"
 PAGES = [README, *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
-SHOWN_ONLY = {"{literalinclude}", "{toctree}", "{eval-rst}", "{cell-file}", "{command-line}"}
-SHOWN_ONLY |= {"{figure}", "{image}", "{note}", "{checks}", "{include}"}
+SHOWN_ONLY = {
+    "{literalinclude}",
+    "{toctree}",
+    "{eval-rst}",
+    "{cell-file}",
+    "{command-line}",
+    "{gallery}",
+}
+SHOWN_ONLY |= {"{figure}", "{image}", "{note}", "{checks}", "{include}", "{gallery}"}
 SHOWN_ONLY |= {"console"}  # commands that need a robot
 
 

@@ -4,13 +4,11 @@
 """
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from other_side import OtherSide
 from rendered import Rendered
 
 from vergence.assembly import open_driver, run_cell, run_driver
@@ -21,6 +19,7 @@ from vergence.drivers import Equipment
 from vergence.drivers.so101 import So101
 from vergence.errors import DriverSilent, InputError
 from vergence.runtime import Driver
+from vergence.runtime.driver import outputs_of
 from vergence.signals import OutcomeKind, RobotMode, Sample
 
 # As a first servoing: slowly. So a computer with other things to do keeps up, too.
@@ -42,33 +41,19 @@ TICK = 2 * np.pi / 4096
 BUSY_S = 2.0  # by which a busy computer may be late
 
 
-class Servos:
+class Servos(OtherSide):
     """The servos in their process."""
 
     def __init__(self) -> None:
+        gripper = 1000
         ticks = np.rint(np.array(ZEROS) + np.array(SIGNS) * START / TICK).astype(int)
-        program = str(Path(__file__).with_name("servo_chain.py"))
-        self.process = subprocess.Popen(
-            [sys.executable, "-S", program, ",".join(map(str, ticks))],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self.port = self._line()
+        words = ",".join(map(str, (*ticks, gripper)))
+        super().__init__("servo_chain.py", words, python=("-S",))
+        self.port = self.line()
 
     def open(self, at: Equipment = BLIND, **settings: object) -> Driver:
         settings = {"timeout_s": BUSY_S, **settings}
         return So101(self.port, zero_ticks=ZEROS, signs=SIGNS, **settings).open(at)
-
-    def ask(self, words: str) -> str:
-        assert self.process.stdin is not None
-        self.process.stdin.write(f"{words}\n")
-        self.process.stdin.flush()
-        return self._line()
-
-    def _line(self) -> str:
-        assert self.process.stdout is not None
-        return self.process.stdout.readline().strip()
 
 
 @pytest.fixture
@@ -77,8 +62,7 @@ def servos() -> Iterator[Servos]:
     try:
         yield made
     finally:
-        made.process.kill()
-        made.process.communicate()
+        made.end()
 
 
 def turn(driver: Driver, rate: float, seconds: float) -> Sample:
@@ -116,8 +100,24 @@ def test_joints_are_read_and_turned_as_in_the_model(servos: Servos) -> None:
     assert moved[4] > 0.05
     assert np.abs(moved[:4]).max() <= 2 * TICK
     told = json.loads(servos.ask("tell"))
-    assert told["torque"] == [1] * 5  # it holds its place: without torque the arm would fall
+    assert told["torque"][:5] == [1] * 5  # it holds its place: without torque the arm would fall
     assert told["ticks"][4] < ZEROS[4] - 30  # that servo turns against the model
+
+
+def test_the_gripper_is_a_servo_beside_the_arms_joints(servos: Servos) -> None:
+    driver = servos.open(outputs={"gripper": (6, 1000, 2000)})
+    assert outputs_of(driver) == ("gripper",)
+    assert servos.tell()["torque"][5] == 0  # nothing moves before it is told to
+    driver.set_output("gripper", 0.5)
+    before = driver.read().joints["so100"].position
+    after = turn(driver, 0.1, 1.0).joints["so100"].position
+    driver.close()
+    told = servos.tell()
+    assert told["ticks"][5] == pytest.approx(1500, abs=2)
+    assert told["torque"][5] == 1
+    assert after[4] > before[4]  # the arm goes on meanwhile
+    with pytest.raises(InputError, match=r"outputs.gripper: given 5; allowed: a servo that is no"):
+        servos.open(outputs={"gripper": (5, 1000, 2000)})
 
 
 @pytest.mark.parametrize("words", ["fault 3", "hot 2"])
@@ -158,5 +158,5 @@ def test_wrong_settings_and_ports_are_refused() -> None:
         So101("/dev/nowhere").open(BLIND)
     with pytest.raises(InputError, match=r"driver.signs: given 2 values; allowed: 5, one a joint"):
         So101(signs=(1, 1)).open(BLIND)
-    with pytest.raises(InputError, match=r"driver.cameras.side: given nothing"):
+    with pytest.raises(InputError, match=r"driver.cameras.side: missing"):
         open_driver(CELL, "so101")

@@ -25,6 +25,10 @@ class Rendered:
         self._waiting: deque[Frame] = deque()
         return self
 
+    def clocked_by(self, clock: Callable[[], float]) -> None:
+        """Expose by another clock than that of this computer."""
+        self._clock = clock
+
     def frames(self, joints_at: Callable[[float], Mapping[str, FloatArray]]) -> tuple[Frame, ...]:
         now = self._clock()
         if now >= self._due:  # an image that a busy computer missed is dropped, as by a camera

@@ -133,10 +133,18 @@ def test_the_command_prints_and_writes_what_it_found(
 ) -> None:
     from vergence import assembly
     from vergence.app.bring_up import check
+    from vergence.app.options import CheckOptions
 
     monkeypatch.setattr(assembly, "open_driver", lambda cell, named: Robot(monkeypatch, pace=1.2))
     settings = [f"{key}={value}" for key, value in SETTINGS.items()]
-    assert check("ur5", "mine", 2.0, 5.0, tmp_path / "out", settings, True) == 1
+    options = CheckOptions(
+        cell="ur5",
+        driver="socket:localhost:9",
+        out=tmp_path / "out",
+        settings=settings,
+        as_json=True,
+    )
+    assert check(options) == 1
     answer = json.loads(capsys.readouterr().out)
     assert answer["command"] == "check"
     assert any(not each["holds"] for each in answer["checks"])

@@ -11,12 +11,13 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence.assembly import open_driver
+from vergence.assembly import check_driver, open_driver
 from vergence.cell import Cell, load_cell
 from vergence.drivers import Equipment, LocalCameras, optional_package
 from vergence.drivers.cameras import Video
 from vergence.errors import DriverSilent, InputError
 from vergence.runtime import Recording
+from vergence.signals import Frame
 
 # The robot of the example, with a watchdog that a busy computer does not trip.
 ROBOT = """
@@ -59,12 +60,14 @@ def robot(*settings: str) -> Iterator[int]:
 def test_the_cell_that_was_simulated_runs_on_the_robot_with_one_word_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    from vergence.app.options import RunOptions
     from vergence.app.run import run
 
     with robot("target.motion={ kind = 'stationary' }") as port:
         named = f"socket:localhost:{port}"
-        ended = run("puma560", tmp_path / "out", None, True, 2, ["duration_s=1.5"], False, named)
-    assert ended == 0
+        settings = ["duration_s=1.5"]
+        options = RunOptions(cell="puma560", out=tmp_path / "out", settings=settings, driver=named)
+        assert run(options) == 0
     assert "completed at" in capsys.readouterr().out
     kept = Recording.open(tmp_path / "out")
     assert kept.complete
@@ -77,6 +80,21 @@ def test_a_robot_at_another_rate_is_refused_before_it_moves() -> None:
         with pytest.raises(DriverSilent, match=r"runs at 12\d.* set the cell's inner_rate_hz to"):
             driver.step({})
         driver.close()
+
+
+def test_a_driver_without_its_address_is_told_where_it_is_given() -> None:
+    with pytest.raises(InputError, match="--driver: given ur; allowed: ur:ADDRESS, or address in"):
+        open_driver(load_cell("ur5"), "ur")
+
+
+@pytest.mark.parametrize("named", ["ur", "urs:192.0.2.1", "my_robot:Robot"])
+def test_what_is_no_driver_is_refused_without_opening_anything(named: str) -> None:
+    with pytest.raises(InputError, match="--driver"):
+        check_driver(load_cell("ur5"), named)
+
+
+def test_a_driver_that_does_not_answer_yet_passes_the_check() -> None:
+    check_driver(cell(address="localhost:2"), "socket:localhost:1")
 
 
 def test_the_address_on_the_command_line_replaces_that_of_the_table() -> None:
@@ -112,9 +130,9 @@ def test_a_table_of_another_kind_leaves_a_driver_its_defaults() -> None:
 
 
 def test_a_missing_package_is_a_sentence_that_installs_it() -> None:
-    with pytest.raises(InputError, match=r"given ur, which needs a package that is not installed"):
+    with pytest.raises(InputError, match="ur needs a package that is not installed"):
         optional_package("ur", "no_such_module", "ur")
-    with pytest.raises(InputError, match=r"pip install 'vergence\[ur\]' first"):
+    with pytest.raises(InputError, match=r"run: pip install 'vergence\[ur\]'$"):
         optional_package("ur", "no_such_module.inner", "ur")
 
 
@@ -128,7 +146,7 @@ def test_a_robot_of_one_arm_refuses_a_cell_that_it_does_not_fit() -> None:
     two = Equipment("two.toml", {"a": puma.arms["puma"], "b": puma.arms["puma"]}, {}, 500.0)
     with pytest.raises(InputError, match=r"two.toml: arms: given a, b; allowed: one arm"):
         two.only_arm("ur")
-    with pytest.raises(InputError, match=r"driver.cameras.wrist: given nothing"):
+    with pytest.raises(InputError, match=r"driver.cameras.wrist: missing"):
         puma.check_sources("ur")
 
 
@@ -145,11 +163,37 @@ def test_images_of_all_cameras_of_this_computer_come_in_the_order_of_exposure(
     cameras = LocalCameras(sources, lambda: float(next(ticks)))
     frames = []
     while len(frames) < 12:
-        arrived = cameras.frames(lambda exposed: {})
+        arrived = cameras.frames(lambda exposed: {}, np.inf)
         assert [frame.time for frame in arrived] == sorted(frame.time for frame in arrived)
         frames += arrived
     cameras.close()
     assert {frame.camera for frame in frames} == {"late", "early"}
+
+
+def test_an_image_waits_for_the_joints_of_its_exposure() -> None:
+    class Ahead:
+        """Delivers one image at once, exposed 20 ms after the joints that are known."""
+
+        waiting = (Frame("a", 1.02, np.zeros((4, 4), np.uint8), {"arm": np.zeros(1)}),)
+
+        def open(self, name: str, clock: object) -> "Ahead":
+            return self
+
+        def frames(self, joints_at: object) -> tuple[Frame, ...]:
+            arrived, self.waiting = self.waiting, ()
+            return arrived
+
+        def close(self) -> None:
+            pass
+
+    cameras = LocalCameras({"a": Ahead()}, float)
+    assert cameras.frames(lambda exposed: {"arm": np.zeros(1)}, 1.0) == ()
+    assert cameras.frames(lambda exposed: {"arm": np.zeros(1)}, 1.01) == ()
+    (frame,) = cameras.frames(lambda exposed: {"arm": np.full(1, exposed)}, 1.03)
+    assert frame.joints["arm"] == 1.02
+    far = Ahead()
+    far.waiting = (Frame("a", 9.0, None, {}),)  # of a camera whose clock is wrong
+    assert len(LocalCameras({"a": far}, float).frames(lambda exposed: {}, 1.0)) == 1
 
 
 def test_a_camera_that_does_not_open_lets_go_of_those_that_did() -> None:

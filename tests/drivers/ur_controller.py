@@ -72,13 +72,14 @@ class Controller:
         self.acceleration, self.watchdog_s, self.heard = 1.4, 0.0, 0.0
         self.integers, self.doubles, self.state = [0] * 48, [0.0] * 48, 0
         self.fastest = self.hardest = 0.0  # rad/s, rad/s² that the joints were seen to move with
-        self.owner: Any = None  # the client that writes the registers
+        self.owners: dict[str, Any] = {}  # the client that writes each input
+        self.outputs = {"standard": 0, "configurable": 0, "tool": 0}  # bits
         self.lock, self.clients = threading.Lock(), []
 
     def tell(self) -> dict[str, object]:
         return {
             "q": self.q, "qd": self.qd, "fastest": self.fastest, "hardest": self.hardest,
-            "running": self.running, "watchdog_s": self.watchdog_s,
+            "running": self.running, "watchdog_s": self.watchdog_s, "outputs": self.outputs,
         }  # fmt: skip
 
     def value(self, name: str) -> Any:
@@ -240,8 +241,10 @@ class Rtde:
                 length, kind = struct.unpack(">HB", head)
                 self.answer(chr(kind), stream.read(length - 3))
         finally:
-            if self.robot.owner is self:
-                self.robot.owner = None
+            with self.robot.lock:
+                mine = {name for name, owner in self.robot.owners.items() if owner is self}
+                for name in mine:
+                    del self.robot.owners[name]
 
     def answer(self, kind: str, payload: bytes) -> None:
         if kind == "V":
@@ -253,10 +256,11 @@ class Rtde:
             self.outputs = payload[8:].decode().split(",")
             self.send("O", b"\1" + ",".join(map(kind_of, self.outputs)).encode())
         elif kind == "I":
-            names = payload.decode().split(",")
-            taken = self.robot.owner not in (None, self)
-            self.robot.owner = self.robot.owner or self
-            self.inputs.append([name for name in names if name])
+            names = [name for name in payload.decode().split(",") if name]
+            with self.robot.lock:
+                owners = [self.robot.owners.setdefault(name, self) for name in names]
+            taken = any(owner is not self for owner in owners)
+            self.inputs.append(names)
             kinds = ["IN_USE" if taken else kind_of(name) for name in names]
             number = 0 if taken else len(self.inputs)
             self.send("I", bytes([number]) + ",".join(kinds).encode())
@@ -270,7 +274,7 @@ class Rtde:
             self.take(self.inputs[payload[0] - 1], payload[1:])
 
     def take(self, names: list[str], payload: bytes) -> None:
-        offset = 0
+        offset, written = 0, dict[str, int]()
         with self.robot.lock:
             for name in names:
                 form = FORMATS[kind_of(name)]
@@ -280,7 +284,14 @@ class Rtde:
                     self.robot.integers[int(name.rpartition("_")[2])] = value
                 elif name.startswith("input_double"):
                     self.robot.doubles[int(name.rpartition("_")[2])] = value
-            self.robot.obey()
+                else:
+                    written[name] = value
+            for kind, bits in self.robot.outputs.items():
+                mask = written.get(f"{kind}_digital_output_mask", 0)
+                fresh = written.get(f"{kind}_digital_output", 0)
+                self.robot.outputs[kind] = bits & ~mask | fresh & mask
+            if "input_int_register_0" in names:  # of the control program, which hears nothing else
+                self.robot.obey()
 
 
 def packed(kind: str, value: Any) -> bytes:

@@ -68,6 +68,14 @@ def test_the_arms_own_motion_tells_the_scale(flat, factor):
     assert deviations[1] < 0.2 * deviations[0]
 
 
+def test_a_guess_with_points_behind_a_camera_is_no_pose():
+    rng = np.random.default_rng(6)
+    points, T_goal, T_start = scene(rng, flat=False)
+    image, goal = seen(rng, T_start, points), seen(rng, T_goal, points)
+    behind = GoalGuess(T_goal, points - [0.0, 0.0, 2.0])
+    assert fit_goal(behind, goal, [image], Prior(np.full(COUNT, 0.5), 0.7)) is None
+
+
 def test_the_stated_covariance_covers_the_errors():
     rng = np.random.default_rng(2)
     squares = []

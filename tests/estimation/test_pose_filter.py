@@ -7,6 +7,7 @@ from estimation_scene import BOX, HAND, WALL, moving, pose_error, view
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, Verdict
 from vergence.estimation.motion import correct_pose, predict_pose
+from vergence.estimation.target_filter import state_of
 from vergence.estimation.view import together
 
 SMALL_START = np.diag(np.repeat([0.01, 0.03, 0.05, 0.1], 3) ** 2)
@@ -124,7 +125,7 @@ def test_sudden_motion_is_noticed_and_caught_up_with():
         T = np.eye(4)
         T[0, 3] = 0.0 if time < 0.7 else 0.5 * (time - 0.7)
         belief = filter_.update(belief, view(rng, time, T)).belief
-        noticed = noticed or not belief.state().consistent
+        noticed = noticed or not state_of(belief).consistent
     assert noticed
     assert np.linalg.norm(belief.T_world_target[:3, 3] - T[:3, 3]) < 0.003
     assert belief.velocity[0] == pytest.approx(0.5, abs=0.05)
@@ -141,7 +142,7 @@ def test_image_of_another_thing_is_refused_and_doubted():
     assert not update.kept.any()
     assert update.belief.doubts == 1
     again = filter_.update(update.belief, scrambled._replace(time=time + 0.08))
-    assert not again.belief.state().consistent
+    assert not state_of(again.belief).consistent
     np.testing.assert_array_equal(
         update.belief.T_world_target, filter_.predict(belief, time + 0.04).T_world_target
     )

@@ -6,6 +6,7 @@ from vergence.errors import InputError
 from vergence.estimation import PoseFilter, RpyPoseFilter
 from vergence.estimation.rpy_belief import twist_jacobian
 from vergence.estimation.rpy_filter import predict_rpy, rpy_rows
+from vergence.estimation.target_filter import state_of
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3, se3_inverse
 
 STEP = 1e-6
@@ -84,7 +85,7 @@ def test_follows_the_target_with_two_cameras_within_the_papers_centimetre():
         if time > 1.0:
             assert np.linalg.norm(error[:3]) < 0.01
             assert np.degrees(np.linalg.norm(error[3:])) < 3.0
-    expected = belief.state()
+    expected = state_of(belief)
     assert expected.covariance.shape == (12, 12)
     assert np.linalg.norm(expected.velocity) < 0.2
 

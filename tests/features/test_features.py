@@ -18,16 +18,43 @@ POLYGON = np.array(
 )
 FLAT = np.column_stack((POLYGON, np.zeros(6)))
 PARALLEL = np.array([[-0.1, -0.1, 0.0], [0.1, -0.08, 0.05], [-0.1, 0.1, 0.0], [0.2, 0.13, 0.075]])
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+UNIT = np.column_stack((np.cos(ANGLES), np.sin(ANGLES), np.zeros(12)))
+CENTRE = np.array([0.02, -0.03, 0.01])
 SHIPPED = {kind: find("feature", kind) for kind in kinds("feature")}
 
 
 def body(kind: str) -> np.ndarray:
-    return PARALLEL if kind == "vanishing_point" else FLAT
+    return {"vanishing_point": PARALLEL, "ellipse": 0.1 * UNIT}.get(kind, FLAT)
+
+
+def outline_of_sphere(T: np.ndarray, radius: float) -> np.ndarray:
+    """Where lines of sight touch a sphere around CENTRE, in the camera's frame, (12, 3)."""
+    middle = transform_points(T, CENTRE[None])[0]
+    square = middle @ middle
+    across = np.linalg.svd(middle[None])[2][1:]
+    share = 1.0 - radius**2 / square
+    return share * middle + radius * np.sqrt(share) * UNIT[:, :2] @ across
+
+
+def outlines_of_cylinder(T: np.ndarray, radius: float) -> list[np.ndarray]:
+    """Where lines of sight touch a cylinder along y through CENTRE, two points a line."""
+    eye = se3_inverse(T)[:3, 3] - CENTRE
+    away = np.arctan2(eye[2], eye[0])
+    lines = []
+    for side in (-1.0, 1.0):
+        angle = away + side * np.arccos(radius / np.hypot(eye[0], eye[2]))
+        touch = CENTRE + radius * np.array([np.cos(angle), 0.0, np.sin(angle)])
+        lines.append(transform_points(T, touch + np.outer([-0.1, 0.1], [0.0, 1.0, 0.0])))
+    return lines
+
+
+def feature_of(kind: str, points: np.ndarray) -> Feature:
+    return SHIPPED[kind](points[:, :2] / points[:, 2:], points[:, 2])
 
 
 def seen(kind: str, T_camera_body: np.ndarray) -> Feature:
-    points = transform_points(T_camera_body, body(kind))
-    return SHIPPED[kind](points[:, :2] / points[:, 2:], points[:, 2])
+    return feature_of(kind, transform_points(T_camera_body, body(kind)))
 
 
 def random_pose(rng: np.random.Generator) -> np.ndarray:
@@ -123,6 +150,10 @@ def test_only_turns_move_a_vanishing_point() -> None:
         ("vanishing_point", [[0.0, 0.0], [0.1, 0.0]]),
         ("vanishing_point", [[0.0, 0.0], [0.1, 0.0], [0.2, 0.0], [0.3, 0.0]]),
         ("size", [[0.1, 0.2], [0.1, 0.2]]),
+        ("ellipse", [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]]),
+        ("ellipse", [[0.1 * k, 0.05 * k] for k in range(6)]),
+        ("ellipse", [[0.1 * k, (0.1 * k) ** 2] for k in range(-3, 4)]),
+        ("ellipse", [[0.1, 0.1]] * 6),
         ("orientation", [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]]),
         ("region_moments", [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2]]),
     ],
@@ -134,21 +165,67 @@ def test_points_that_do_not_make_the_feature_are_refused(
         SHIPPED[kind](points).value()
 
 
+def test_the_outline_of_a_sphere_moves_as_its_interaction_matrix_says() -> None:
+    """The outline is other points of the sphere at each pose."""
+    rng = np.random.default_rng(12)
+    h = 1e-6
+    for _ in range(1000):
+        T, v_camera = random_pose(rng), rng.normal(size=6)
+        before, after = (
+            feature_of("ellipse", outline_of_sphere(se3_inverse(se3_exp(s * v_camera)) @ T, 0.08))
+            for s in (-h, h)
+        )
+        L = feature_of("ellipse", outline_of_sphere(T, 0.08)).interaction()
+        rate = after.error(before) / (2.0 * h)
+        scale = max(np.abs(L).max() * np.abs(v_camera).max(), 1.0)
+        np.testing.assert_allclose(L @ v_camera, rate, atol=1e-6 * scale, rtol=0.0)
+
+
+def test_an_ellipse_is_the_same_from_any_of_its_points() -> None:
+    rng = np.random.default_rng(13)
+    angle = rng.uniform(0.0, 2.0 * np.pi, (2, 9))
+    axes, middle = np.array([[0.2, 0.05], [-0.02, 0.1]]), np.array([0.3, -0.2])
+    first, second = (
+        features.Ellipse(np.column_stack((np.cos(a), np.sin(a))) @ axes + middle) for a in angle
+    )
+    np.testing.assert_allclose(first.value(), second.value(), atol=1e-12)
+    np.testing.assert_allclose(first.value()[:2], middle, atol=1e-12)
+    n = axes.T @ axes / 4.0
+    np.testing.assert_allclose(first.value()[2:], [n[0, 0], n[0, 1], n[1, 1]], atol=1e-12)
+
+
 def test_values_and_matrices_are_those_of_another_implementation() -> None:
-    """ViSP 3.5's; its direction of a segment points the other way."""
+    """ViSP 3.5's; its directions of segments and of some lines point the other way."""
+    planes = np.array([[1.0, 0.2, 0.1, 0.03], [0.1, 1.0, -0.3, 0.02]])
+    along = np.cross(planes[0, :3], planes[1, :3])
+    line = np.linalg.lstsq(planes[:, :3], -planes[:, 3])[0] + np.outer([-0.1, 0.1], along)
     bodies = {
         "polar": ("polar_points", np.array([[0.1, 0.05, 0.02]]), slice(0, 2)),
         "segment": ("segments", np.array([[-0.1, 0.03, 0.0], [0.12, -0.05, 0.04]]), slice(0, 4)),
         "moment_alpha": ("region_moments", FLAT, slice(5, 6)),
+        "circle": ("ellipse", CENTRE + 0.08 * UNIT, slice(0, 5)),
+        "line": ("lines", line, slice(0, 2)),
+    }
+    outlines = {
+        "sphere": ("ellipse", lambda T: outline_of_sphere(T, 0.08)),
+        "cylinder1": ("lines", lambda T: outlines_of_cylinder(T, 0.05)[0]),
+        "cylinder2": ("lines", lambda T: outlines_of_cylinder(T, 0.05)[1]),
     }
     rows = Path(__file__).with_name("reference.jsonl").read_text().splitlines()
-    assert len(rows) == 15
+    assert len(rows) == 40
     for row in map(json.loads, rows):
-        kind, points, which = bodies[row["kind"]]
-        moved = transform_points(np.reshape(row["T_camera_object"], (4, 4)), points)
-        feature = SHIPPED[kind](moved[:, :2] / moved[:, 2:], moved[:, 2])
-        expected = np.array(row["s"])
+        T = np.reshape(row["T_camera_object"], (4, 4))
+        expected, L = np.array(row["s"]), np.array(row["L"])
+        if row["kind"] in outlines:
+            kind, outline = outlines[row["kind"]]
+            feature, which = feature_of(kind, outline(T)), slice(None)
+        else:
+            kind, points, which = bodies[row["kind"]]
+            feature = feature_of(kind, transform_points(T, points))
         if kind == "segments":
             expected[3] -= np.pi * np.sign(expected[3])
+        elif kind == "lines" and np.cos(feature.value()[1] - expected[1]) < 0.0:
+            expected, L = expected * [-1.0, 1.0] + [0.0, np.pi], L * [[-1.0], [1.0]]
+            expected[1] -= 2.0 * np.pi * round((expected[1] - feature.value()[1]) / (2.0 * np.pi))
         np.testing.assert_allclose(feature.value()[which], expected, atol=1e-12)
-        np.testing.assert_allclose(feature.interaction()[which], row["L"], atol=1e-7)
+        np.testing.assert_allclose(feature.interaction()[which], L, atol=1e-7)

@@ -8,5 +8,5 @@ _QUIET = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function
 settings.register_profile(
     "quick", max_examples=60, deadline=None, derandomize=True, suppress_health_check=_QUIET
 )
-settings.register_profile("long", max_examples=5000, deadline=None, suppress_health_check=_QUIET)
+settings.register_profile("long", max_examples=10_000, deadline=None, suppress_health_check=_QUIET)
 settings.load_profile(os.environ.get("VERGENCE_FUZZ", "quick"))

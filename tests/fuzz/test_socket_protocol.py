@@ -1,6 +1,8 @@
 """Both ends of the example's socket, and what may come over it."""
 
+import fcntl
 import json
+import resource
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
@@ -17,7 +19,13 @@ from vergence.drivers import Equipment
 from vergence.drivers.socket_robot import Link, LinkBrokenError, SocketDriver, read_answer
 from vergence.errors import DriverSilent
 
-ANSWER = json.dumps({"period": 3, "setpoints": {"puma": [[0.1, -2.0], [0.0, 1e-3]]}}).encode()
+ANSWER = json.dumps(
+    {
+        "period": 3,
+        "setpoints": {"puma": [[0.1, -2.0], [0.0, 1e-3]]},
+        "outputs": {"grip": 0.5},
+    }
+).encode()
 STATE = json.dumps(
     {
         "period": 4,
@@ -53,10 +61,11 @@ def pair() -> Iterator[Callable[[], tuple[socket.socket, socket.socket]]]:
 @given(mutants(ANSWER))
 def test_a_set_point_is_one_or_breaks_the_link(message: bytes) -> None:
     try:
-        period, setpoints = read_answer(message, 5, {"puma": ARM})
+        period, setpoints, outputs = read_answer(message, 5, {"puma": ARM}, ("grip",))
     except LinkBrokenError:
         return
     assert 0 <= period <= 5
+    assert all(0.0 <= value <= 1.0 for value in outputs.values())
     for setpoint in setpoints.values():
         assert setpoint.position.shape == setpoint.velocity.shape == (2,)
         assert np.isfinite(setpoint.position + setpoint.velocity).all()
@@ -73,6 +82,26 @@ def test_messages_come_as_they_were_sent_in_whatever_pieces(
         far.sendall(data[start : start + size])
     assert [link.receive(5.0) for _ in sent] == list(sent)
     assert link.receive(0.0) is None
+
+
+def test_a_link_works_in_a_process_with_thousands_of_open_files(
+    pair: Callable[[], tuple[socket.socket, socket.socket]],
+) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    near, far = pair()
+    link = Link(socket.socket(fileno=fcntl.fcntl(near, fcntl.F_DUPFD, 2000)), LONGEST)
+    try:
+        assert link.receive(0.01) is None
+        far.sendall(framed(STATE))
+        assert link.receive(5.0) == STATE
+        link.send([STATE], 1.0)
+        assert far.recv(len(STATE) + 4, socket.MSG_WAITALL) == framed(STATE)
+    finally:
+        link.close()
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    with pytest.raises(LinkBrokenError, match="is closed"):
+        link.receive(0.0)
 
 
 @given(mutants(framed(STATE) + framed(bytes(12)) + framed(STATE)))

@@ -11,7 +11,9 @@ TURNED = [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, 0.2], [0, 0, 0, 1]]
 
 
 def test_every_kernel_has_its_function() -> None:
-    for name in kernels.__all__:
+    compiled = [name for name in kernels.__all__ if hasattr(getattr(kernels, name), "py_func")]
+    assert len(compiled) > 15
+    for name in compiled:
         assert getattr(transforms, name).__name__ == name
         assert getattr(transforms, name) is not getattr(kernels, name)
 

@@ -10,8 +10,8 @@ from vergence.planning.failure import Obstacle
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.path import Path
 from vergence.planning.problem import PlanningProblem
-from vergence.planning.separation import cell_sees
 from vergence.planning.visibility import add_visibility_penalty, clearance_at
+from vergence.planning.wrist_cells import cell_sees
 from vergence.robot.inverse_kinematics import goal_configurations
 
 SQUARE = np.array([[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]])

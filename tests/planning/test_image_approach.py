@@ -2,14 +2,18 @@
 
 import cv2
 import numpy as np
+import pytest
 
 from vergence.camera import Camera
+from vergence.estimation.goal_fit import GoalFit
 from vergence.planning.approach import GoalImage
+from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.points import choose_points, depth_between
 from vergence.planning.approach.recognition import confirm
 from vergence.vision.matching import Sift
 
 CAMERA = Camera(640, 480, focal_px=600)
+CORNERS = np.array([(60.0, 60.0), (580.0, 60.0), (580.0, 420.0), (60.0, 420.0)])
 
 
 def cluttered(seed):
@@ -52,3 +56,35 @@ def test_a_scene_in_its_place_is_confirmed_and_one_that_moved_is_not():
     half[:, :320] = np.roll(image, 12, axis=0)[:, :320]  # one half of the scene was moved
     assert not confirm(goal, half).holds
     assert not confirm(goal, cluttered(3)).holds
+
+
+def test_at_the_goal_only_points_whose_places_are_known_well_are_followed():
+    rng = np.random.default_rng(3)
+    noise = cv2.GaussianBlur(rng.normal(0.0, 1.0, (480, 640)), (0, 0), 4.0)
+    scene = np.clip(128 + 50 * noise / noise.std(), 0, 255).astype(np.uint8)
+    covered = scene.copy()  # by stripes, whose borders look like places of the scene
+    v, u = np.indices((200, 260))
+    covered[140:340, 200:460] = np.where((u + 2 * v) // 12 % 2, 60, 170)
+    points = GoalPoints(GoalImage.of(covered, CAMERA, Sift()), CORNERS)
+    tracks = points.track(np.roll(scene, (1, 2), (0, 1)), 0.0)
+    assert 12 < tracks.found.sum() < 40
+    off = tracks.points_px - points.points_px - (2.0, 1.0)
+    assert np.abs(off[tracks.found]).max() < 0.1
+    assert "its place is not known well enough" in tracks.reasons
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_errors_of_depths_do_not_make_the_place_seem_known_better(seed):
+    rng = np.random.default_rng([7, seed])
+    image = cluttered(6)
+    noisy = np.clip(image + rng.normal(0, 6, image.shape), 0, 255).astype(np.uint8)
+    points = GoalPoints(GoalImage.of(image, CAMERA, Sift()), CORNERS)
+    rays = np.column_stack((rng.uniform(-0.4, 0.4, (16, 2)), np.ones(16)))
+    sure_m = []
+    for error in (0.0, 0.2):
+        known = rays * 0.4 * np.exp(error * rng.normal(size=16))[:, None]
+        fit = GoalFit(np.eye(4), np.eye(6), known, np.ones(16, np.bool_), 0.0, 1)
+        points.learn(fit)
+        assert points.track(noisy, 0.0) is not None
+        sure_m.append(points.displacement.at_most()[0])
+    assert sure_m[1] > 0.8 * sure_m[0]

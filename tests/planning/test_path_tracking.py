@@ -89,11 +89,11 @@ def view(found: np.ndarray) -> Observation:
 def test_lost_points_are_left_out_and_too_few_are_a_fault() -> None:
     law = tracking_law()
     joints = JointState(0.0, section6().q_start, np.zeros(6))
-    wanted = np.array([[300.0, 200.0], [350.0, 210.0], [340.0, 290.0], [310.0, 280.0]])
-    reference = Reference(0.0, wanted, None, np.full(4, 0.7))
+    desired = np.array([[300.0, 200.0], [350.0, 210.0], [340.0, 290.0], [310.0, 280.0]])
+    reference = Reference(0.0, desired, None, np.full(4, 0.7))
     with_three = law.command(view(np.array([True, True, True, False])), reference, joints)
     assert with_three.fault is None
-    elsewhere = replace(reference, points_px=wanted + [[0, 0], [0, 0], [0, 0], [99, 99]])
+    elsewhere = replace(reference, points_px=desired + [[0, 0], [0, 0], [0, 0], [99, 99]])
     again = law.command(view(np.array([True, True, True, False])), elsewhere, joints)
     np.testing.assert_array_equal(with_three.velocity, again.velocity)
     lost = law.command(view(np.array([True, True, False, False])), reference, joints)

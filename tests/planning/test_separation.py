@@ -1,21 +1,24 @@
 """The proof that there is no path."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from displacements import random_displacement
 from gantry_cell import CAMERA, gantry, marks, section6
 
 from vergence.geometry import se3, so3_exp, transform_points
+from vergence.planning.halfspaces import halfspaces_meet
 from vergence.planning.optimised import OptimisedPlanner
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.separation import (
-    cell_sees,
-    halfspaces_meet,
-    label_islands,
+    Separation,
     proves_no_path,
+    reaches,
     slides_then_turns,
 )
 from vergence.planning.visibility import clearance_at
+from vergence.planning.wrist_cells import WristCells, cell_sees, visible_cells
 
 
 def hopeless() -> PlanningProblem:
@@ -77,15 +80,62 @@ def test_halfspaces_meet_where_a_linear_program_says_so() -> None:
     assert 20 < sum(answers) < 180
 
 
-def test_islands_are_the_connected_components() -> None:
+def test_cells_reach_those_of_their_connected_component() -> None:
     from scipy.ndimage import label
 
-    seen = np.random.default_rng(4).random((7, 8, 9)) < 0.12
-    ours = label_islands(seen.ravel(), np.array(seen.shape)).reshape(seen.shape)
+    random = np.random.default_rng(4)
+    seen = random.random((7, 8, 9)) < 0.12
     twin, count = label(seen, np.ones((3, 3, 3)))
-    assert (ours[~seen] == -1).all()
-    pairs = set(zip(ours[seen], twin[seen], strict=True))
-    assert len(pairs) == count == len(set(ours[seen]))
+    shape, cells = np.array(seen.shape), np.flatnonzero(seen)
+    assert count > 5
+    for start in random.choice(cells, 20):
+        alike = twin.ravel() == twin.ravel()[start]
+        assert not reaches(seen.ravel(), shape, start, ~alike)
+        for end in random.choice(cells, 10):
+            one = np.arange(seen.size) == end
+            assert reaches(seen.ravel(), shape, start, one) == alike[end]
+    assert not reaches(seen.ravel(), shape, int(np.flatnonzero(~seen.ravel())[0]), seen.ravel())
+
+
+def test_a_goal_behind_a_flat_object_is_proved_impossible_for_any_arm() -> None:
+    problem = section6()
+    middle, T = problem.points_world.mean(axis=0), problem.T_world_goal.copy()
+    corners = np.array([[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]])
+    points = middle + corners @ T[:3, :3].T
+    assert not proves_no_path(replace(problem, points_world=points), 32)
+    T[:3, 3] += 2.0 * (middle - T[:3, 3])
+    behind = replace(problem, T_world_goal=T, points_world=points)
+    assert behind.sees_the_back
+    turning = problem.arm.chain._replace(sliding=np.zeros(6, dtype=np.bool_))
+    for arm in (problem.arm, replace(problem.arm, chain=turning)):
+        assert proves_no_path(replace(behind, arm=arm), 32)
+
+
+@pytest.mark.parametrize("problem", [hopeless(), section6()])
+def test_a_grid_refined_at_its_border_sees_what_each_cell_by_itself_sees(
+    problem: PlanningProblem,
+) -> None:
+    view, (low, high) = problem.view(), problem.joint_range()
+    grid = WristCells(problem.arm.chain, view, low, high, 8)
+    while grid.cells < 32:
+        grid.sharpen()
+        grid.split()
+    every = np.ones(grid.seen.size, dtype=np.bool_)
+    alone = visible_cells(
+        problem.arm.chain, view, low, high, low[3:], grid.width, grid.shape, every, 0.0
+    )
+    assert 0.0 < alone.mean() < 1.0
+    np.testing.assert_array_equal(grid.middles().ravel(), alone)
+
+
+def test_a_proof_goes_on_where_a_coarser_one_ended() -> None:
+    for problem, proved in ((hopeless(), True), (section6(), False)):
+        separation = Separation(problem)
+        assert [separation.proves_no_path(cells) for cells in (16, 32, 64)] == [
+            proves_no_path(problem, cells) for cells in (16, 32, 64)
+        ]
+        assert separation.proves_no_path(64) is proved
+        assert separation.proves_no_path(16) is proved  # what is proved stays so
 
 
 def test_only_arms_that_slide_first_are_judged() -> None:

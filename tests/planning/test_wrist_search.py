@@ -7,7 +7,8 @@ import numpy as np
 from gantry_cell import gantry, section6
 
 from vergence.planning.tree import pull_into_view
-from vergence.planning.wrist_search import shortest_way, wrist_path
+from vergence.planning.wrist_cells import shortest_way
+from vergence.planning.wrist_search import wrist_path
 from vergence.robot.inverse_kinematics import goal_configurations
 
 

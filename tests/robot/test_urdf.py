@@ -18,8 +18,8 @@ REASONS = {  # why an arm cannot be made of some robots of example-robot-data, r
     "double_pendulum_simple.urdf": "joints that cannot move, lower = upper: joint1, joint2",
     "iris_simple.urdf": "something that a hinge or slide joint carries",
     "quadrotor_base.urdf": "something that a hinge or slide joint carries",
-    "quadruped.urdf": "limit of joint .*KFE: given no lower, no upper",
-    "ur3.urdf": "links: given none",
+    "quadruped.urdf": "limit of joint .*KFE: no lower, no upper",
+    "ur3.urdf": "links: none",
 }
 
 
@@ -164,8 +164,8 @@ def test_a_velocity_limit_of_zero_is_taken_for_none_in_words(tmp_path: Path, cap
 @pytest.mark.parametrize(
     ("changed", "complaint"),
     [
-        (joint(3, ""), "limit of joint joint3: given no lower, no upper"),
-        (joint(3, '<limit effort="1" velocity="1"/>'), "limit of joint joint3: given no lower"),
+        (joint(3, ""), "limit of joint joint3: no lower, no upper"),
+        (joint(3, '<limit effort="1" velocity="1"/>'), "limit of joint joint3: no lower"),
         (joint(3, '<limit lower="1" upper="-1"/>'), "limit of joint joint3: given 1 … -1"),
         (joint(3, '<limit lower="-1" upper="1" velocity="-1"/>'), "joint joint3: velocity"),
         (joint(3, '<limit lower="-1e999" upper="1"/>'), "limit of joint joint3: lower"),
@@ -209,7 +209,7 @@ def test_degrees_and_millimetres_are_noticed(tmp_path: Path, caplog) -> None:
         ("<robot>", "allowed: XML"),
         ("", "allowed: XML"),
         ("<mujoco/>", "<robot>, as a URDF begins"),
-        ("<robot/>", "links: given none"),
+        ("<robot/>", "links: none"),
         ('<!DOCTYPE r [<!ENTITY a "b">]><robot>&a;</robot>', "entities"),
         ("<robot>" + "<a>" * 300 + "</a>" * 300 + "</robot>", "256 levels"),
         ("<robot>" + "<a/>" * 100_001 + "</robot>", "too many elements"),

@@ -16,6 +16,7 @@ FLAT = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0.1, 0.1, 0]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 OBJ = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 MESH, BOX = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_BOX)
+ROD = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 ROBOT = """<robot name="r">
   <link name="base"/>
   <joint name="lift" type="prismatic"><parent link="base"/><child link="mast"/>
@@ -97,11 +98,28 @@ def test_a_mesh_is_drawn_whatever_its_form(tmp_path: Path, caplog, file: str) ->
 def test_a_mesh_that_cannot_be_drawn_costs_the_drawing_only(tmp_path, caplog, file) -> None:
     content, complaint = UNDRAWN[file]
     model = read(tmp_path, file, content, collision="")
-    assert mast_shapes(model) == []
+    assert mast_shapes(model) == [ROD]
     assert len(caplog.records) == 1
     text = caplog.records[0].getMessage()
-    assert f"shapes of mast: mesh package://robots/{file}" in text
+    assert f"mast cannot be drawn as the file says: mesh package://robots/{file}" in text
     assert re.search(complaint, text)
+
+
+@pytest.mark.parametrize(
+    "end", [(0.0, 0.0, 0.3), (0.0, 0.0, -0.3), (0.1, -0.2, 0.3), (0.0, 0.4, 0.0)]
+)
+def test_a_rod_goes_from_a_links_origin_to_its_joint(tmp_path: Path, end) -> None:
+    text = ROBOT.format(name="none.stl", collision="", ixy=0.0)
+    path = tmp_path / "r.urdf"
+    path.write_text(text.replace("0 0 0.3", "{} {} {}".format(*end)))
+    model = read_urdf(path, "tool").compile()
+    (rod,) = np.flatnonzero(model.geom_bodyid == model.body("mast").id)
+    assert model.geom_type[rod] == ROD
+    along = np.zeros(9)
+    mujoco.mju_quat2Mat(along, model.geom_quat[rod])
+    half = model.geom_size[rod, 1] * along.reshape(3, 3)[:, 2]
+    np.testing.assert_allclose(model.geom_pos[rod] + half, end, atol=1e-7)
+    np.testing.assert_allclose(model.geom_pos[rod] - half, 0.0, atol=1e-7)
 
 
 @pytest.mark.parametrize("file", UNDRAWN)

@@ -41,6 +41,19 @@ def test_noise_about_the_goal_is_no_stall() -> None:
     assert not arrival(SQUARE, noise_px=2.0).stalled
 
 
+def test_an_arm_that_nears_its_goal_slowly_has_not_stalled() -> None:
+    for rate, stalled in ((1.0, False), (0.0, True)):
+        watched = Arrival(Goal(), np.ones(6))
+        for k in range(60):
+            measured = SQUARE + 6.0 * np.exp(-rate * k / 30)
+            found, covariance = np.ones(4, dtype=np.bool_), np.tile(np.eye(2), (4, 1, 1))
+            view = ImagePoints("c", k / 30, measured, covariance, found, ("",) * 4)
+            q = np.full(6, 1e-4 * np.exp(-rate * k / 30))  # less than rest allows in any second
+            command = JointCommand(np.zeros(6), np.zeros(6))
+            watched.observe(Observation(k / 30, (view,)), Reference(k / 30, SQUARE), command, q)
+        assert watched.stalled is stalled
+
+
 def test_a_task_with_an_end_that_moves_when_its_time_is_over_is_not_reached() -> None:
     outcome = arrival(SQUARE + 5.0, goal=Goal(1.0, ends=True), speed=0.1).outcome(2.0, 2.0)
     assert outcome.kind is OutcomeKind.NOT_REACHED

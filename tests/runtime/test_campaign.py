@@ -35,6 +35,7 @@ from vergence.experiments import (
     start_trials,
 )
 from vergence.experiments.batch import KinematicRun
+from vergence.experiments.kinematic import is_ideal
 from vergence.parts import kind_of
 from vergence.runtime import Run, RunInfo
 from vergence.signals import Outcome, OutcomeKind
@@ -113,6 +114,23 @@ def test_a_feature_that_the_arm_itself_hides_is_not_seen_by_the_batch_either():
     found = run_trial(source, hidden, 2.0)
     assert found.ending is Ending.LOST
     assert found.time_s == pytest.approx(run_trial(source, hidden, 2.0, physics=True).time_s)
+
+
+def test_the_guard_ends_runs_of_a_campaign_before_a_collision():
+    source = CellSource.of("post", {"duration_s": "9.0"}, None)
+    limits = {"limits": {"order": ["view", "singularity", "joint margin"]}}
+    law = {"kind": "image_based", "solver": {"kind": "quadratic_program", "S": 1e-5}, **limits}
+    found = run_trial(source, Trial("unlimited", {"law": {"gain": 4.0, **law}}), 2.0)
+    assert found.ending is Ending.COLLISION
+    assert "scene/post" in found.reason
+    assert found.time_s < 8.5
+
+
+def test_a_planned_way_is_tried_as_run_does_it():
+    desired = [[280.0, 200.0], [360.0, 200.0], [360.0, 280.0], [280.0, 280.0]]
+    cell = load_cell("ur5").replace(task={"desired": desired})
+    assert is_ideal(cell)
+    assert not is_ideal(cell.replace(task={"approach": "auto"}))
 
 
 def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
@@ -236,7 +254,7 @@ def test_a_reach_is_tried_from_random_starts_before_random_targets():
     assert len({result.start_m for result in results}) == 2
     (short,) = run_trials(CellSource.of("gantry", {}, None), [Trial("short", {"duration_s": 1})], 2)
     assert short.ending is Ending.OTHER
-    assert "the way takes" in short.reason
+    assert "the path takes" in short.reason
     with pytest.raises(InputError, match="headings"):
         heading_trials(cell, 1.0, 4, (0.1,))
 

@@ -87,5 +87,5 @@ def test_a_camera_file_and_a_lens_of_its_own_contradict_each_other(tmp_path: Pat
 def test_a_camera_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     path = calibrated_cell(tmp_path, Camera(800, 600, 901.5, 899.0, 410.0, 290.0))
     (tmp_path / "eye.yaml").unlink()
-    with pytest.raises(InputError, match=r"eye\.yaml: given no such file"):
+    with pytest.raises(InputError, match=r"eye\.yaml: no such file"):
         load_cell(path)

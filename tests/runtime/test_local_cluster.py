@@ -1,9 +1,11 @@
 """The processes that share out a campaign's runs, as somebody else on this machine finds them."""
 
+import logging
 import socket
 import ssl
 
 import psutil
+import pytest
 
 from vergence.experiments import Executor
 
@@ -41,6 +43,19 @@ def is_refused(port: int, *, encrypted: bool) -> bool:
     except (OSError, ssl.SSLError):
         return True
     return said == b"" or said.startswith(b"HTTP/1.1 404")
+
+
+def complain() -> None:
+    """Warn of a cell, as its model does whenever it is read."""
+    logging.getLogger("vergence.robot").warning("this arm has no meshes")
+
+
+def test_workers_leave_warnings_to_the_process_that_shares_out_the_runs(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with Executor(workers=2)._client(1) as client:
+        client.submit(complain).result()
+    assert capfd.readouterr().err == ""
 
 
 def test_workers_hear_nobody_without_their_certificate_and_show_no_pages() -> None:

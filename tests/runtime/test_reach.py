@@ -51,7 +51,7 @@ def test_a_mark_that_two_views_leave_out_is_left_out_of_the_way(
 def test_a_way_that_takes_too_long_is_an_outcome_before_anything_moves():
     result = run_cell(load_cell("gantry").replace(duration_s=3.0), images=False)
     assert result.outcome.kind is OutcomeKind.INFEASIBLE
-    assert "duration_s is 3" in result.outcome.reason
+    assert "duration_s leaves 3 s" in result.outcome.reason
 
 
 def test_the_same_seed_gives_the_same_run():

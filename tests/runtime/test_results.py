@@ -1,6 +1,6 @@
 """One object for what a run was: the same in memory, from its recording, and in a table."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.geometry import so3_log
 from vergence.runtime import Recorder, Recording, Run, RunInfo, TickRecord
-from vergence.runtime.results import Columns, TargetTrace, largest
+from vergence.runtime.results import Columns, TargetTrace, largest, tick_pose_errors
 
 
 class TickByTick:
@@ -121,6 +121,25 @@ def test_the_summary_of_a_pose_is_what_the_ticks_say(followed: tuple[Run, TickBy
     assert "final_error_px" not in run.summary  # no points are desired
     trace = run.cameras[run.info.task_camera]
     assert np.isfinite(trace.error_px).any()  # but where they would be at the pose is known
+
+
+def test_a_tick_without_an_image_of_the_tasks_camera_has_no_error_of_it(
+    followed: tuple[Run, TickByTick],
+) -> None:
+    ticks = followed[1]
+    seen = [r for r in ticks.records if r.observation and r.observation.target and r.sample.frames]
+    sample, observation = seen[0].sample, seen[0].observation
+    frames = tuple(f for f in sample.frames if f.camera != ticks.info.task_camera)
+    views = tuple(v for v in observation.views if v.camera != ticks.info.task_camera)
+    record = replace(
+        seen[0],
+        sample=replace(sample, frames=frames),
+        observation=replace(observation, views=views),
+    )
+    errors = tick_pose_errors(record, ticks.info)
+    assert len(errors.time) == 1
+    assert np.isfinite(errors.target_rad).all()
+    assert np.isnan(errors.camera_rad).all()
 
 
 def test_setpoints_lead_the_joints(tracked: tuple[Run, TickByTick]) -> None:

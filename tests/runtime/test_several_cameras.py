@@ -24,9 +24,9 @@ class Ends:
 
     def tick(self, record):
         self.position = record.sample.joints["puma"].position
-        wanted = {**record.reference.elsewhere_px, "wrist": record.reference.points_px}
+        desired = {**record.reference.elsewhere_px, "wrist": record.reference.points_px}
         for view in record.observation.views if record.observation else ():
-            error = np.linalg.norm(view.points_px - wanted[view.camera], axis=1)
+            error = np.linalg.norm(view.points_px - desired[view.camera], axis=1)
             self.error_px[view.camera] = error[view.found].max(initial=0.0)
 
     def event(self, time, name, text):
@@ -48,13 +48,16 @@ def settle(driver, cameras, ticks=400):
     """Servo on ideal joints by some of the cameras; return joints, and errors by camera in px."""
     parts = assemble_parts(driver.cell, driver, images=False)
     q = driver.read().joints["puma"].position
-    wanted = parts.planner.reference(0.0)
-    desired = {**wanted.elsewhere_px, "wrist": wanted.points_px}
+    reference = parts.planner.reference(0.0)
+    desired = {**reference.elsewhere_px, "wrist": reference.points_px}
     for k in range(ticks):
         truth = {name: driver.frame_at(name, "puma", q).truth for name in desired}
         views = [view(name, k * PERIOD, truth[name].points_px) for name in cameras]
         joints = JointState(k * PERIOD, q, np.zeros(6))
-        q = q + PERIOD * parts.law.command(Observation(k * PERIOD, views), wanted, joints).velocity
+        q = (
+            q
+            + PERIOD * parts.law.command(Observation(k * PERIOD, views), reference, joints).velocity
+        )
     return q, {n: np.linalg.norm(truth[n].points_px - desired[n], axis=1).max() for n in desired}
 
 

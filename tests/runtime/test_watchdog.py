@@ -42,19 +42,19 @@ def test_set_points_that_come_in_time_are_handed_on_unchanged() -> None:
 
 
 def test_a_gap_at_constant_speed_is_not_felt() -> None:
-    watchdog, wanted = dog(), sent(300)
-    for tick, setpoint in enumerate(wanted):
+    watchdog, desired = dog(), sent(300)
+    for tick, setpoint in enumerate(desired):
         if not 200 <= tick < 240:
             watchdog.hear(setpoint)
         np.testing.assert_allclose(watchdog.step().position, setpoint.position, atol=1e-12)
 
 
 def test_a_late_set_point_counts_from_when_it_was_meant() -> None:
-    watchdog, wanted = dog(), sent(300)
+    watchdog, desired = dog(), sent(300)
     for tick in range(300):
-        watchdog.hear(wanted[max(tick - 3, 0)], age_s=3 * DT)
+        watchdog.hear(desired[max(tick - 3, 0)], age_s=3 * DT)
         out = watchdog.step()
-    np.testing.assert_allclose(out.position, wanted[-1].position, atol=1e-9)
+    np.testing.assert_allclose(out.position, desired[-1].position, atol=1e-9)
 
 
 def test_silence_brakes_the_arm_to_rest_within_its_limits() -> None:

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from certainty import count_answers, deviations
+from scipy import stats
 from two_view_scenes import CAMERA, Pair, pair, pose_facing, shape
 
 from vergence.arrays import FloatArray
 from vergence.errors import InputError, ShapeError
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
+from vergence.geometry.chi_square import normal_deviate_of_ratio
+from vergence.studies.honesty_two_views import KINDS, try_scene
 from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem, estimate_two_view
 
 
@@ -101,6 +104,20 @@ def test_covariance_matches_the_spread_of_repeated_measurements() -> None:
     ratio = np.var(upsilons, axis=0) / np.mean(predicted, axis=0)
     assert (ratio > 0.6).all()
     assert (ratio < 1.5).all()
+
+
+@pytest.mark.parametrize(("kind", "most_wrong"), [("plane", 0.02), ("general", 0.1)])
+def test_motions_are_within_their_deviations(kind: str, most_wrong: float) -> None:
+    answers = [
+        answer
+        for scene in range(0, 500, len(KINDS))
+        for answer in try_scene(np.random.default_rng([3, scene]), KINDS.index(kind))
+        if answer.explanations
+    ]
+    off = np.array([answer.deviations for answer in answers])
+    assert len(off) > 30
+    assert np.mean(off > 5.0) <= most_wrong
+    assert np.quantile(off, 0.9) > 1.0  # and they are not stated to be anywhere
 
 
 def test_noise_of_nine_marks_leaves_about_one_degree() -> None:
@@ -235,6 +252,16 @@ def test_answers_over_random_scenes_are_rarely_wrong_and_certain() -> None:
     assert sum(kind["wrong"] for kind in counts.values()) <= 1
     assert counts["unrelated"]["refused"] == 15
     assert counts["general"]["right"] + counts["general"]["ambiguous"] >= 4
+
+
+@pytest.mark.parametrize(
+    ("ratio", "freedom", "below"), [(1.9, 77, 75), (5.0, 30, 19), (3.0, 9, 1e9)]
+)
+def test_ratio_of_mean_squares_is_as_unlikely_as_its_deviate(
+    ratio: float, freedom: float, below: float
+) -> None:
+    exact = stats.norm.isf(stats.f.sf(ratio, freedom, below))
+    assert normal_deviate_of_ratio(ratio, freedom, below) == pytest.approx(exact, rel=0.02)
 
 
 def test_coincident_points_are_refused() -> None:

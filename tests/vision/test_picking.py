@@ -21,6 +21,14 @@ def test_corners_lie_in_the_windows_of_the_picks_and_edges_are_not_picked() -> N
         assert np.min(np.abs(picked.points_px - corner).max(axis=1)) <= 8.0
 
 
+def test_a_straight_edge_with_noise_is_not_picked() -> None:
+    rows, columns = np.indices((200, 260))
+    side = np.clip(columns - 0.7 * rows - 60.0, -1.0, 1.0)
+    noise = np.random.default_rng(6).normal(0.0, 4.0, side.shape)
+    image = np.clip(128 + 110 * side + noise, 0, 255).astype(np.uint8)
+    assert not pick_features(image, 5)
+
+
 def test_fine_pattern_that_vanishes_at_the_coarse_level_is_not_picked() -> None:
     image = squares((200, 100))
     rows, columns = np.indices((60, 60))

@@ -3,6 +3,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence.errors import ShapeError
+from vergence.studies.honesty_points import KINDS, try_scene
 from vergence.vision import SsdTracker
 
 
@@ -106,3 +107,32 @@ def test_point_whose_window_does_not_fit_has_no_template(image: NDArray[np.uint8
 def test_wrong_shape_of_points_is_an_error(image: NDArray[np.uint8]) -> None:
     with pytest.raises(ShapeError, match="points_px"):
         SsdTracker(image, [1.0, 2.0, 3.0])
+
+
+def test_of_marks_that_look_alike_the_one_that_moves_as_its_neighbours_is_the_point(
+    image: NDArray[np.uint8],
+) -> None:
+    rows, columns = np.indices((240, 180))
+    dots = 128 + 90 * np.sin(2 * np.pi * rows / 16) * np.sin(2 * np.pi * columns / 16)
+    image[:, 140:] = np.rint(dots).astype(np.uint8)
+    shift = np.array([8, 0])  # half of the period: four marks lie as near
+    points = np.array([[220.0, 120.0], [230.0, 110.0], [40.0, 60.0], [60.0, 120.0], [50.0, 180.0]])
+    tracks = SsdTracker(image, points).track(np.roll(image, shift, axis=(1, 0)))
+    assert tracks.found.all(), tracks.reasons
+    np.testing.assert_allclose(tracks.points_px, points + shift, atol=0.05)
+
+
+@pytest.mark.parametrize(("kind", "most_wrong"), [("straight edge", 0.0), ("look-alikes", 0.03)])
+def test_what_edges_and_marks_in_rows_do_not_tell_is_in_the_deviation(
+    kind: str, most_wrong: float
+) -> None:
+    number = KINDS.index(kind)
+    answers = [
+        answer
+        for seed in range(80)
+        for answer in try_scene(np.random.default_rng([5, seed]), number)
+        if answer.explanations
+    ]
+    assert len(answers) > 300
+    assert np.mean([answer.deviations > 5.0 for answer in answers]) <= most_wrong
+    assert max(answer.deviations for answer in answers) > 0.2  # not stated to be anywhere

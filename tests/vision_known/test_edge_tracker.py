@@ -7,8 +7,9 @@ from known_scene import CAMERA, box_model, clutter, drawn_image, off, pose, pose
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.vision.known_object import EdgeTracker, ObjectModel
-from vergence.vision.known_object.edge_samples import sample_edges
-from vergence.vision.known_object.profiles import find_steps
+from vergence.vision.known_object.edge_samples import EdgeSamples, Steps, sample_edges
+from vergence.vision.known_object.profiles import find_steps, read_profile
+from vergence.vision.known_object.shift_vote import SUPPORT_PX, vote_shift
 
 MODEL = box_model()
 LOOSE = np.diag(np.repeat([0.01, 0.1], 3) ** 2)
@@ -37,6 +38,48 @@ def test_a_blurred_step_is_found_in_the_middle_of_its_ramp(length: float) -> Non
     places, _, widths = steps_of(profile, 9)
     assert places[0] == pytest.approx(1.2, abs=0.3)
     assert widths[0] == pytest.approx(length, rel=0.3)
+
+
+def test_a_profile_is_the_grey_values_along_the_normal() -> None:
+    rows, columns = np.mgrid[0:60, 0:80]
+    slope = np.asarray(np.rint(2.0 * columns + 1.0 * rows), np.uint8)
+    profile = np.empty(21)
+    assert read_profile(slope, 40.3, 30.6, 0.6, 0.8, profile)
+    assert profile == pytest.approx(2.0 * 40.3 + 30.6 + 2.0 * np.arange(-10, 11), abs=0.02)
+    assert not read_profile(slope, 8.0, 30.0, 1.0, 0.0, profile)
+
+
+def votes(rng: np.random.Generator, shift: np.ndarray) -> tuple[EdgeSamples, Steps]:
+    """Samples whose steps are where a shift puts them, among others that are anywhere."""
+    count, candidates = 120, 4
+    angle = rng.uniform(0, 2 * np.pi, count)
+    normals = np.column_stack((np.cos(angle), np.sin(angle)))
+    offsets = rng.uniform(-15, 15, (count, candidates))
+    offsets[::2, 1] = normals[::2] @ shift + rng.normal(0, 0.4, count // 2)
+    weights = rng.uniform(0.1, 1.0, (count, candidates))
+    zeros = np.zeros(count, dtype=np.int64)
+    samples = EdgeSamples(zeros, zeros, np.zeros((count, 3)), np.zeros((count, 2)), normals)
+    none, looks = np.zeros((count, candidates)), np.zeros((count, candidates, 9))
+    return samples, Steps(offsets, weights, none, none, looks, np.ones(count, np.bool_))
+
+
+def test_the_vote_finds_what_a_trial_of_every_shift_finds() -> None:
+    rng = np.random.default_rng(4)
+    reach = 14
+    for _ in range(20):
+        samples, steps = votes(rng, rng.uniform(-9, 9, 2))
+        scores = {}
+        for x, y in np.argwhere(np.hypot(*np.indices((29, 29)) - 14) <= reach) - 14:
+            across = samples.normals @ (x, y)
+            miss = (steps.offsets - across[:, None]) / SUPPORT_PX
+            support = (steps.weights * np.maximum(1.0 - miss**2, 0.0)).max(axis=1).sum()
+            scores[(x, y)] = support * (1.0 - 0.25 * np.hypot(x, y) / reach)
+        assert scores[vote_shift(samples, steps, reach)] > 0.995 * max(scores.values())
+
+
+def test_without_steps_nothing_is_shifted() -> None:
+    samples, steps = votes(np.random.default_rng(5), np.zeros(2))
+    assert vote_shift(samples, steps._replace(weights=0.0 * steps.weights), 10) == (0.0, 0.0)
 
 
 def test_only_edges_that_are_seen_are_expected() -> None:

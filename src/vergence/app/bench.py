@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vergence.app.names import benchmarks
-from vergence.errors import InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 
 
-def bench(names: Sequence[str], as_json: bool) -> int:
+def bench(names: Sequence[str], as_json: bool, baseline: Path | None) -> int:
     """Run the benchmarks in a process of their own; return its exit code.
 
     Raises:
@@ -18,9 +18,11 @@ def bench(names: Sequence[str], as_json: bool) -> int:
     script = Path(__file__).parents[3] / "benchmarks" / "run.py"
     if not script.is_file():
         allowed = "a source checkout of vergence: the benchmarks are not part of the package"
-        raise InputError("vergence bench", "", f"no {script}", allowed)
+        raise InputError("vergence bench", "", Absent(f"no {script}"), allowed)
     for name in names:
         if name.removeprefix("bench_") not in benchmarks():
             raise InputError("vergence bench", "", name, nearest(name, benchmarks()))
     options = ["--json"] if as_json else []
+    if baseline is not None:
+        options += ["--compare", str(baseline)]
     return subprocess.run([sys.executable, str(script), *options, *names], check=False).returncode

@@ -13,6 +13,7 @@ from vergence.app.report import REPORT
 from vergence.app.run import overrides
 
 if TYPE_CHECKING:
+    from vergence.app.options import CheckOptions
     from vergence.cell import Cell
     from vergence.drivers.bring_up import CarriedCamera, Finding
 
@@ -23,38 +24,32 @@ _REMINDERS = (
 )
 
 
-def check(
-    cell: str,
-    driver: str,
-    nudge_deg: float,
-    nudge_mm: float,
-    out: Path | None,
-    settings: Sequence[str],
-    as_json: bool,
-) -> int:
+def check(options: "CheckOptions") -> int:
     """Check a robot, print and write what was found; return the exit code."""
-    from vergence.assembly import open_driver, rehearse
+    from vergence.assembly import check_driver, open_driver, rehearse
     from vergence.cell import load_cell
     from vergence.drivers.bring_up import bring_up
 
-    loaded = load_cell(cell, overrides(settings))
+    loaded = load_cell(options.cell, overrides(options.settings))
+    check_driver(loaded, options.driver)
     rehearse(loaded)
-    opened = open_driver(loaded, driver)
+    opened = open_driver(loaded, options.driver)
     findings: list[Finding] = []
     try:
         rates = {name: loaded.cameras[name].rate_hz for name in loaded.watched}
         camera = carried_camera(loaded)
-        nudges = np.deg2rad(nudge_deg), 1e-3 * nudge_mm
+        nudges = np.deg2rad(options.nudge_deg), 1e-3 * options.nudge_mm
         for found in bring_up(opened, loaded.task.arm, rates, camera, *nudges):
             findings.append(found)
-            if not as_json:
+            if not options.as_json:
                 say(_words(found))
     finally:
         opened.close()
-    page = _write_page(out or new_folder(f"check-{loaded.name}"), loaded.name, driver, findings)
+    folder = options.out or new_folder(f"check-{loaded.name}")
+    page = _write_page(folder, loaded.name, options.driver, findings)
     holds = all(found.holds for found in findings)
-    if as_json:
-        emit(_answer(loaded.name, driver, findings, page))
+    if options.as_json:
+        emit(_answer(loaded.name, options.driver, findings, page))
     else:
         for reminder in _REMINDERS:
             say(f"  to do  {reminder}")

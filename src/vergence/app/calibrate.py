@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
-from vergence.errors import InputError, nearest
+from vergence.app.output import FAILURE, SUCCESS, confirmed, emit, new_folder, say
+from vergence.errors import NOTHING, InputError, nearest
 
 if TYPE_CHECKING:
     from vergence.app.calibration.dataset import Dataset
     from vergence.app.calibration.estimates import Estimate
     from vergence.app.calibration.synthetic import Truth
+    from vergence.app.options import CalibrateOptions
     from vergence.arrays import FloatArray
     from vergence.camera import Camera
     from vergence.camera.calibration import (
@@ -20,29 +21,8 @@ if TYPE_CHECKING:
         LensFit,
         MountingFit,
     )
-
-
-class Request(NamedTuple):
-    """What the command line asks for."""
-
-    images: Path | None
-    board: str | None  # inner corners, COLUMNSxROWS
-    square_mm: float | None
-    marker_mm: float | None
-    dictionary: str | None
-    pattern: str | None
-    square_deviation_percent: float
-    poses: Path | None
-    fixed: bool
-    camera: Path | None  # known already
-    lens: str  # which distortion coefficients
-    base: str | None  # x, y, z, roll, pitch, yaw of the arm's base in the world
-    synthetic: str | None  # a cell
-    watch: str | None  # which of its cameras
-    chessboard: bool
-    image_count: int
-    projected: bool
-    noise_px: float
+    from vergence.cell import Cell
+    from vergence.vision import Board
 
 
 class Calibration(NamedTuple):
@@ -82,7 +62,7 @@ class Calibration(NamedTuple):
         ]
 
 
-def calibrate(request: Request, out: Path | None, overwrite: bool, seed: int, as_json: bool) -> int:
+def calibrate(options: "CalibrateOptions") -> int:
     """Calibrate, write what a cell file reads, and say how well it is known.
 
     Raises:
@@ -92,41 +72,65 @@ def calibrate(request: Request, out: Path | None, overwrite: bool, seed: int, as
     from vergence.app.calibration.page import write_calibration_page
     from vergence.app.progress import working
 
-    _require_one_source(request)
-    _require_lens(request.lens)
-    _require_deviation(request.square_deviation_percent)
-    T_world_base = _base(request)
-    name = request.synthetic or str(request.images)
-    folder = out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
-    if not overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
+    _require_one_source(options)
+    _require_lens(options.lens)
+    _require_deviation(options.square_deviation)
+    T_world_base = _base(options)
+    name = options.synthetic or str(options.images or options.cell)
+    folder = options.out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
+    if not options.overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
         given = f"{folder}, which holds a calibration"
         raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
-    data, truth = _data(request, folder, seed)
+    data, truth = _data(options, folder)
     if truth is not None:
         T_world_base = truth.T_world_base
     with working("calibrating"):
-        found = _calibrated(request, data, truth, seed)
+        found = _calibrated(options, data, truth)
     if not isinstance(found, Calibration):
-        return _failed(found, data, as_json)
-    camera = request.watch or "camera"
+        return _failed(found, data, options.as_json)
+    camera = options.watch or "camera"
     write_results(folder, found.camera, found.mounting, T_world_base, camera)
     with working("drawing"):
         report = write_calibration_page(folder, name, found)
     files = {"camera": folder / CAMERA, "table": folder / TABLE, "report": report}
-    emit(_answer(found, files)) if as_json else _tell(found, files)
+    emit(_answer(found, files)) if options.as_json else _tell(found, files)
     return SUCCESS
 
 
-def _require_one_source(request: Request) -> None:
-    if (request.images is None) == (request.synthetic is None):
-        given = "both" if request.images else "nothing"
-        allowed = "either a folder of images, or --synthetic CELL"
+def _require_one_source(options: "CalibrateOptions") -> None:
+    from vergence.runtime.bags import is_bag
+
+    sources = options.images, options.synthetic, options.driver
+    count = sum(source is not None for source in sources)
+    if count != 1:
+        given = "several of them" if count else NOTHING
+        allowed = "a folder of images, a ROS 2 bag, --synthetic CELL, or --driver NAME --cell CELL"
         raise InputError("vergence calibrate", "", given, allowed)
-    if request.synthetic is None:
-        for key, value in (("--watch", request.watch), ("--projected", request.projected)):
-            if value:
-                raise InputError("vergence calibrate", key, value, "with --synthetic CELL")
+    if options.driver and not options.cell:
+        allowed = "it with --cell CELL, or with --latency CELL"
+        raise InputError("vergence calibrate", "--driver", options.driver, allowed)
+    bag = options.images is not None and is_bag(options.images)
+    for key, given_too, fits in (
+        ("--topic", options.topic, bag),
+        ("--joints", options.joints, bag),
+        ("--cell", options.cell, bag or options.driver is not None),
+    ):
+        if given_too and not fits:
+            raise InputError("vergence calibrate", key, given_too, "it with a ROS 2 bag")
+    if options.joints and not options.cell:
+        allowed = "--cell too: the cell whose arm has these joints"
+        raise InputError("vergence calibrate", "--joints", options.joints, allowed)
+    if options.move and options.driver is None:
+        allowed = "it with --driver NAME --cell CELL"
+        raise InputError("vergence calibrate", "--move", True, allowed)
+    if options.yes and not options.move:
+        raise InputError("vergence calibrate", "--yes", True, "it with --move")
+    if options.projected and options.synthetic is None:
+        raise InputError("vergence calibrate", "--projected", True, "with --synthetic CELL")
+    if options.watch and options.synthetic is None and options.driver is None:
+        allowed = "with --synthetic CELL or --driver NAME"
+        raise InputError("vergence calibrate", "--watch", options.watch, allowed)
 
 
 def _require_lens(lens: str) -> None:
@@ -141,49 +145,119 @@ def _require_deviation(percent: float) -> None:
         raise InputError("vergence calibrate", "--square-deviation", percent, "0 … 20, in percent")
 
 
-def _base(request: Request) -> "FloatArray":
+def _base(options: "CalibrateOptions") -> "FloatArray":
     import numpy as np
 
     from vergence.geometry import rpy_to_matrix, se3
     from vergence.tables import numbers
 
-    if request.base is None:
+    if options.base is None:
         return np.eye(4)
     values = numbers(
-        {"--base": request.base.replace(",", " ").split()}, "--base", (6,), "vergence calibrate"
+        {"--base": options.base.replace(",", " ").split()}, "--base", (6,), "vergence calibrate"
     )
     T: FloatArray = se3(rpy_to_matrix(np.deg2rad(values[:2:-1].copy())), values[:3].copy())
     return T
 
 
-def _data(request: Request, folder: Path, seed: int) -> "tuple[Dataset, Truth | None]":
+def _data(options: "CalibrateOptions", folder: Path) -> "tuple[Dataset, Truth | None]":
     from vergence.app.calibration.dataset import board_of_options, read_dataset
+    from vergence.runtime.bags import is_bag
 
-    if request.synthetic is None:
-        assert request.images is not None
+    if options.synthetic is None:
         board = board_of_options(
-            request.board,
-            request.square_mm,
-            request.marker_mm,
-            request.dictionary,
-            request.pattern,
+            options.board,
+            options.square_mm,
+            options.marker_mm,
+            options.dictionary,
+            options.pattern,
         )
-        return read_dataset(request.images, board, request.poses), None
+        if options.images is None:
+            return _robot_data(options, board, folder), None
+        if is_bag(options.images):
+            return _bag_data(options, options.images, board, folder), None
+        return read_dataset(options.images, board, options.poses), None
     from vergence.app.calibration.synthetic import Studio, make_data
 
     with tempfile.TemporaryDirectory() as models:
-        charuco = not request.chessboard
-        studio = Studio(request.synthetic, request.watch, charuco, Path(models), seed)
-        if request.projected:
-            return make_data(studio, request.image_count, None, request.noise_px)
+        charuco = not options.chessboard
+        studio = Studio(options.synthetic, options.watch, charuco, Path(models), options.seed)
+        if options.projected:
+            return make_data(studio, options.image_count, None, options.noise_px)
         image_folder = folder / "images"
         image_folder.mkdir(exist_ok=True)
-        _, truth = make_data(studio, request.image_count, image_folder, request.noise_px)
+        _, truth = make_data(studio, options.image_count, image_folder, options.noise_px)
         return read_dataset(image_folder, None, None), truth
 
 
+def _bag_data(
+    options: "CalibrateOptions", bag: Path, board: "Board | None", folder: Path
+) -> "Dataset":
+    """Write the images and poses of a bag beside the results, and read them."""
+    from vergence.app.calibration.dataset import read_dataset
+    from vergence.app.calibration.from_bag import ArmOfBag, write_bag_images
+    from vergence.vision.board_file import BOARD, read_board
+
+    board = board or read_board(bag / BOARD)
+    images = _empty_folder(folder / "images")
+    arm = ArmOfBag(options.cell, options.joints) if options.cell else None
+    poses = write_bag_images(bag, options.topic, arm, images)
+    return read_dataset(images, board, options.poses or poses)
+
+
+def _robot_data(options: "CalibrateOptions", board: "Board | None", folder: Path) -> "Dataset":
+    """Take images and poses from a robot into a folder beside the results, and read them."""
+    from vergence.app.calibration.dataset import read_dataset
+    from vergence.app.calibration.driven_images import drive_for_images
+    from vergence.app.calibration.from_robot import take_robot_images
+    from vergence.app.run import overrides
+    from vergence.assembly import open_driver
+    from vergence.cell import load_cell
+
+    if board is None:
+        raise InputError("vergence calibrate", "--board", None, "COLUMNSxROWS of the board")
+    cell = load_cell(str(options.cell), overrides(options.settings))
+    camera = options.watch or cell.task.camera
+    if camera not in cell.cameras:
+        raise InputError("vergence calibrate", "--watch", camera, nearest(camera, cell.cameras))
+    if options.move:
+        _require_agreement(cell, camera, options.yes)
+    images = _empty_folder(folder / "images")
+    driver = open_driver(cell, str(options.driver))
+    count = options.image_count
+    try:
+        if options.move:
+            poses = drive_for_images(cell, driver, camera, board, count, images, options.seed)
+        else:
+            poses = take_robot_images(cell, driver, camera, count, images)
+    finally:
+        driver.close()
+    return read_dataset(images, board, options.poses or poses)
+
+
+def _require_agreement(cell: "Cell", camera: str, agreed: bool) -> None:
+    """Refuse to drive an arm that does not carry the camera, or that nobody agreed to move."""
+    arm = cell.task.arm
+    if cell.cameras[camera].arm != arm:
+        allowed = f"a camera that {arm} carries; without --move you move the arm yourself"
+        raise InputError("vergence calibrate", "--move", f"camera {camera}", allowed)
+    question = (
+        f"{arm} will move by itself, slowly, around the board it sees now. Is it free? [y/N] "
+    )
+    if not agreed and not confirmed(question):
+        raise InputError("vergence calibrate", "--move", NOTHING, "y, or --yes")
+
+
+def _empty_folder(folder: Path) -> Path:
+    """Make a folder for images, without those of an earlier calibration."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    return folder
+
+
 def _calibrated(
-    request: Request, data: "Dataset", truth: "Truth | None", seed: int
+    options: "CalibrateOptions", data: "Dataset", truth: "Truth | None"
 ) -> "Calibration | CalibrationFailure":
     import numpy as np
 
@@ -196,9 +270,9 @@ def _calibrated(
     )
     from vergence.camera.calibration.from_folder import with_reason
 
-    file = request.camera
+    file = options.camera
     known = None if file is None else read_camera(file, data.width, data.height)
-    lens = fit_lens(data.sightings, data.width, data.height, request.lens, known)
+    lens = fit_lens(data.sightings, data.width, data.height, options.lens, known)
     if isinstance(lens, CalibrationFailure):
         return with_reason(lens, data.blank)
     if data.T_base_flange is None:
@@ -209,10 +283,10 @@ def _calibrated(
         np.array([arm[seen.name] for seen in lens.sightings]),
         lens.camera,
         lens.noise_px,
-        fixed=request.fixed if truth is None else truth.fixed,
-        free=None if known else free_parameters(request.lens),
-        scale_deviation=request.square_deviation_percent / 100.0,
-        rng=np.random.default_rng(seed),
+        fixed=options.fixed if truth is None else truth.fixed,
+        free=None if known else free_parameters(options.lens),
+        scale_deviation=options.square_deviation / 100.0,
+        rng=np.random.default_rng(options.seed),
     )
     if isinstance(mounting, CalibrationFailure):
         return mounting

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vergence.app import markup
+from vergence.app.compilations import Compilations
 from vergence.app.output import FAILURE, warn
-from vergence.app.progress import bar
+from vergence.app.progress import COMPILING, bar
 from vergence.app.report import REPORT
+from vergence.errors import InputError
 
 if TYPE_CHECKING:
+    from vergence.app.options import CampaignOptions
     from vergence.experiments import CellSource, Trial, TrialResult
 
 
@@ -21,15 +24,12 @@ class Running:
     """How a campaign is run."""
 
     folder: Path  # where results go, and are resumed from
-    tolerance_px: float
-    workers: int | None  # processes of this machine; None for one a core
-    scheduler: str | None  # address of a Dask scheduler
-    physics: bool  # whether to simulate physics for every cell
+    options: "CampaignOptions"
 
     @property
     def motion(self) -> str:
         """Say how arms moved."""
-        if self.physics:
+        if self.options.physics:
             return "arms moved in simulated physics"
         return (
             "single-arm, single-camera cells follow commands perfectly; all others run in MuJoCo "
@@ -37,16 +37,7 @@ class Running:
         )
 
 
-def prepare(
-    command: str,
-    cell: str,
-    settings: Sequence[str],
-    out: Path | None,
-    tolerance_px: float,
-    workers: int | None,
-    scheduler: str | None,
-    physics: bool,
-) -> "tuple[CellSource, Running]":
+def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Running]":
     """Return what the options of a command mean: which cell, and how to run it.
 
     Raises:
@@ -56,9 +47,21 @@ def prepare(
     from vergence.app.run import overrides
     from vergence.experiments import CellSource
 
-    source = CellSource.of(cell, overrides(settings), None)
-    folder = out or new_folder(f"{source.load().name}-{command}")
-    return source, Running(folder, tolerance_px, workers, scheduler, physics)
+    source = CellSource.of(options.cell, overrides(options.settings), None)
+    folder = options.out or new_folder(f"{source.load().name}-{command}")
+    return source, Running(folder, options)
+
+
+def names_in(option: str, text: str) -> tuple[str, ...]:
+    """Split names with commas between.
+
+    Raises:
+        InputError: if there are none.
+    """
+    given = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not given:
+        raise InputError(option, "", text, "names with commas between")
+    return given
 
 
 def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
@@ -69,23 +72,27 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
         task = progress.add_task("runs", total=len(trials))
 
         def show(done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total)
+            progress.update(task, completed=done, total=total, description="runs")
+
+        def compiling(count: int) -> None:
+            progress.update(task, description=f"runs ({COMPILING}, {count} so far)")
 
         try:
-            return run_campaign(
-                source,
-                trials,
-                how.folder,
-                executor=Executor(how.workers, how.scheduler),
-                tolerance_px=how.tolerance_px,
-                physics=how.physics,
-                progress=show,
-            )
+            with Compilations(compiling):
+                return run_campaign(
+                    source,
+                    trials,
+                    how.folder,
+                    executor=Executor(how.options.workers, how.options.scheduler),
+                    tolerance_px=how.options.tolerance_px,
+                    physics=how.options.physics,
+                    progress=show,
+                )
         except KeyboardInterrupt:
-            warn(f"interrupted: the same command with --out {how.folder} goes on from here")
+            warn(f"interrupted: repeat the command with --out {how.folder} to resume")
             raise SystemExit(FAILURE) from None
         except WorkersLostError as error:
-            warn(f"{error}; the same command with --out {how.folder} goes on from here")
+            warn(f"{error}; repeat the command with --out {how.folder} to resume")
             raise SystemExit(FAILURE) from None
 
 
@@ -149,6 +156,15 @@ def _number(column: int) -> str:
     return ' class="number"' if column else ""
 
 
+def _why(result: "TrialResult") -> str:
+    """Return why a run did not converge: of one that went to its end, how far off it was."""
+    from vergence.experiments import Ending
+
+    if result.ending is Ending.OFF_GOAL and result.final_error_px is not None:
+        return f"the farthest feature is {result.final_error_px:.1f} px off at the end"
+    return result.reason
+
+
 def reasons_table(results: "Sequence[TrialResult]", name: str) -> str:
     """Return what ended the runs that did not converge, each with its reason.
 
@@ -163,7 +179,7 @@ def reasons_table(results: "Sequence[TrialResult]", name: str) -> str:
         f'<tr><th scope="row">{escape(name.format(**result.labels))}</th>'
         f"<td>{escape(result.ending.value)}</td>"
         f'<td class="number">{result.time_s:.2f} s</td>'
-        f'<td class="note">{escape(result.reason)}</td></tr>'
+        f'<td class="note">{escape(_why(result))}</td></tr>'
         for result in failed
     )
     return f"<table><tbody>\n{lines}\n</tbody></table>" if failed else ""

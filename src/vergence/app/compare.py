@@ -1,13 +1,14 @@
 """`vergence compare`: several laws from the same random starts, in one table."""
 
 import sys
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from vergence.app import markup
 from vergence.app.campaign import (
     Running,
     html_table,
+    names_in,
+    prepare,
     reasons_table,
     run,
     write_page,
@@ -18,7 +19,8 @@ from vergence.app.output import SUCCESS, emit, say
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.experiments import CellSource, Comparison, Sampling, Score
+    from vergence.app.options import CompareOptions
+    from vergence.experiments import CellSource, Comparison, Score
 
 _REMARK = (
     "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
@@ -26,38 +28,24 @@ _REMARK = (
 )
 
 
-def compare(
-    source: "CellSource",
-    laws: Sequence[str],
-    starts: int,
-    seed: int,
-    sampling: "Sampling",
-    how: Running,
-    as_json: bool,
-) -> int:
-    """Compare laws; write table, data and page into the run folder; return the exit code.
+def compare(options: "CompareOptions") -> int:
+    """Compare laws; write table, data and page into the run folder; return the exit code."""
+    from vergence.experiments import Comparison, Sampling, start_trials, usual_laws
 
-    Args:
-        source: of the cell.
-        laws: their names; those that suit the cell if there are none.
-        starts: how many each.
-        seed: of the draws.
-        sampling: what is drawn for each.
-        how: to run it.
-        as_json: whether to answer with one JSON object.
-    """
-    from vergence.experiments import Comparison, start_trials, usual_laws
-
+    source, how = prepare("compare", options)
     cell = source.load()
-    trials = start_trials(cell, laws or usual_laws(cell), starts, seed, sampling)
+    laws = usual_laws(cell) if options.laws is None else names_in("--laws", options.laws)
+    sampling = Sampling(names_in("--vary", options.vary), options.spread, options.speed)
+    trials = start_trials(cell, laws, options.starts, options.seed, sampling)
     found = Comparison(run(source, trials, how))
     data = write_table(how.folder / "compare.csv", found.runs)
     remark = _REMARK.format(drawn=", ".join(sampling.vary), motion=how.motion)
     report = _write_page(source, found, how, remark)
-    if as_json:
-        answer = {"command": "compare", "cell": cell.name, "starts": starts, "seed": seed}
+    if options.as_json:
+        drawn = {"starts": options.starts, "seed": options.seed}
         rows = [_as_json(score) for score in found.scores]
-        emit({**answer, "laws": rows, "run": how.folder, "data": data, "report": report})
+        files = {"run": how.folder, "data": data, "report": report}
+        emit({"command": "compare", "cell": cell.name, **drawn, "laws": rows, **files})
         return SUCCESS
     _tell(found)
     say(f"  report  {report}")
@@ -86,29 +74,30 @@ def _write_page(
     remark: str,
 ) -> "Path":
     from vergence.app.figures.endings import scores_figure, starts_figure
-    from vergence.experiments import Goal
+    from vergence.experiments import Ending, Goal
 
     cell = source.load()
     goal = Goal.of(cell)
     count = len(goal.desired_px)
     middle = tuple(sum(row[axis] for row in goal.desired_px) / count for axis in (0, 1))
     size = cell.cameras[cell.task.camera].resolution
+    failing = any(score.count(Ending.CONVERGED) < score.trials for score in found.scores)
     tables = html_table(found.headings, [found.row(score) for score in found.scores])
     parts = [
         markup.section(
             "Result",
             tables,
-            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end. Time until "
-            "then and the camera's path are medians over the runs that converged.</p>",
+            f"<p>Converged: every feature within {how.options.tolerance_px:g} px at the end. Time "
+            "until then and the camera's path are medians over the runs that converged.</p>",
             markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),
         markup.section(
-            "Where each fails",
+            "Where each fails" if failing else "Starts",
             markup.figure(
                 starts_figure(found.runs, (middle[0], middle[1]), size),
                 "Each mark is a start, its colour how the run from there ended; the line leads to "
-                "where it ended. Left the camera's place seen from above, right the features' "
-                "middle in the image, the cross where it should be.",
+                "where it ended. Left: camera position from above; right: centre of the features "
+                "in the image, with a cross where it should be.",
             ),
         ),
         markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),

@@ -1,68 +1,65 @@
 """`vergence goal`: take a photograph to go back to."""
 
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vergence.app.output import FAILURE, SUCCESS, emit, say
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 
 if TYPE_CHECKING:
+    from vergence.app.options import GoalOptions
     from vergence.arrays import BoolArray, FloatArray
     from vergence.cell import Cell
     from vergence.runtime.driver import Driver
     from vergence.signals import Frame
 
 
-class Request(NamedTuple):
-    """What was asked for."""
-
-    cell: str
-    out: Path
-    at: str | None  # joint positions, degrees, with commas; a simulation's alone
-    distance_m: float | None
-    settings: Sequence[str]
-    driver: str | None
-
-
-def goal(request: Request, as_json: bool) -> int:
+def goal(options: "GoalOptions") -> int:
     """Take the photograph and say where it is; return the exit code."""
     from vergence.app.run import overrides
     from vergence.assembly import open_driver
-    from vergence.camera.photograph import write_photograph
     from vergence.cell import load_cell
     from vergence.errors import DriverSilent
     from vergence.simulation import SimulatedDriver
     from vergence.vision.matching import image_fault
 
-    cell = load_cell(request.cell, overrides(request.settings))
-    if request.driver is not None and request.at is not None:
-        raise InputError("--at", "", request.at, "nothing with --driver: move the robot there")
-    driver = open_driver(cell, request.driver) if request.driver else SimulatedDriver(cell)
+    cell = load_cell(options.cell, overrides(options.settings))
+    if options.driver is not None and options.at is not None:
+        raise InputError("--at", "", options.at, "nothing with --driver: move the robot there")
+    driver = open_driver(cell, options.driver) if options.driver else SimulatedDriver(cell)
     try:
-        frame = _frame(cell, driver, request.at)
-        camera = driver.cameras[cell.task.camera]
-        sliding = {name: arm.sliding for name, arm in driver.arms.items()}
+        frame = _frame(cell, driver, options.at)
+        keep_photograph(options.out, frame, driver, options.distance_m)
     except DriverSilent as silence:
         say(f"no photograph: {silence}")
         return FAILURE
     finally:
         driver.close()
     assert frame.image is not None
-    joints = {arm: _in_degrees(q, sliding[arm]) for arm, q in frame.joints.items()}
-    write_photograph(request.out, frame.image, camera, joints, request.distance_m)
     fault = image_fault(frame.image)
-    if as_json:
-        emit({"command": "goal", "cell": cell.name, "goal": request.out, "fault": fault or None})
+    if options.as_json:
+        emit({"command": "goal", "cell": cell.name, "goal": options.out, "fault": fault or None})
         return SUCCESS
-    say(f"goal  {request.out}, with its camera file and joints beside it")
+    say(f"goal  {options.out}, with its camera file and joints beside it")
     if fault:
-        say(f"  beware: it is {fault}; nothing may be recognised in it")
-    say(f"  next: vergence run {request.cell} --goal {shlex.quote(str(request.out))}")
+        say(f"  warning: the image is {fault}; the goal may not be recognised in it")
+    say(f"  next: vergence run {options.cell} --goal {shlex.quote(str(options.out))}")
     return SUCCESS
+
+
+def keep_photograph(
+    path: Path, frame: "Frame", driver: "Driver", distance_m: float | None = None
+) -> None:
+    """Write an image as a photograph to go back to, with its camera and the joints beside it."""
+    from vergence.camera.photograph import write_photograph
+
+    assert frame.image is not None
+    camera, arms = driver.cameras[frame.camera], driver.arms
+    joints = {name: _in_degrees(q, arms[name].sliding) for name, q in frame.joints.items()}
+    write_photograph(path, frame.image, camera, joints, distance_m)
 
 
 def _frame(cell: "Cell", driver: "Driver", at: str | None) -> "Frame":
@@ -85,7 +82,7 @@ def _frame(cell: "Cell", driver: "Driver", at: str | None) -> "Frame":
         return driver.frame_at(name, cell.task.arm, q)
     started = StartedDriver(driver, (name,))
     if started.missing:
-        raise InputError("--driver", "", f"no image of {name} came", "a camera that runs")
+        raise InputError("--driver", "", Absent(f"no image of {name} came"), "a camera that runs")
     return started.frames[name]
 
 

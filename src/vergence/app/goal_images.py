@@ -16,7 +16,8 @@ from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
 from vergence.runtime.recording import Recording
 
-GOAL = "goal.png"  # in the run's folder
+GOAL = "goal.png"  # in the run's folder; goal-2.png for the second of several tasks
+_BEFORE_S = 0.5  # by which the first image of a task may be older
 _LINES = 40  # matches drawn
 _QUALITY = 88  # JPEG
 _WIDTH_PX = 640  # of one image
@@ -26,29 +27,45 @@ def keep_goal(cell: Cell, folder: Path, camera: Camera) -> None:
     """Put the photograph, as the arm's camera would have taken it, into a run's folder."""
     import cv2
 
-    task = cell.task
-    if not isinstance(task, ReachTable) or task.goal is None:
-        return
-    photograph = read_photograph(cell.path.parent / task.goal, camera)
-    cv2.imwrite(str(folder / GOAL), photograph.image)
+    for number, task in enumerate(cell.tasks or (cell.task,)):
+        if isinstance(task, ReachTable) and task.goal is not None:
+            photograph = read_photograph(cell.path.parent / task.goal, camera)
+            name = _goal_file(number) if cell.tasks else GOAL
+            cv2.imwrite(str(folder / name), photograph.image)
 
 
 def goal_section(recording: Recording) -> str:
-    """Return the section of a report that shows the photograph; empty without one."""
-    file, name = recording.folder / GOAL, recording.info.task_camera
-    count = len(recording.image_times(name)) if file.is_file() else 0
-    if not count:
+    """Return the sections of a report that show the photographs; empty without any."""
+    tasks = recording.outcome.tasks
+    if not tasks:
+        return _section(recording, "Goal", GOAL, 0.0, float("inf"))
+    return "".join(
+        _section(recording, f"Goal of {t.name}", _goal_file(number), t.begun, t.outcome.time)
+        for number, t in enumerate(tasks)
+    )
+
+
+def _goal_file(number: int) -> str:
+    return f"goal-{number + 1}.png"
+
+
+def _section(recording: Recording, title: str, file_name: str, begun: float, ended: float) -> str:
+    """Return the section of one photograph, with the first and last image of its task."""
+    file, name = recording.folder / file_name, recording.info.task_camera
+    times = recording.image_times(name) if file.is_file() else np.empty(0)
+    during = np.flatnonzero((times >= begun - _BEFORE_S) & (times <= ended))
+    if not len(during):
         return ""
     raw = read_image_file(file)
     goal = grey_levels(grey_values(raw, str(file)), 255.0)
-    images = [image for _, image in recording.images(name, only=(0, count - 1))]
-    if any(image.shape != goal.shape for image in images):
+    images = [image for _, image in recording.images(name, only=(during[0], during[-1]))]
+    if not images or any(image.shape != goal.shape for image in images):
         return ""
     camera, first, last = recording.info.cameras[name], images[0], images[-1]
     found, caption = _matches(first, goal, camera)
     blended = _jpeg(np.hstack([_coloured(goal), _coloured(last), _blended(last, goal)]))
     return markup.section(
-        "Goal",
+        title,
         markup.image(found, "image/jpeg", caption),
         markup.image(
             blended,

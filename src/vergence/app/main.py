@@ -3,17 +3,34 @@
 Commands import what they need when they run, so that help comes at once.
 """
 
+import gc
+import re
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vergence.app import calibrate_command, campaign_commands, driver_commands, goal_command, names
-from vergence.app.options import CellName, Driver, ImageEvery, Images, Json, Out, Seed, Settings
+from vergence.app import names
+from vergence.app.options import (
+    CalibrateOptions,
+    CheckOptions,
+    CompareOptions,
+    GoalOptions,
+    Json,
+    MapOptions,
+    NewOptions,
+    Out,
+    PlanOptions,
+    RunOptions,
+    TrackOptions,
+    WatchOptions,
+    takes,
+)
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
-from vergence.errors import VergenceError
-from vergence.places import find_recording
+from vergence.app.warnings_once import warn_once
+from vergence.errors import InputError, VergenceError
+from vergence.places import cell_description, find_cell, find_recording
 from vergence.prebuilt import use_prebuilt_kernels
 from vergence.studies import PAPERS
 
@@ -30,7 +47,7 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
   vergence run puma560                    an arm follows a moving board; ends with a report to open
   vergence watch puma560                  the same in your browser, as it happens
   vergence run puma560 --no-images        without images, much faster
-  vergence cells                          the cells that come with vergence
+  vergence cells                          the built-in cells, and what each shows
   vergence new ARM.urdf --body LAST_LINK  a first cell for an arm of yours
   vergence compare panda                  several laws from the same random starts
   vergence reproduce nelson1995 --quick   a paper's experiments, checked
@@ -42,6 +59,10 @@ _NEXT = """vergence servoes robot arms by what their cameras see.
 
 def main() -> None:
     """Run the command line; a mistake of the user is one message and exit code 2."""
+    # What is loaded stays. Looking through it for garbage again and again, as Python does by
+    # default, takes a tenth of the time to the end of a short run.
+    gc.set_threshold(50_000, 20, 100)
+    warn_once()
     try:
         app()
     except VergenceError as error:
@@ -71,95 +92,93 @@ def start(
 
 
 @app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
-def run(
-    cell: CellName,
-    out: Out = None,
-    seed: Seed = None,
-    images: Images = True,
-    image_every: ImageEvery = 2,
-    settings: Settings = None,
-    driver: Driver = None,
-    goal: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PHOTO", help="Go where this was taken, by images alone; see `vergence goal`."
-        ),
-    ] = None,
-    points: Annotated[
-        str | None,
-        typer.Option(
-            metavar="U,V U,V …",
-            help="Track these points of the first image, by pixel, whatever the task was.",
-        ),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@takes(RunOptions)
+def run(options: RunOptions) -> int:
     """Run a work cell: progress, a summary, and a folder with recording and report."""
     from vergence.app.run import run as command
 
-    chosen = settings or ()
-    code = command(cell, out, seed, images, image_every, chosen, as_json, driver, goal, points)
-    raise typer.Exit(code)
+    return command(options)
 
 
-@app.command(epilog="Example: vergence report runs/puma560-20250131-120000")
+@app.command(
+    epilog="Example: vergence report runs/puma560-20250131-120000    or vergence report RUN OTHER"
+)
 def report(
     run: Annotated[
         Path,
         typer.Argument(
-            help="A run folder, finished or cut off, or its recording alone.",
+            help="A run folder, or a recording; a run that was cut off will do.",
             autocompletion=names.recordings,
         ),
     ],
+    other: Annotated[
+        Path | None,
+        typer.Argument(
+            help="A second run, to compare with the first.", autocompletion=names.recordings
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make the report of a recording again."""
+    """Make the report of a recording again, or one page of two recordings side by side."""
     find_recording(run)
-    from vergence.app.report import write_report
+    if other is None:
+        from vergence.app.report import write_report
 
-    path = write_report(run)
+        path = write_report(run)
+    else:
+        from vergence.app.report_pair import write_pair
+
+        path = write_pair(run, other)
     if as_json:
         emit({"command": "report", "run": path.parent, "report": path})
     else:
         say(f"report  {path}")
 
 
-@app.command(epilog="Example: vergence plan gantry --planner potential_field")
-def plan(
-    cell: Annotated[
-        str,
-        typer.Argument(
-            help="Name of a built-in cell, a cell file or folder, whose task is to reach.",
-            autocompletion=names.cells,
-        ),
+@app.command(epilog="Example: vergence export runs/puma560-20250131-120000 --out puma560-bag")
+def export(
+    run: Annotated[
+        Path,
+        typer.Argument(help="A run folder, or its recording.", autocompletion=names.recordings),
     ],
-    planner: Annotated[
-        str | None,
-        typer.Option(
-            help="optimised or potential_field, instead of the cell's.",
-            autocompletion=names.planners,
-        ),
+    out: Annotated[
+        Path | None, typer.Option(help="The bag's folder, instead of bag beside the recording.")
     ] = None,
-    out: Out = None,
-    seed: Seed = None,
-    images: Images = True,
-    settings: Settings = None,
     as_json: Json = False,
 ) -> None:
-    """Plan the way between two images and draw it; nothing moves."""
-    from vergence.app.plan import Request
+    """Write a recording as a ROS 2 bag: images, camera parameters, joints, set-points, poses."""
+    file = find_recording(run)
+    from vergence.runtime.bags import write_bag
+    from vergence.runtime.recording import Recording
+
+    bag = out or file.parent / "bag"
+    count = write_bag(Recording.open(file), bag)
+    if as_json:
+        emit({"command": "export", "run": file.parent, "bag": bag, "messages": count})
+    else:
+        say(f"bag  {bag}  ({count} messages)")
+
+
+@app.command(epilog="Example: vergence plan gantry --planner potential_field")
+@takes(PlanOptions)
+def plan(options: PlanOptions) -> int:
+    """Plan the path between two images and draw it; nothing moves."""
     from vergence.app.plan import plan as command
 
-    raise typer.Exit(command(Request(cell, planner, images, seed, settings or ()), out, as_json))
+    return command(options)
 
 
 @app.command(epilog="Example: vergence reproduce nelson1995 --quick")
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(help=f"Which paper: {', '.join(PAPERS)}.", autocompletion=names.papers)
+        str,
+        typer.Argument(
+            help=f"Name of the study: {', '.join(PAPERS)}.", autocompletion=names.papers
+        ),
     ],
     quick: Annotated[
-        bool, typer.Option("--quick", help="Exact projections instead of images: under a minute.")
+        bool,
+        typer.Option("--quick", help="Use exact projections instead of images: under a minute."),
     ] = False,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     out: Out = None,
@@ -174,122 +193,96 @@ def reproduce(
 @app.command(
     epilog="Example: vergence track footage/ --model box.obj --fx 548 --start 0.02,0.1,0.5,0,180,0"
 )
-def track(
-    images: Annotated[str, typer.Argument(help="A folder of images, or a video.")],
-    model: Annotated[str, typer.Option(help="The object: an OBJ, STL or MJCF file.")],
-    start: Annotated[
-        str,
-        typer.Option(
-            help="The object's pose in the camera, in the first image: "
-            "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file."
-        ),
-    ],
-    camera: Annotated[
-        Path | None, typer.Option(help="Intrinsics: a TOML, JSON or YAML file, ROS's too.")
-    ] = None,
-    fx: Annotated[float | None, typer.Option("--fx", help="Focal length, pixels.")] = None,
-    fy: Annotated[float | None, typer.Option("--fy", help="As --fx if absent.")] = None,
-    cx: Annotated[float | None, typer.Option("--cx", help="The middle if absent.")] = None,
-    cy: Annotated[float | None, typer.Option("--cy", help="The middle if absent.")] = None,
-    distortion: Annotated[str | None, typer.Option(help="k1,k2,p1,p2,k3; zero if absent.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Images per second.")] = None,
-    scale: Annotated[float, typer.Option(help="Metres in a unit of the model file.")] = 1.0,
-    contrast: Annotated[float, typer.Option(help="Least step of an edge, grey levels.")] = 5.0,
-    jolt: Annotated[float, typer.Option(help="Unforeseen motion, pixels per image.")] = 3.0,
-    share: Annotated[
-        float, typer.Option(help="Least share of the edges to be found, for an image to count.")
-    ] = 0.5,
-    overlay: Annotated[
-        bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
-    ] = True,
-    out: Out = None,
-    as_json: Json = False,
-) -> None:
+@takes(TrackOptions)
+def track(options: TrackOptions) -> int:
     """Follow a known object through footage: poses, covariances, an overlay film."""
-    from vergence.app.track import Request
     from vergence.app.track import track as command
 
-    intrinsics = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
-    request = Request(
-        images,
-        model,
-        start,
-        camera,
-        intrinsics,
-        distortion,
-        rate,
-        scale,
-        contrast,
-        jolt,
-        share,
-        overlay,
-    )
-    raise typer.Exit(command(request, out, as_json))
+    return command(options)
 
 
 @app.command(epilog="Example: vergence new my_robot.urdf --body tool0")
-def new(
-    model: Annotated[
-        str, typer.Argument(help="URDF or MJCF file of the arm; or package:NAME/PATH.")
-    ],
-    body: Annotated[
-        str,
-        typer.Option(
-            help="Last body of the arm; the camera is mounted on it. Omit it to list the bodies."
-        ),
-    ] = "",
-    out: Annotated[Path | None, typer.Option(help="Folder, instead of the model's name.")] = None,
-    camera: Annotated[
-        Path | None, typer.Option(help="Camera file with the lens, as `calibrate` writes it.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@takes(NewOptions)
+def new(options: NewOptions) -> int:
     """Write a first cell for an arm of yours: start, camera and target are found."""
     from vergence.app.new import new as command
 
-    raise typer.Exit(command(model, body, out, camera, as_json))
+    return command(options)
 
 
 @app.command(epilog="Example: vergence watch puma560    or vergence watch runs/NAME-TIME")
-def watch(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="CELL|RUN",
-            help="Name of a built-in cell, a cell file or folder; or the folder of a run.",
-            autocompletion=names.cells,
-        ),
-    ],
-    out: Out = None,
-    seed: Seed = None,
-    images: Images = True,
-    image_every: ImageEvery = 5,
-    settings: Settings = None,
-    host: Annotated[
-        str, typer.Option(help="Where to listen; only this machine can reach the default.")
-    ] = "127.0.0.1",
-    port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="8230 or the next free one if absent.")
-    ] = None,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
-    ] = True,
-    as_json: Json = False,
-) -> None:
+@takes(WatchOptions)
+def watch(options: WatchOptions) -> int:
     """Watch a cell run, or a recording, in the browser: turn its knobs, drag its target."""
-    from vergence.app.watch import Request
     from vergence.app.watch import watch as command
 
-    request = Request(
-        source, out, seed, images, image_every, settings or (), host, port, browser, as_json
-    )
-    raise typer.Exit(command(request))
+    return command(options)
 
 
-campaign_commands.register(app)
-calibrate_command.register(app)
-driver_commands.register(app)
-goal_command.register(app)
+@app.command(epilog="Example: vergence compare panda --laws image_based,constrained --starts 40")
+@takes(CompareOptions)
+def compare(options: CompareOptions) -> int:
+    """Run several laws from the same random draws: one table, and where each fails."""
+    find_cell(options.cell)  # a mistake is told before all is loaded
+    from vergence.app.compare import compare as command
+
+    return command(options)
+
+
+@app.command(name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2")
+@takes(MapOptions)
+def map_region(options: MapOptions) -> int:
+    """Map where a cell's law works: how far it follows the target, and what ends it."""
+    find_cell(options.cell)  # a mistake is told before all is loaded
+    from vergence.app.map_region import map_region as command
+
+    return command(options)
+
+
+@app.command(
+    epilog="Example: vergence calibrate photos/ --board 11x8 --square-mm 20 --marker-mm 15"
+)
+@takes(CalibrateOptions)
+def calibrate(options: CalibrateOptions) -> int:
+    """Find a camera's lens, and where it is mounted, from images of a board.
+
+    Images alone give the lens. With the arm's pose at each image, lens and mounting are
+    refined together. With --driver and --cell they come from a robot that you move from stop to
+    stop. With --latency an arm swings one joint by 2°, and the delay of the camera's
+    images comes from their motion.
+    """
+    if options.latency is not None:
+        from vergence.app.latency import latency as measure
+
+        return measure(options)
+    if options.write:
+        raise InputError("calibrate", "--write", True, "it with --latency CELL")
+    if options.settings and not options.driver:
+        raise InputError("calibrate", "--set", options.settings, "it with --driver NAME")
+    from vergence.app.calibrate import calibrate as command
+
+    return command(options)
+
+
+@app.command(epilog="Example: vergence check my_cell.toml --driver ur:192.168.1.10")
+@takes(CheckOptions)
+def check(options: CheckOptions) -> int:
+    """Bring up a robot: check clocks, joints and images, then move each joint slowly to and fro.
+
+    The arm moves at a tenth of its limits. No joint moves before everything at rest holds.
+    """
+    from vergence.app.bring_up import check as command
+
+    return command(options)
+
+
+@app.command(epilog="Example: vergence goal ur5 --at 0,-100,100,-90,-90,30 --out goal.png")
+@takes(GoalOptions)
+def goal(options: GoalOptions) -> int:
+    """Take a photograph to go back to: the image, its camera file and the joints beside it."""
+    from vergence.app.goal import goal as command
+
+    return command(options)
 
 
 @app.command(epilog="Example: vergence bench control")
@@ -297,25 +290,33 @@ def bench(
     chosen: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="NAMES", help="Which benchmarks; all if none.", autocompletion=names.benchmarks
+            metavar="NAMES",
+            help="Benchmarks to run. Default: all.",
+            autocompletion=names.benchmarks,
         ),
+    ] = None,
+    compare_with: Annotated[
+        Path | None,
+        typer.Option("--compare", metavar="FILE", help="Put an earlier run's --json beside it."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the benchmarks, peers beside us."""
     from vergence.app.bench import bench as command
 
-    raise typer.Exit(command(chosen or (), as_json))
+    raise typer.Exit(command(chosen or (), as_json, compare_with))
 
 
 @app.command(epilog="Example: vergence cells")
 def cells(as_json: Json = False) -> None:
-    """List the cells that come with vergence."""
+    """List the built-in cells, each with what it shows."""
+    described = {name: cell_description(name) for name in names.cells()}
     if as_json:
-        emit({"command": "cells", "cells": names.cells()})
+        emit({"command": "cells", "cells": names.cells(), "descriptions": described})
         return
-    for name in names.cells():
-        say(name)
+    width = max(map(len, described))
+    for name, text in described.items():
+        say(f"{name:{width}}  {re.split(r'[.:](?: |$)', text)[0]}.")
 
 
 if __name__ == "__main__":

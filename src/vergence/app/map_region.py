@@ -1,5 +1,6 @@
 """`vergence map`: where, how far and how fast a cell's law follows the target."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -8,19 +9,23 @@ from vergence.app import markup
 from vergence.app.campaign import (
     Running,
     html_table,
+    names_in,
+    prepare,
     reasons_table,
     run,
     write_page,
     write_table,
 )
 from vergence.app.output import SUCCESS, emit, say
+from vergence.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from vergence.app.figures import Panels
+    from vergence.app.figures.layout import Panels
+    from vergence.app.options import MapOptions
     from vergence.cell import Cell
-    from vergence.experiments import CellSource, Score, Trial, TrialResult
+    from vergence.experiments import Score, Trial, TrialResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,22 +33,24 @@ class Region:
     """What is mapped."""
 
     over: str  # "places" or "headings"
-    extent_m: float  # half a side of the square of places, or the way in each direction
+    extent_m: float  # half a side of the square of places, or length of a path from the middle
     steps: int  # places along a side, or directions
     speeds_m_s: tuple[float, ...]  # of the target; places are mapped at the first
     laws: tuple[str, ...]  # see `vergence.experiments.law_table`
 
 
-def map_region(source: "CellSource", region: Region, how: Running, as_json: bool) -> int:
+def map_region(options: "MapOptions") -> int:
     """Map a region; write image, data and page into the run folder; return the exit code."""
+    region = _region(options)
     from vergence.experiments import scores
 
+    source, how = prepare("map", options)
     cell = source.load()
     results = run(source, _trials(cell, region), how)
     data = write_table(how.folder / "map.csv", results)
     report, image = _write_page(cell, region, results, how)
     found = scores(results)
-    if as_json:
+    if options.as_json:
         answer = {"command": "map", "cell": cell.name, "over": region.over}
         files = {"run": how.folder, "data": data, "image": image, "report": report}
         emit({**answer, "laws": [_as_json(score) for score in found], **files})
@@ -51,9 +58,24 @@ def map_region(source: "CellSource", region: Region, how: Running, as_json: bool
     for score in found:
         say(f"{cell.name}, law {score.law}: {_in_words(score)}")
     say(f"  report   {report}")
-    say(f"  image  {image}")
+    say(f"  image    {image}")
     say(f"  data     {data}")
     return SUCCESS
+
+
+def _region(options: "MapOptions") -> Region:
+    laws = names_in("--laws", options.laws)
+    return Region(options.over, options.extent, options.steps, _speeds(options.speeds), laws)
+
+
+def _speeds(text: str) -> tuple[float, ...]:
+    try:
+        speeds = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        speeds = ()
+    if not speeds or not all(0 < speed < math.inf for speed in speeds):
+        raise InputError("--speeds", "", text, "numbers above zero with commas between, in m/s")
+    return speeds
 
 
 def _as_json(score: "Score") -> dict[str, object]:
@@ -105,7 +127,7 @@ def _write_page(
     title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
         f"{len(results)} runs on exact projections; {how.motion}; converged: every feature within "
-        f"{how.tolerance_px:g} px at the end."
+        f"{how.options.tolerance_px:g} px at the end."
     )
     return write_page(how.folder, "vergence map", title, remark, parts), image
 

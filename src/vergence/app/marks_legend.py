@@ -32,4 +32,4 @@ def marks_legend(trace: CameraTrace) -> str:
         for name, where in occurs.items()
         if where.any()
     )
-    return f'<p class="marks">{marks}</p>'
+    return f'<span class="marks">{marks}</span>'

@@ -1,20 +1,29 @@
 """Small pieces of HTML."""
 
+import json
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
+from typing import TYPE_CHECKING
 
-from vergence.app.figures import Panels, svg
+from vergence.app.figures import Chart, chart_svg
+from vergence.app.recorded_images import MarkedImage
 from vergence.app.table import Row
+
+if TYPE_CHECKING:
+    from vergence.app.figures.layout import Panels
+
+_PX_PER_INCH = 118.0  # of a figure: its text is then as large as the page's
 
 
 def page(title: str, body: str) -> str:
     """Return a whole page that needs nothing but itself."""
     folder = files("vergence.app")
     template = Template((folder / "page.html").read_text(encoding="utf-8"))
-    style = (folder / "page.css").read_text(encoding="utf-8")
+    sheets = (folder / "watch" / "page" / "colours.css", folder / "page.css")
+    style = "\n".join(sheet.read_text(encoding="utf-8") for sheet in sheets)
     return template.substitute(title=escape(title), style=style, body=body)
 
 
@@ -29,26 +38,60 @@ def data_url(data: bytes, kind: str) -> str:
     return f"data:{kind};base64,{b64encode(data).decode()}"
 
 
-def figure(panels: Panels | None, caption: str) -> str:
-    """Return a figure with its caption; empty without a figure."""
-    return image(svg(panels.figure), "image/svg+xml", caption) if panels else ""
+def script(name: str) -> str:
+    """Return a script of this package as part of a page."""
+    text = (files("vergence.app") / name).read_text(encoding="utf-8")
+    return f"<script>\n{text}</script>"
 
 
-def image(data: bytes, kind: str, caption: str) -> str:
-    """Return an image with its caption."""
+def chart(drawn: Chart | None, caption: str) -> str:
+    """Return a chart with its caption; empty without a chart."""
+    if drawn is None:
+        return ""
     text = escape(caption)
+    return f"<figure>{chart_svg(drawn, caption)}<figcaption>{text}</figcaption></figure>"
+
+
+def figure(panels: "Panels | None", caption: str) -> str:
+    """Return a figure by matplotlib with its caption; empty without a figure."""
+    if panels is None:
+        return ""
+    from vergence.app.figures.layout import svg
+
+    width = round(_PX_PER_INCH * panels.figure.get_figwidth())
+    return image(svg(panels.figure), "image/svg+xml", caption, width)
+
+
+def image(data: bytes, kind: str, caption: str, width: int | None = None) -> str:
+    """Return an image with its caption, no wider than so many pixels; as the page if None."""
+    text = escape(caption)
+    narrow = "" if width is None else f' style="max-width: {width}px"'
     return (
-        f'<figure><img src="{data_url(data, kind)}" alt="{text}">'
+        f'<figure><img src="{data_url(data, kind)}" alt="{text}"{narrow}>'
         f"<figcaption>{text}</figcaption></figure>"
     )
 
 
-def film(data: bytes | None, poster: bytes) -> str:
-    """Return a player that shows a JPEG until it plays; empty without a film."""
-    if data is None:
+def film(frames: Sequence[MarkedImage], name: str, caption: str) -> str:
+    """Return a player of images, which ``report.js`` makes play; empty with less than two.
+
+    Args:
+        frames: in order of time.
+        name: of what is shown, for who cannot see it.
+        caption: HTML that stands below.
+    """
+    if len(frames) < 2:
         return ""
-    still, source = data_url(poster, "image/jpeg"), data_url(data, "video/webm")
-    return f'<video controls muted loop playsinline poster="{still}" src="{source}"></video>'
+    jpegs = [b64encode(frame.jpeg).decode() for frame in frames]
+    shown = json.dumps({"times": [round(frame.time, 4) for frame in frames], "jpegs": jpegs})
+    return (
+        f'<figure class="film"><img src="data:image/jpeg;base64,{jpegs[0]}" alt="{escape(name)}">'
+        '<div class="controls"><button type="button">Play</button>'
+        f'<input type="range" min="0" max="{len(frames) - 1}" value="0" aria-label="image">'
+        f"<output>{frames[0].time:.2f} s</output></div>"
+        f'<script type="application/json">{shown}</script>'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
 
 
 def table(title: str, rows: Sequence[Row]) -> str:
@@ -67,6 +110,11 @@ def table(title: str, rows: Sequence[Row]) -> str:
 def cards(parts: Iterable[str]) -> str:
     """Return cards beside each other."""
     return f'<div class="cards">{"".join(parts)}</div>'
+
+
+def beside(*parts: str) -> str:
+    """Return parts beside each other, below each other where the page is narrow."""
+    return f'<div class="beside">{"".join(parts)}</div>' if any(parts) else ""
 
 
 def badge(text: str, good: bool) -> str:

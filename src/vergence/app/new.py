@@ -3,16 +3,20 @@
 import json
 import os
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from vergence.app.output import SUCCESS, emit, say
 from vergence.errors import InputError
 from vergence.places import CELL
+from vergence.registry import kinds
 
 if TYPE_CHECKING:
+    from vergence.app.options import NewOptions
     from vergence.arrays import FloatArray
     from vergence.camera import Camera
     from vergence.simulation.draft import Draft
@@ -33,8 +37,24 @@ _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper fac
 </mujoco>
 """
 
+_TARGET = """<!-- {name}, speckled so that features are found on it. Its frame is in its middle. -->
+<mujoco model="target">
+  <asset>
+    <texture name="speckles" type="cube" builtin="flat" rgb1="0.9 0.9 0.9" mark="random"
+             markrgb="0.1 0.1 0.1" random="0.2" width="32" height="32"/>
+    <material name="speckles" texture="speckles" specular="0"/>
+    <mesh name="target" file={file} scale="{scale:g} {scale:g} {scale:g}" inertia="shell"/>
+  </asset>
+  <worldbody>
+    <body name="target">
+      <geom type="mesh" mesh="target" pos="{middle}" material="speckles"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
 _CELL = """# A first cell for {model_name}: a camera on {body} keeps its place
-# before a board that wanders. Start, mounting and board were found by `vergence new`; the arm's
+# before a {what} that wanders. Start, mounting and {what} were placed by `vergence new`; the arm's
 # accelerations and the camera are guesses, to be replaced by your own.
 name = "{name}"
 duration_s = 10.0
@@ -51,12 +71,17 @@ acceleration_max_deg_s2 = {accelerations}  # a guess: see the robot's manual
 arm = "arm"
 position_m = {camera_m}  # in the last body: z looks ahead, x right, y down
 rotation_rpy_deg = {camera_rpy}
+radius_m = 0.03  # of a ball around it that must touch nothing
 {lens}
 rate_hz = 30.0
 latency_frames = 1  # from exposure until the image arrives
 
+[collision]
+avoid = ["self", "fixtures"]  # the arm's own links, the scene; also "arms", "target"
+margin_m = 0.01
+
 [target]
-model = "board.xml"
+model = "{what}.xml"
 position_m = {target_m}
 rotation_rpy_deg = {target_rpy}
 
@@ -75,6 +100,19 @@ feature_count = 4  # picked in the first image
 [law]
 kind = "image_based"  # joint limits, view and singularities are kept by the default solver
 gain = 3.0
+
+# The same cell on the robot: put in its driver and camera, remove the "# " of the lines below, then
+#   vergence check {name} --driver ur   looks at clocks, joints, images; nudges each joint
+#   vergence run {name} --driver ur     moves the robot
+# Drivers: {drivers}; your own is "my_robot:Driver", from my_robot.py beside this file.
+# [driver]
+# kind = "ur"
+# address = "192.168.1.10"
+#
+# [driver.cameras.wrist]
+# kind = "video"
+# source = 0  # /dev/video0
+# latency_s = 0.03  # from exposure to arrival; `vergence calibrate --latency` measures it
 """
 
 
@@ -82,32 +120,82 @@ _LENS = """resolution = [640, 480]
 focal_px = [600.0, 600.0]  # your lens, see `vergence calibrate --help`"""
 
 
-def new(model: str, body: str, out: Path | None, camera: Path | None, as_json: bool) -> int:
+def new(options: "NewOptions") -> int:
     """Write a cell for an arm into a new folder; return the exit code."""
     from vergence.camera import read_camera
     from vergence.cell.locate import locate_model
     from vergence.simulation.draft import SPAN, draft_cell
 
-    path = locate_model(Path(model), Path.cwd(), "vergence new", "MODEL")
-    folder = out or Path(path.stem)
+    path = locate_model(Path(options.model), Path.cwd(), "vergence new", "MODEL")
+    folder = options.out or Path(path.stem)
     if (folder / CELL).exists():
-        raise InputError(str(folder), "", "a cell is there already", "--out with another folder")
-    lens = None if camera is None else read_camera(camera)
-    draft = draft_cell(path, body, SPAN if lens is None else min(SPAN, _span(lens)))
+        raise InputError("--out", "", f"{folder}, which holds a cell", "another folder")
+    lens = None if options.camera is None else read_camera(options.camera)
+    span = SPAN if lens is None else min(SPAN, _span(lens))
+    target = None if options.target is None else _Target.of(options.target, options.target_scale)
+    draft = draft_cell(path, options.body, span, None if target is None else target.half_side_m)
     folder.mkdir(parents=True, exist_ok=True)
-    named = model if model.startswith("package:") else os.path.relpath(path, folder)
-    (folder / "board.xml").write_text(_BOARD.format(half=draft.half_side_m))
-    text = _text(draft, path.name, named, body, folder.resolve().name)
-    if camera is not None:
-        text = text.replace(_LENS, f"calibration = {json.dumps(os.path.relpath(camera, folder))}")
+    what = "board" if target is None else "target"
+    shape = _BOARD.format(half=draft.half_side_m) if target is None else target.as_mjcf(folder)
+    (folder / f"{what}.xml").write_text(shape)
+    packaged = options.model.startswith("package:")
+    named = options.model if packaged else os.path.relpath(path, folder)
+    text = _text(draft, path.name, named, options.body, folder.resolve().name, what)
+    if options.camera is not None:
+        calibration = json.dumps(os.path.relpath(options.camera, folder))
+        text = text.replace(_LENS, f"calibration = {calibration}")
     (folder / CELL).write_text(text)
-    if as_json:
+    if options.as_json:
         emit({"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()})
     else:
-        say(f"wrote {folder / CELL} and board.xml: {len(draft.arm.names)} joints up to {body}")
-        typed = shlex.quote(str(folder))
-        say(f"next:  vergence watch {typed}      or  vergence run {typed}")
+        _tell(folder, options.body, draft, what)
     return SUCCESS
+
+
+def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:
+    from vergence.robot import unserved_directions
+
+    say(f"wrote {folder / CELL} and {what}.xml: {len(draft.arm.names)} joints up to {body}")
+    if len(draft.arm.names) < 6:
+        unserved = unserved_directions(draft.J_camera, draft.distance_m)
+        say(f"  with so few joints the camera {unserved} (its own axes, at the start)")
+    typed = shlex.quote(str(folder))
+    say(f"next:  vergence watch {typed}      or  vergence run {typed}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """A mesh in the board's place."""
+
+    path: Path
+    scale: float  # m in a unit of the file
+    middle: "FloatArray"  # (3,) of the box around it, m
+    half_side_m: float
+
+    @classmethod
+    def of(cls, path: Path, scale: float) -> "_Target":
+        """Measure a mesh.
+
+        Raises:
+            InputError: if it is no mesh, or cannot be read.
+        """
+        from vergence.vision.known_object import load_object_model
+
+        if path.suffix.lower() not in (".obj", ".stl"):
+            kind = path.suffix or "(none)"
+            raise InputError("--target", "", f"a file of kind {kind}", "a mesh: .obj or .stl")
+        vertices = load_object_model(path, scale).vertices
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        return cls(path, scale, (low + high) / 2, 0.5 * float((high - low)[:2].max()))
+
+    def as_mjcf(self, folder: Path) -> str:
+        """Return the model of a target in a folder."""
+        return _TARGET.format(
+            name=self.path.name.replace("--", "__"),
+            file=quoteattr(os.path.relpath(self.path, folder)),
+            scale=self.scale,
+            middle=" ".join(f"{-value:.6g}" for value in self.middle),
+        )
 
 
 def _span(lens: "Camera") -> float:
@@ -116,16 +204,18 @@ def _span(lens: "Camera") -> float:
     return _SHARE * min(half_width, half_height)
 
 
-def _text(draft: "Draft", model_name: str, model: str, body: str, name: str) -> str:
+def _text(draft: "Draft", model_name: str, model: str, body: str, name: str, what: str) -> str:
     unit = np.where(draft.arm.sliding, 1.0, np.pi / 180)
     camera_m, camera_rpy = _placement(draft.T_body_camera)
     target_m, target_rpy = _placement(draft.T_world_target)
     return _CELL.format(
         model_name=model_name,
+        what=what,
         model=model,
         body=body,
         height=draft.height_m,
         name=name,
+        drivers=", ".join(kinds("driver")),
         start=_numbers(draft.start / unit, 3),
         rates=_limits(draft.arm.rate_max / unit),
         rates_from=draft.rates_from,

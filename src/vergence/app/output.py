@@ -8,17 +8,26 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from vergence.errors import InputError
+from vergence.places import RECORDING
+
 SUCCESS, FAILURE, BAD_INPUT = 0, 1, 2
 
 
 def say(text: str = "") -> None:
-    """Write a line for a person."""
-    print(text)
+    """Write a line for a person, who reads it now even where it goes through a pipe."""
+    print(text, flush=True)
 
 
 def warn(text: str) -> None:
     """Write a line that is not part of the answer."""
     print(text, file=sys.stderr)
+
+
+def confirmed(question: str) -> bool:
+    """Ask on stderr; no answer, as where nobody can give one, means no."""
+    print(question, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def emit(answer: Mapping[str, Any]) -> None:
@@ -33,6 +42,20 @@ def new_folder(name: str) -> Path:
     while folder.exists():
         folder, number = first.with_name(f"{first.name}-{number}"), number + 1
     return folder
+
+
+def run_folder(out: Path | None, overwrite: bool, name: str) -> Path:
+    """Return the folder that a run is recorded in: the one asked for, or a new one.
+
+    Raises:
+        InputError: if a recording is in it already, and is not to be replaced.
+    """
+    if out is None:
+        return new_folder(name)
+    if (out / RECORDING).exists() and not overwrite:
+        given = f"{out}, which holds a recording"
+        raise InputError("--out", "", given, "another folder, or --overwrite")
+    return out
 
 
 def _finite(value: Any) -> Any:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.runtime.results import CameraTrace
-from vergence.signals import SearchWindows
+from vergence.signals import SearchWindows, curves_of
 
 # Blue, green, red: Okabe and Ito's hues, brightened to stand out from grey textures.
 FOUND = (150, 230, 20)
@@ -39,6 +39,7 @@ class Marks:
     windows: SearchWindows  # around the predicted places
     desired_px: FloatArray  # (M, 2)
     true_px: FloatArray  # (M, 2)
+    joined: BoolArray  # (M,) see `ImagePoints`: points of curves
 
     @classmethod
     def at(cls, trace: CameraTrace, time: float) -> Self:
@@ -51,6 +52,7 @@ class Marks:
             SearchWindows(trace.window_center_px[row], trace.window_half_px[row]),
             trace.desired_px[row],
             trace.true_px[row],
+            trace.joined[row],
         )
 
 
@@ -69,6 +71,9 @@ def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[n
     scale = np.array(canvas.shape[1::-1]) / image.shape[::-1]
     for low, high in _corners(marks.windows, scale):
         _frame(canvas, low, high)
+    if marks.joined.any():
+        _draw_curves(canvas, marks, scale)
+        return canvas
     for point in _known(marks.tracked_px[~marks.asked], scale):
         _cross(canvas, point, UNASKED, _SMALL_PX, upright=False)
     for point in _known(marks.desired_px, scale):
@@ -80,6 +85,21 @@ def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[n
     for point in _known(marks.tracked_px[marks.asked & ~marks.found], scale):
         _cross(canvas, point, LOST, _RADIUS_PX, upright=False)
     return canvas
+
+
+def _draw_curves(canvas: NDArray[np.uint8], marks: Marks, scale: FloatArray) -> None:
+    """Draw curves that are desired, true and found as lines."""
+    import cv2
+
+    found = np.where(marks.found[:, None], marks.tracked_px, np.nan)
+    for curve in curves_of(marks.joined):
+        for points_px, ink in ((marks.true_px, TRUE), (marks.desired_px, DESIRED), (found, FOUND)):
+            places = _known(points_px[curve.points], scale)
+            if len(places) < len(curve.points):
+                continue
+            line = [np.array([_fixed(place) for place in places], dtype=np.int32)]
+            for color, thickness in ((_OUTLINE, _THICK), (ink, _THIN)):
+                cv2.polylines(canvas, line, curve.closed, color, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def _colored(image: ImageArray, width: int) -> NDArray[np.uint8]:

@@ -1,29 +1,20 @@
-"""`vergence plan`: plan the way of a cell whose task is to reach, draw it, move nothing."""
+"""`vergence plan`: plan the path of a cell whose task is to reach, draw it, move nothing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.errors import InputError, nearest
 from vergence.registry import kinds
 
 if TYPE_CHECKING:
+    from vergence.app.options import PlanOptions
     from vergence.planning import Path as PlannedPath
     from vergence.planning import Trajectory
 
 
-class Request(NamedTuple):
-    """What was asked for."""
-
-    cell: str
-    planner: str | None  # instead of the cell's
-    images: bool
-    seed: int | None
-    settings: Sequence[str]
-
-
-def plan(request: Request, out: Path | None, as_json: bool) -> int:
+def plan(options: "PlanOptions") -> int:
     """Plan, draw and say what came of it; return the exit code.
 
     Raises:
@@ -33,15 +24,17 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
     from vergence.cell import load_cell
     from vergence.cell.schema import ReachTable
 
-    changes = overrides(request.settings)
-    if request.planner is not None:
-        if ":" not in request.planner and request.planner not in kinds("planner"):
-            allowed = f"{nearest(request.planner, kinds('planner'))}, or module:Class"
-            raise InputError("vergence plan", "--planner", request.planner, allowed)
-        changes["task.planner"] = request.planner
-    cell = load_cell(request.cell, changes, request.seed)
+    changes = overrides(options.settings)
+    if options.planner is not None:
+        if ":" not in options.planner and options.planner not in kinds("planner"):
+            allowed = f"{nearest(options.planner, kinds('planner'))}, or module:Class"
+            raise InputError("vergence plan", "--planner", options.planner, allowed)
+        several = load_cell(options.cell, changes, options.seed).tasks
+        changes["tasks.0.planner" if several else "task.planner"] = options.planner
+    cell = load_cell(options.cell, changes, options.seed)
     if not isinstance(cell.task, ReachTable):
-        raise InputError(str(cell.path), "task.kind", cell.task.kind, "reach")
+        key = "tasks.0.kind" if cell.tasks else "task.kind"
+        raise InputError(str(cell.path), key, cell.task.kind, "reach")
     from vergence.app.plan_page import write_plan_page
     from vergence.app.progress import working
     from vergence.assembly import plan as plan_path
@@ -49,18 +42,18 @@ def plan(request: Request, out: Path | None, as_json: bool) -> int:
     from vergence.planning import Trajectory
 
     with working("planning"):
-        found = plan_path(cell, images=request.images)
+        found = plan_path(cell, images=options.images)
     answer: dict[str, object] = {"command": "plan", "cell": cell.name, "found": bool(found)}
     if not isinstance(found, PlannedPath):
         reason = str(found)
-        emit({**answer, "reason": reason}) if as_json else say(f"no path: {reason}")
+        emit({**answer, "reason": reason}) if options.as_json else say(f"no path: {reason}")
         return FAILURE
     trajectory = Trajectory.of(found, cell.task.camera_speed_m_s)
-    folder = out or new_folder(f"{cell.name}-plan")
+    folder = options.out or new_folder(f"{cell.name}-plan")
     numbers = _numbers(found, trajectory)
     with working("drawing"):
         report = write_plan_page(folder, cell.name, trajectory, numbers)
-    if as_json:
+    if options.as_json:
         emit({**answer, "planner": found.planner, "summary": numbers, "report": report})
     else:
         _tell(found, numbers, report)

@@ -46,9 +46,9 @@ def _header(cell: str, path: PlannedPath) -> str:
 def _rows(numbers: Mapping[str, float]) -> list[Row]:
     return [
         Row("duration", f"{numbers['duration_s']:.2f}", "s"),
-        Row("way of the camera", f"{numbers['camera_length_m']:.3f}", "m"),
+        Row("length of the camera's path", f"{numbers['camera_length_m']:.3f}", "m"),
         Row("least distance to the image's border", f"{numbers['image_margin_px']:.1f}", "px"),
-        Row("least room to a joint limit", f"{100 * numbers['joint_margin']:.1f}", "%", _ROOM),
+        Row("least distance to a joint limit", f"{100 * numbers['joint_margin']:.1f}", "%", _ROOM),
     ]
 
 
@@ -67,8 +67,8 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
         ),
         "space": (
             plan_space_figure(path),
-            "The camera's way; strokes show where it looks. How far and how large things are "
-            "follows from the believed d*.",
+            "The camera's path; strokes show its viewing direction. The scale follows from the "
+            "believed d*.",
         ),
     }
     figures = []

@@ -6,23 +6,25 @@ from pathlib import Path
 
 from vergence.app import markup
 from vergence.app.figures import (
-    Panels,
-    camera_figure,
-    constraints_figure,
-    error_figure,
-    estimate_figure,
-    joints_figure,
-    mark_events,
-    measures_figure,
-    paths_figure,
-    pose_error_figure,
-    target_figure,
-    twist_figure,
+    Chart,
+    camera_chart,
+    clearance_chart,
+    constraints_chart,
+    error_chart,
+    estimate_chart,
+    event_lines,
+    joints_chart,
+    measures_chart,
+    paths_chart,
+    pose_error_chart,
+    target_chart,
+    twist_chart,
 )
 from vergence.app.goal_images import goal_section
 from vergence.app.marks_legend import marks_legend
-from vergence.app.recorded_images import film, key_frames
-from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
+from vergence.app.recorded_images import camera_images
+from vergence.app.signals_csv import SIGNALS, write_signals
+from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows, task_rows
 from vergence.places import RECORDING
 from vergence.runtime.recording import Recording
 from vergence.runtime.results import CameraTrace, Run
@@ -45,6 +47,8 @@ def write_report(folder: Path) -> Path:
 def report(run: Run | str | Path, path: str | Path | None = None) -> Path:
     """Write the report of a run, one page that needs nothing but itself; return where it is.
 
+    The run's numbers are written beside it, as ``signals.csv``.
+
     Args:
         run: a run in memory, whose page is without images, a run folder, or a recording.
         path: of the page; beside the recording if None, or else ``report.html`` in this folder.
@@ -57,12 +61,19 @@ def report(run: Run | str | Path, path: str | Path | None = None) -> Path:
     if path is None and isinstance(told, Recording):
         own = told.path.name == RECORDING
         page = told.folder / REPORT if own else told.path.with_suffix(".html")
-    page.write_text(make_report(told), encoding="utf-8")
+    signals = page.with_name(SIGNALS if page.name == REPORT else f"{page.stem}-{SIGNALS}")
+    write_signals(told, signals)
+    page.write_text(make_report(told, signals.name), encoding="utf-8")
     return page
 
 
-def make_report(run: Run) -> str:
-    """Return the report as a page that needs nothing but itself."""
+def make_report(run: Run, signals: str = SIGNALS) -> str:
+    """Return the report as a page that needs nothing but itself.
+
+    Args:
+        run: what it is of.
+        signals: name of the file with the numbers beside it.
+    """
     parts = [
         _header(run),
         _summary(run),
@@ -72,7 +83,8 @@ def make_report(run: Run) -> str:
         *(_arm(run, name) for name in run.arms),
         _events(run),
         _cell(run),
-        _footer(run),
+        _footer(run, signals),
+        markup.script("report.js"),
     ]
     return markup.page(f"{run.info.cell} · vergence", "\n".join(filter(None, parts)))
 
@@ -88,7 +100,7 @@ def _header(run: Run) -> str:
 
 
 def _summary(run: Run) -> str:
-    tables = [markup.table("Run", run_rows(run))]
+    tables = [markup.table("Run", run_rows(run)), markup.table("Tasks", task_rows(run))]
     for name, camera in run.cameras.items():
         tables.append(markup.table(f"Camera {name}", camera_rows(camera)))
     for name, arm in run.arms.items():
@@ -100,32 +112,47 @@ def _summary(run: Run) -> str:
 def _camera(run: Run, name: str) -> str:
     trace = run.cameras[name]
     size = run.info.cameras[name]
+    film, key_frames = _images(run, name)
+    robot = _robot(run) if name == run.info.task_camera else ""
+    paths = _chart(
+        run,
+        paths_chart(size, trace),
+        f"Feature trajectories in the image, {size.width} × {size.height} px.",
+    )
     return markup.section(
         f"Camera {name}",
-        _images(run, name),
-        _figure(run, error_figure(trace), "Feature error over time."),
-        _figure(
+        markup.beside(film, robot),
+        markup.beside(paths, key_frames),
+        _chart(run, error_chart(trace), "Feature error over time."),
+        _chart(
             run,
-            pose_error_figure(trace),
+            pose_error_chart(trace),
             "True distance of the target from its desired pose in this camera.",
         ),
-        markup.figure(
-            paths_figure(size, trace),
-            f"Feature trajectories in the image, {size.width} × {size.height} px.",
-        ),
-        _figure(run, camera_figure(trace), "How the camera moved since the first image."),
+        _chart(run, camera_chart(trace), "How the camera moved since the first image."),
     )
 
 
-def _images(run: Run, camera: str) -> str:
-    frames = key_frames(run, camera) if isinstance(run, Recording) else []
-    if not (isinstance(run, Recording) and frames):
-        return ""
+def _images(run: Run, camera: str) -> tuple[str, str]:
+    """Return a camera's film and its key frames; both empty where none was recorded."""
+    if not isinstance(run, Recording):
+        return "", ""
+    images = camera_images(run, camera)
+    player = markup.film(images.film, f"what {camera} saw", marks_legend(run.cameras[camera]))
     stills = "".join(
-        markup.image(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in frames
+        markup.image(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in images.key_frames
     )
-    player = markup.film(film(run, camera), poster=frames[0].jpeg)
-    return f'{player}{marks_legend(run.cameras[camera])}<div class="frames">{stills}</div>'
+    return player, f'<div class="frames">{stills}</div>' if stills else ""
+
+
+def _robot(run: Run) -> str:
+    """Return a film of the cell from outside; empty where it cannot be drawn."""
+    if not isinstance(run, Recording):
+        return ""
+    from vergence.app.robot_film import robot_film
+
+    caption = "The cell from outside, drawn from the joints as they were measured."
+    return markup.film(robot_film(run), "the robot", caption)
 
 
 def _target(run: Run) -> str:
@@ -133,13 +160,13 @@ def _target(run: Run) -> str:
     trace = run.cameras.get(run.info.task_camera)
     if trace is None:
         return ""
-    moved = target_figure(trace, run.target)
+    moved = target_chart(trace, run.target)
     return markup.section(
         "Target",
-        _figure(run, moved, "How the target moved since the first image."),
-        _figure(
+        _chart(run, moved, "How the target moved since the first image."),
+        _chart(
             run,
-            estimate_figure(trace, run.target),
+            estimate_chart(trace, run.target),
             "How far the filter's target is from the true one.",
         ),
     )
@@ -158,36 +185,36 @@ def _arm(run: Run, name: str) -> str:
     )
     return markup.section(
         f"Arm {name}",
-        _figure(
+        _chart(run, joints_chart(arm, trace), "Joint positions and rates against their limits."),
+        _chart(
             run,
-            joints_figure(arm, trace),
-            "Joints against their limits at −1 and 1; a joint without limits is left out.",
-        ),
-        _figure(
-            run,
-            twist_figure(trace),
+            twist_chart(trace),
             f"Twist of {camera} that the law asked for; z is the optical axis.",
         ),
-        _figure(
+        _chart(
             run,
-            constraints_figure(trace),
+            constraints_chart(trace),
             "Limits that were active, and those relaxed for others of higher priority.",
         ),
-        _figure(
+        _chart(
             run,
-            measures_figure(trace),
+            clearance_chart(trace),
+            "Least distance of the arm from what it must not touch; nothing is drawn where nothing "
+            "is near.",
+        ),
+        _chart(
+            run,
+            measures_chart(trace),
             "How far the arm is from singularities and joint limits, [Nelson1995] eqs. (26), (27).",
         ),
     )
 
 
-def _figure(run: Run, panels: Panels | None, caption: str) -> str:
-    """Return a figure over time, the events marked in it."""
-    if panels is None:
-        return ""
-    panels.axes[0].set_xlim(0.0, max(run.duration, 1e-9))
-    mark_events(panels, run.events)
-    return markup.figure(panels, caption)
+def _chart(run: Run, chart: Chart | None, caption: str) -> str:
+    """Return a chart over the whole run, the events marked in it."""
+    if chart is not None:
+        chart = chart.until(run.duration, event_lines(run.events, run.duration))
+    return markup.chart(chart, caption)
 
 
 def _events(run: Run) -> str:
@@ -204,14 +231,15 @@ def _cell(run: Run) -> str:
     return markup.section("Cell file", folded if text else "")
 
 
-def _footer(run: Run) -> str:
+def _footer(run: Run, signals: str) -> str:
+    numbers = f"The numbers of every tick are in {escape(signals)} beside this page."
     if not isinstance(run, Recording):
-        return f"<footer>Made by vergence {escape(version('vergence'))}.</footer>"
+        return f"<footer>{numbers} Made by vergence {escape(version('vergence'))}.</footer>"
     cut = "" if run.complete else "The recording was cut off; this is what had been written. "
     if run.skipped:
         messages = "message" if run.skipped == 1 else "messages"
         cut += f"{run.skipped} {messages} could not be read. "
     return (
-        f"<footer>{cut}Made by vergence {escape(run.version)} from recording.mcap, which "
-        "also opens in Foxglove and Rerun.</footer>"
+        f"<footer>{cut}{numbers} Made by vergence {escape(run.version)} from "
+        f"{escape(run.path.name)}, which also opens in Foxglove and Rerun.</footer>"
     )

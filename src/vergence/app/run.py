@@ -4,69 +4,74 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say, warn
+from vergence.app.output import FAILURE, SUCCESS, emit, run_folder, say, warn
 from vergence.errors import InputError
 from vergence.places import RECORDING
 from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
+    from vergence.app.options import RunOptions
     from vergence.cell import Cell
     from vergence.runtime import Recorder, Run
 
 
-def run(
-    cell: str,
-    out: Path | None,
-    seed: int | None,
-    images: bool,
-    image_every: int,
-    settings: Sequence[str],
-    as_json: bool,
-    driver: str | None = None,
-    goal: Path | None = None,
-    points: str | None = None,
-) -> int:
+def run(options: "RunOptions") -> int:
     """Run a cell in a run folder and say how it went; return the exit code."""
-    from vergence.cell import load_cell
-
-    loaded = load_cell(cell, overrides(settings), seed)  # a mistake is told before all is loaded
-    if goal is not None and points is not None:
-        raise InputError("--points", "", points, "nothing with --goal: one task at a time")
-    if goal is not None:
-        from vergence.assembly import with_goal
-
-        loaded = with_goal(loaded, goal)
-    if points is not None:
-        from vergence.assembly import with_points
-
-        loaded = with_points(loaded, _pixels(points))
-    if out is not None and (out / RECORDING).exists():
-        raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
-    from vergence.app.goal_images import keep_goal
-    from vergence.app.progress import working
-    from vergence.app.report import write_report
+    cell = _loaded(options)  # a mistake is told before all is loaded
+    folder = run_folder(options.out, options.overwrite, cell.name)
     from vergence.runtime import Recorder
 
-    recorder = Recorder(out or new_folder(loaded.name), image_every)
-    result = _recorded(loaded, recorder, images, driver)
-    with working("writing the report"):
-        keep_goal(loaded, recorder.folder, result.info.cameras[loaded.task.camera])
-        report = write_report(recorder.folder)
-    if as_json:
-        emit(_answer(loaded.name, result, recorder.folder, report))
+    recorder = Recorder(folder, options.image_every)
+    result = _recorded(cell, recorder, options.images, options.driver)
+    if not options.as_json:
+        _tell_outcome(result)  # at once: what has to be read later is written later
+    report = _reported(cell, result, folder)
+    if options.as_json:
+        emit(_answer(cell.name, result, folder, report))
     else:
-        _tell(result, recorder.folder, report)
+        say(f"  report     {report}")
+        say(f"  recording  {folder / RECORDING}  (opens in Foxglove and Rerun)")
     return SUCCESS if result.outcome.succeeded else FAILURE
 
 
-def overrides(settings: Sequence[str]) -> dict[str, str]:
+def _loaded(options: "RunOptions") -> "Cell":
+    """Return the cell with the settings and the task that the options ask for."""
+    from vergence.cell import load_cell
+
+    cell = load_cell(options.cell, overrides(options.settings), options.seed)
+    if options.goal is not None and options.points is not None:
+        allowed = "nothing with --goal: one task at a time"
+        raise InputError("--points", "", options.points, allowed)
+    if options.goal is not None:
+        from vergence.assembly import with_goal
+
+        return with_goal(cell, options.goal)
+    if options.points is not None:
+        from vergence.assembly import with_points
+
+        return with_points(cell, _pixels(options.points))
+    return cell
+
+
+def _reported(cell: "Cell", result: "Run", folder: Path) -> Path:
+    """Write the report of a run that is over; return where it is."""
+    from vergence.app.goal_images import keep_goal
+    from vergence.app.progress import working
+    from vergence.app.report import write_report
+
+    with working("writing the report"):
+        keep_goal(cell, folder, result.info.cameras[cell.task.camera])
+        return write_report(folder)
+
+
+def overrides(settings: Sequence[str] | None) -> dict[str, str]:
     """Split ``key=value`` settings.
 
     Raises:
         InputError: if one has no key or no value.
     """
     pairs = {}
-    for setting in settings:
+    for setting in settings or ():
         key, equals, value = (part.strip() for part in setting.partition("="))
         if not (key and equals):
             raise InputError("--set", "", setting, "key=value, such as duration_s=5")
@@ -86,9 +91,17 @@ def _pixels(text: str) -> list[tuple[float, float]]:
 def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | None = None) -> "Run":
     """Run a cell, in simulation or with a driver; whatever happens, the recording is closed."""
     from vergence.app.progress import RunProgress, working
-    from vergence.assembly import open_driver, rehearse, run_cell, run_driver
+    from vergence.assembly import (
+        check_driver,
+        open_driver,
+        rehearse,
+        run_cell,
+        run_driver,
+        servo_lag_s,
+    )
 
     if driver is not None:
+        check_driver(cell, driver)
         with working("rehearsing in simulation"):
             rehearse(cell)
     try:
@@ -97,7 +110,10 @@ def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | No
                 return run_cell(cell, (recorder, progress), images)
             opened = open_driver(cell, driver)
             try:
-                return run_driver(cell, opened, (recorder, progress), images)
+                lag_s, listeners = servo_lag_s(cell, driver), (recorder, progress)
+                return run_driver(
+                    cell, opened, listeners, images, servo_lag_s=lag_s, self_calibration=True
+                )
             finally:
                 opened.close()
     except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
@@ -117,24 +133,25 @@ def _tell_interrupted(recorder: "Recorder") -> None:
 
 
 def _answer(name: str, result: "Run", folder: Path, report: Path) -> Mapping[str, object]:
-    outcome = result.outcome
+    from vergence.runtime.recording import outcome_json
+
     return {
         "command": "run",
         "cell": name,
-        "outcome": {
-            "kind": outcome.kind.value,
-            "reason": outcome.reason,
-            "time": outcome.time,
-        },
+        "outcome": outcome_json(result.outcome),
         "summary": result.summary,
         "run": folder,
         "report": report,
     }
 
 
-def _tell(result: "Run", folder: Path, report: Path) -> None:
+def _tell_outcome(result: "Run") -> None:
+    from vergence.runtime.results import UNDER_ACTUATED
+
     summary = result.summary
     say(str(result.outcome))
+    for task in result.outcome.tasks:
+        say(f"  {task.begun:6.2f} s  {task.name}: {task.outcome}")
     off_mm = 1e3 * summary.get("final_pose_error_m", 0.0)
     off_deg = summary.get("final_pose_error_deg", 0.0)
     words = [
@@ -145,5 +162,6 @@ def _tell(result: "Run", folder: Path, report: Path) -> None:
         (f"{summary.get('real_time_factor', 0.0):.1f} × real time", "real_time_factor"),
     ]
     say("  " + " · ".join(text for text, key in words if key in summary))
-    say(f"  report     {report}")
-    say(f"  recording  {folder / 'recording.mcap'}  (opens in Foxglove and Rerun)")
+    for event in result.events:
+        if event.name == UNDER_ACTUATED:
+            say(f"  {event.text}")

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vergence.app.figures.arm import normalized
+from vergence.app.figures.arm import CLEAR_OF, clearance, normalized
 from vergence.app.figures.constraints import constraint_names
 from vergence.arrays import FloatArray
 from vergence.runtime import ArmInfo
-from vergence.runtime.results import ArmTrace, CameraTrace, Run
+from vergence.runtime.results import UNDER_ACTUATED, ArmTrace, CameraTrace, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +24,14 @@ class Row:
 
 def run_rows(run: Run) -> list[Row]:
     """Return what concerns the whole run, with what the loop itself had to say."""
-    rows = [Row("run time", f"{run.duration:.2f}", "s")]
+    rows = [Row("run time", f"{run.duration:.2f}", "s", "from the first tick to the last")]
     if run.info.seed is not None:
-        rows.append(Row("seed", str(run.info.seed)))
+        rows.append(Row("seed", str(run.info.seed), "", "of everything drawn by chance"))
+    rows += [
+        Row("unserved directions", "some", "", event.text)
+        for event in run.events
+        if event.name == UNDER_ACTUATED
+    ]
     return rows + [
         _summary_row(name, value)
         for name, value in run.summary.items()
@@ -34,43 +39,83 @@ def run_rows(run: Run) -> list[Row]:
     ]
 
 
+def task_rows(run: Run) -> list[Row]:
+    """Return how each of several tasks ended."""
+    return [
+        Row(
+            task.name,
+            task.outcome.kind.value,
+            "",
+            f"{task.begun:.2f} to {task.outcome.time:.2f} s: {task.outcome.reason}",
+        )
+        for task in run.outcome.tasks
+    ]
+
+
 def camera_rows(trace: CameraTrace) -> list[Row]:
     """Return how well a camera's points were followed."""
-    rows = [Row("images", str(len(trace.time)))]
+    rows = [Row("images", str(len(trace.time)), "", "that the loop had")]
     if asked := np.count_nonzero(trace.asked):
         share = np.count_nonzero(trace.found & trace.asked) / asked
-        note = "" if trace.asked.all() else "of those looked for"
-        rows.append(Row("points found", f"{100 * share:.1f}", "%", note))
+        rows.append(Row("points found", f"{100 * share:.1f}", "%", "of those looked for"))
     if (looked := np.count_nonzero(trace.asked.any(axis=1))) < len(trace.time):
         rows.insert(1, Row("looked into", str(looked), "", "of the others no corner was chosen"))
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
-        rows.append(Row("final error", f"{error[-1]:.2f}", "px", "farthest point, last image"))
-        rows.append(Row("largest error", f"{error.max():.2f}", "px"))
+        note = f"farthest point, last image{_lag(trace)}"
+        rows.append(Row("final error", f"{error[-1]:.2f}", "px", note))
+        rows.append(Row("largest error", f"{error.max():.2f}", "px", "farthest point, any image"))
     if len(drift):
-        rows.append(Row("largest drift", f"{drift.max():.2f}", "px", "tracked against true"))
+        note = "tracked point from the true one"
+        rows.append(Row("largest drift", f"{drift.max():.2f}", "px", note))
     if len(trace.time):
         late = 1e3 * float(np.median(trace.received - trace.time))
         rows.append(Row("age of an image", f"{late:.0f}", "ms", "median, when the loop had it"))
     return rows
 
 
+def _lag(trace: CameraTrace) -> str:
+    """Return what to expect of the last error, if the target was moving then."""
+    with_error = np.flatnonzero(np.isfinite(trace.error_px).any(axis=1))
+    known = np.isfinite(trace.T_world_target[:, 0, 3])
+    known[with_error[-1] + 1 if len(with_error) else 0 :] = False
+    time, place = trace.time[known], trace.T_world_target[known, :3, 3]
+    late = time >= time[-1] - _LATE_S if len(time) else np.empty(0, dtype=bool)
+    if np.count_nonzero(late) < 2:
+        return ""
+    distance = float(np.linalg.norm(place[-1] - place[late][0]))
+    speed = distance / float(time[-1] - time[late][0])
+    if speed < _MOVING_M_S:
+        return ""
+    return f"; the target moves at {speed:.2g} m/s: a law that does not know this lags behind it"
+
+
 def arm_rows(info: ArmInfo, trace: ArmTrace) -> list[Row]:
     """Return how close an arm came to what it must not do."""
-    return [*_measure_rows(trace), *_limit_rows(info, trace)]
+    return [*_measure_rows(trace), *_clearance_rows(trace), *_limit_rows(info, trace)]
 
 
 def _measure_rows(trace: ArmTrace) -> Iterator[Row]:
     measure = trace.manipulability[np.isfinite(trace.manipulability)]
     if len(measure) and measure[0] > 0:
         ratio = measure.min() / measure[0]
-        yield Row("least manipulability", f"{ratio:.2f}", "", "w′ as a share of the start's")
+        note = "w′ as a share of its value at the start"
+        yield Row("least manipulability", f"{ratio:.2f}", "", note)
     penalty = trace.penalty[np.isfinite(trace.penalty)]
     if len(penalty):
         yield Row(
             "limit clearance P", f"{penalty.min():.2f}", "",
             "1 = far from every joint limit, 0 = at one",
         )  # fmt: skip
+
+
+def _clearance_rows(trace: ArmTrace) -> Iterator[Row]:
+    for kind, name in CLEAR_OF.items():
+        distance = clearance(trace, kind)
+        if np.isfinite(distance).any():
+            nearest = int(np.nanargmin(distance))
+            where = f"at {trace.time[nearest]:.2f}\u00a0s, as the law saw it"
+            yield Row(f"nearest to {name}", f"{1e3 * distance[nearest]:.1f}", "mm", where)
 
 
 def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
@@ -84,7 +129,7 @@ def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
         for name, shares in (("nearest a joint limit", position), ("fastest", rate)):
             if np.isfinite(shares).any():
                 row, joint = np.unravel_index(np.nanargmax(shares), shares.shape)
-                where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f} s; {note}"
+                where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f}\u00a0s; {note}"
                 yield Row(f"{who}: {name}", f"{100 * shares[row, joint]:.0f}", "%", where)
 
 
@@ -112,8 +157,10 @@ def _worst(distances: FloatArray) -> FloatArray:
     return np.asarray(np.nanmax(distances[known], axis=1)) if known.any() else np.empty(0)
 
 
+_LATE_S, _MOVING_M_S = 0.2, 1e-3  # how long before the end a target still counts as moving
 _RATES = {
-    "joint margin": "rad/s or m/s"
+    "collision": "m/s",
+    "joint margin": "rad/s or m/s",
 }  # of limits that can be relaxed; the others have no length
 
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
@@ -123,6 +170,14 @@ _DERIVED = {  # what the rows of cameras and arms say as well, from the recordin
     "max_drift_px",
     "min_manipulability_ratio",
     "min_penalty",
+}
+
+_NOTES = {
+    "real_time": "simulated seconds in a second of computing",
+    "final_target_error": "estimated target from the true one, last image",
+    "max_target_error": "estimated target from the true one, any image",
+    "final_pose_error": "task's camera from its desired pose, last image",
+    "max_pose_error": "task's camera from its desired pose, any image",
 }
 
 _UNITS = {
@@ -142,10 +197,10 @@ _UNITS = {
 def _summary_row(name: str, value: float | str) -> Row:
     """Read the unit off a name's end, as our names have it."""
     ending = next((end for end in _UNITS if name.endswith(end)), "")
-    words = name.removesuffix(ending).replace("_", " ")
-    unit = _UNITS.get(ending, "")
+    stem = name.removesuffix(ending)
+    words, unit, note = stem.replace("_", " "), _UNITS.get(ending, ""), _NOTES.get(stem, "")
     if isinstance(value, str):
-        return Row(words, value, unit)
+        return Row(words, value, unit, note)
     if unit == "m" and abs(value) < 0.1:
         value, unit = 1e3 * value, "mm"
-    return Row(words, f"{value:.3g}", unit)
+    return Row(words, f"{value:.3g}", unit, note)

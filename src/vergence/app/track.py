@@ -12,6 +12,7 @@ from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
+    from vergence.app.options import TrackOptions
     from vergence.app.tracking.follower import ObjectFollower, Step
     from vergence.app.tracking.footage import Footage, FootageFrame
     from vergence.camera import Camera
@@ -23,23 +24,6 @@ _NO_SAMPLES: dict[str, Any] = {
 }
 _KEY_FRAMES = 6  # spread over the footage
 _MOST_KEY_FRAMES = 24  # with those where the sighting changes
-
-
-class Request(NamedTuple):
-    """What the command line asks for."""
-
-    images: str
-    model: str
-    start: str
-    camera: Path | None
-    intrinsics: Mapping[str, float | None]  # fx, fy, cx, cy
-    distortion: str | None
-    rate_hz: float | None
-    scale: float
-    contrast: float
-    jolt_px: float
-    least_share: float
-    overlay: bool
 
 
 class Tracked(NamedTuple):
@@ -54,63 +38,64 @@ class Tracked(NamedTuple):
     median_ms: float  # an image, drawing and files left out
 
 
-def track(request: Request, out: Path | None, as_json: bool) -> int:
+def track(options: "TrackOptions") -> int:
     """Follow an object through footage into a run folder; return the exit code."""
     from vergence.app.tracking.footage import open_footage
     from vergence.vision.known_object import load_object_model
 
-    model = load_object_model(request.model, request.scale)
-    footage = open_footage(request.images, request.rate_hz)
+    model = load_object_model(options.model, options.scale)
+    footage = open_footage(options.images, options.rate, options.topic)
     frames = footage.frames()
     first = next(frames)
-    camera = _camera(request, first)
-    follower = _follower(request, model, camera, footage)
-    folder = out or new_folder(f"track-{Path(request.images).stem or 'footage'}")
+    camera = _camera(options, first)
+    follower = _follower(options, model, camera, footage)
+    folder = options.out or new_folder(f"track-{Path(options.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
-    run = _Run(folder, footage, model, camera, follower, request.overlay)
+    run = _Run(folder, footage, model, camera, follower, options.overlay)
     tracked = run.through(first, frames)
     files = run.files()
-    if as_json:
-        emit(_answer(request, tracked, files, folder))
+    if options.as_json:
+        emit(_answer(options, tracked, files, folder))
     else:
         _tell(tracked, files, folder)
     return SUCCESS if tracked.outcome.succeeded else FAILURE
 
 
-def _camera(request: Request, first: "FootageFrame") -> "Camera":
+def _camera(options: "TrackOptions", first: "FootageFrame") -> "Camera":
     from vergence.app.tracking.intrinsics import camera_of_options
     from vergence.camera import read_camera
     from vergence.errors import InputError
 
     height, width = first.image.shape
-    if request.camera is None:
-        return camera_of_options(request.intrinsics, request.distortion, width, height)
-    for key, value in (*request.intrinsics.items(), ("distortion", request.distortion)):
+    intrinsics = {"fx": options.fx, "fy": options.fy, "cx": options.cx, "cy": options.cy}
+    if options.camera is None:
+        return camera_of_options(intrinsics, options.distortion, width, height)
+    for key, value in (*intrinsics.items(), ("distortion", options.distortion)):
         if value is not None:
             raise InputError("vergence track", f"--{key}", value, "either --camera or intrinsics")
-    return read_camera(request.camera, width, height)
+    return read_camera(options.camera, width, height)
 
 
 def _follower(
-    request: Request, model: "ObjectModel", camera: "Camera", footage: "Footage"
+    options: "TrackOptions", model: "ObjectModel", camera: "Camera", footage: "Footage"
 ) -> "ObjectFollower":
     from vergence.app.tracking.follower import FollowRule, ObjectFollower
     from vergence.app.tracking.start import starting_pose
     from vergence.errors import InputError
     from vergence.vision.known_object import EdgeTracker
 
-    for key, value in (("--contrast", request.contrast), ("--jolt", request.jolt_px)):
+    for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("vergence track", key, value, "a number above zero")
-    if not 0.2 <= request.least_share <= 1.0:
+    if not 0.2 <= options.share <= 1.0:
         allowed = "0.2 … 1: with fewer of its edges an object is not told from its background"
-        raise InputError("vergence track", "--share", request.least_share, allowed)
-    start = starting_pose(request.start, camera)
-    tracker = EdgeTracker(model, contrast=request.contrast)
-    share = request.least_share
+        raise InputError("vergence track", "--share", options.share, allowed)
+    start = starting_pose(options.start, camera)
+    tracker = EdgeTracker(model, contrast=options.contrast)
+    share = options.share
     usual = FollowRule()
     rule = FollowRule(
-        jolt_px=request.jolt_px,
+        jolt_px=options.jolt,
         least_of_all=share,
         least_share=min(usual.least_share, share + 0.07),
         surprising_share=max(usual.surprising_share, share),
@@ -234,15 +219,15 @@ def _outcome(steps: "list[Step]") -> Outcome:
 
 
 def _answer(
-    request: Request, tracked: Tracked, files: Mapping[str, Any], folder: Path
+    options: "TrackOptions", tracked: Tracked, files: Mapping[str, Any], folder: Path
 ) -> dict[str, Any]:
     from vergence.app.tracking.results import pose_record
 
     outcome = tracked.outcome
     return {
         "command": "track",
-        "images": request.images,
-        "model": request.model,
+        "images": options.images,
+        "model": options.model,
         "outcome": {
             "kind": outcome.kind.value,
             "reason": outcome.reason,

@@ -3,7 +3,7 @@
 from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.open_driver import open_driver
+from vergence.assembly.open_driver import check_driver, open_driver, servo_lag_s
 from vergence.assembly.parts import Parts
 from vergence.assembly.photograph import with_goal
 from vergence.assembly.plan import plan
@@ -17,12 +17,14 @@ __all__ = [
     "assemble_parts",
     "build_law",
     "changed_cell",
+    "check_driver",
     "open_driver",
     "plan",
     "rehearse",
     "run",
     "run_cell",
     "run_driver",
+    "servo_lag_s",
     "with_goal",
     "with_points",
 ]

@@ -3,13 +3,14 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.build_law import PLAN_MARGIN_JOINT, PLAN_MARGIN_PX
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.limits_on_plan import PLAN_MARGIN_JOINT, PLAN_MARGIN_PX
 from vergence.cell.schema import TrackTable
 from vergence.control.depth.from_features import fixes_pose
 from vergence.estimation import CornerView, NoPose, fit_pose
 from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import (
+    FixedReference,
     Obstacle,
     OptimisedPlanner,
     Path,
@@ -17,6 +18,10 @@ from vergence.planning import (
     PlanningProblem,
     Trajectory,
 )
+from vergence.planning.approach import Worker
+from vergence.planning.replanner import Replanner
+from vergence.runtime.stages import Planner
+from vergence.signals import Reference
 
 _CAMERA_SPEED = 0.25  # m/s on the way
 
@@ -34,23 +39,72 @@ def desired_depth(
     return depth
 
 
-def plan_approach(
-    context: LawContext, task: TrackTable, points_px: FloatArray, desired_px: FloatArray
-) -> Trajectory | PlanFailure | None:
-    """Plan from what the first image shows to the desired points.
+def approach_to(
+    context: LawContext,
+    task: TrackTable,
+    points_px: FloatArray,
+    reference: Reference,
+    worker: Worker,
+) -> Planner | PlanFailure:
+    """Return what leads to the desired points, and plans again where the arm stalls.
+
+    Without a plan, where goal or scale are not known or no path was found, the law goes straight.
+
+    Args:
+        context: of the task.
+        task: with the desired points.
+        points_px: the features in the first image, (M, 2).
+        reference: with the desired points.
+        worker: plans while the loop runs.
 
     Returns:
-        The path in time; why the goal cannot be reached at all; or None where the law has to go
-        without a plan: goal or scale are not known, or no path was found though there may be one.
+        The planner; or why the goal cannot be reached at all.
+    """
+    desired_px = reference.points_px
+    assert desired_px is not None
+    if task.approach != "auto" or not _can_plan(context, task):
+        return FixedReference(reference)
+    desired = desired_px.copy()
+
+    def plan(points_px: FloatArray, q: FloatArray) -> Trajectory | str:
+        found = plan_approach(context, task, points_px, desired, q)
+        return found if isinstance(found, Trajectory) else str(found)
+
+    found = plan_approach(context, task, points_px, desired, context.joints[task.arm])
+    if isinstance(found, Trajectory):
+        return Replanner(found, plan, worker)
+    if found.proved or found.obstacle is Obstacle.REACH:
+        return found
+    return Replanner(FixedReference(reference), plan, worker)
+
+
+def plan_approach(
+    context: LawContext,
+    task: TrackTable,
+    points_px: FloatArray,
+    desired_px: FloatArray,
+    q: FloatArray,
+) -> Trajectory | PlanFailure:
+    """Plan from where known features are seen to where they are desired.
+
+    Args:
+        context: of the task.
+        task: whose camera sees them.
+        points_px: as they are seen, (M, 2).
+        desired_px: as they are desired, (M, 2).
+        q: joint positions there, (n,).
+
+    Returns:
+        The path in time, or what stood in the way.
     """
     features = context.known_features(task.camera)
-    if features is None or not _can_plan(context, task):
-        return None
+    assert features is not None
     now = _pose_in_camera(context, task, points_px)
     goal = _pose_in_camera(context, task, desired_px)
     if now is None or goal is None:
-        return None
-    arm, q = context.arm_to_camera(task.camera), context.joints[task.arm]
+        where = "at the start" if now is None else "as desired"
+        return PlanFailure(Obstacle.START, f"the features {where} do not fix the target's pose")
+    arm = context.arm_to_camera(task.camera)
     T_world_target = arm.forward_kinematics(q) @ now
     problem = PlanningProblem(
         arm,
@@ -60,17 +114,17 @@ def plan_approach(
         transform_points(T_world_target, features),
         PLAN_MARGIN_PX,
         PLAN_MARGIN_JOINT,
+        bodies=context.bodies,
     )
     found = OptimisedPlanner().plan(problem)
-    if isinstance(found, Path):
-        return Trajectory.of(found, _CAMERA_SPEED)
-    return found if found.proved or found.obstacle is Obstacle.REACH else None
+    return Trajectory.of(found, _CAMERA_SPEED) if isinstance(found, Path) else found
 
 
 def _can_plan(context: LawContext, task: TrackTable) -> bool:
     """Tell whether a goal and a scale exist: stated points of known features at rest."""
-    stated = not isinstance(task.desired, str)
-    return stated and not context.is_fixed and task.tool is None and context.declared_stationary
+    if isinstance(task.desired, str) or context.known_features(task.camera) is None:
+        return False
+    return not context.is_fixed and task.tool is None and context.declared_stationary
 
 
 def _pose_in_camera(
@@ -82,6 +136,8 @@ def _pose_in_camera(
     """
     features = context.known_features(task.camera)
     if features is None or not fixes_pose(features) or features.shape[0] != len(points_px):
+        return None
+    if not np.isfinite(points_px).all():
         return None
     view = CornerView(context.cameras[task.camera], np.eye(4), np.asarray(points_px))
     fit = fit_pose(features, [view])

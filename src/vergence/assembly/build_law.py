@@ -2,18 +2,24 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.limits_on_plan import (
+    PLAN_MARGIN_JOINT,
+    PLAN_MARGIN_PX,
+    limits_on_plan,
+)
 from vergence.assembly.motion_needed import require_motion
+from vergence.cell import Cell
 from vergence.cell.schema import ReachTable, TrackTable
 from vergence.control import (
     CameraMounting,
     CarriedDepth,
     Depth,
+    DepthFromCamera,
     DepthFromFeatures,
     HeldDepth,
     ImageBased,
@@ -38,8 +44,6 @@ from vergence.loading import asking
 from vergence.parts import kind_of
 from vergence.registry import kinds
 
-PLAN_MARGIN_PX, PLAN_MARGIN_JOINT = 10.0, 0.01  # of a plan whose task states none
-_OF_PLAN = 0.5  # share of a plan's margins that is kept: it was made to be followed to within them
 _POINT_DEPTHS, _POSE_DEPTHS = (0.5, 2.0), (0.9, 1.1)  # bounds on true over believed depth
 _FEWEST_OF_PATH = 3  # points that leave no direction of the camera open
 
@@ -53,7 +57,7 @@ def build_law(context: LawContext) -> Law:
     cell = context.cell
     if not isinstance(cell.law, ServoSettings):
         return _own_law(context)
-    _require_suitable(context)
+    require_suitable(cell)
     try:
         law = _pose_servo(context) if _is_pose(cell.law) else _servo(context)
     except InputError as error:
@@ -72,7 +76,7 @@ def _own_law(context: LawContext) -> Law:
     names = [context.camera_name, *(n for n in context.points_px if n != context.camera_name)]
     setting = LawSetting(
         context.arm,
-        {name: _mounting(context, name) for name in names},
+        {name: mounting_of(context, name) for name in names},
         dict(_known_depths(context)),
         context.period_s(),
         context.inner_period_s,
@@ -99,9 +103,12 @@ def _is_pose(settings: ServoSettings) -> bool:
     return len(settings.objectives) == 1 and isinstance(settings.objective, PositionBased)
 
 
-def _require_suitable(context: LawContext) -> None:
-    """Refuse an objective that the task cannot feed."""
-    cell = context.cell
+def require_suitable(cell: Cell) -> None:
+    """Refuse an objective that the task cannot feed.
+
+    Raises:
+        InputError: that names it.
+    """
     follows = cell.task.kind == "follow"
     for term in cell.law.objectives:
         needs_pose = isinstance(term.objective, PositionBased)
@@ -125,7 +132,7 @@ def _servo(context: LawContext) -> Servo:
     depth_m = None if reaches else {name: context.depth_m(name, settings.depth_m) for name in names}
     return Servo(
         context.arm,
-        {name: _mounting(context, name) for name in names},
+        {name: mounting_of(context, name) for name in names},
         settings.terms,
         limits=_limits(context),
         solver=settings.solver,
@@ -133,11 +140,12 @@ def _servo(context: LawContext) -> Servo:
         situation=Situation(
             context.period_s(),
             settings.motion(depth, context.declared_stationary),
-            None if context.is_fixed else context.solids,
+            None if context.is_fixed or context.points_on_anything else context.solids,
             _POINT_DEPTHS,
             context.joints[cell.task.arm],
             _FEWEST_OF_PATH if reaches else 1,
             {name: known for name in names if (known := context.known_features(name)) is not None},
+            context.clearance,
         ),
     )
 
@@ -166,9 +174,16 @@ def _depth(context: LawContext, names: list[str]) -> Depth:
     """
     law = context.cell.law
     depth = law.depth if law.depth is not None else _best_depth(context, names)
+    if isinstance(depth, DepthFromCamera):
+        for name in names:
+            if context.cell.cameras[name].depth is None:
+                allowed = f"another depth, or a table [cameras.{name}.depth] of a depth camera"
+                raise InputError(str(context.cell.path), "law.depth", "from_camera", allowed)
     if law.feed_forward and not depth.estimates_motion:
         given = f"true, with the depth {kind_of(depth)}"
-        allowed = "from_features or from_pose for depth: else a wrong depth feigns motion"
+        allowed = (
+            "from_features, from_pose or from_camera for depth: else a wrong depth feigns motion"
+        )
         raise InputError("law", "feed_forward", given, allowed)
     return depth
 
@@ -176,6 +191,8 @@ def _depth(context: LawContext, names: list[str]) -> Depth:
 def _best_depth(context: LawContext, names: list[str]) -> Depth:
     if isinstance(context.cell.task, ReachTable):
         return HeldDepth()  # the plan knows it at every instant
+    if all(context.cell.cameras[name].depth is not None for name in names):
+        return DepthFromCamera()
     known = [context.known_features(name) for name in names]
     if all(features is not None and fixes_pose(features) for features in known):
         return DepthFromFeatures()
@@ -187,7 +204,7 @@ def _pose_servo(context: LawContext) -> PoseServo:
     constrained = isinstance(settings.solver, QuadraticProgram)
     return PoseServo(
         context.arm,
-        _mounting(context, context.camera_name),
+        mounting_of(context, context.camera_name),
         settings.objective,
         limits=_limits(context),
         solver=settings.solver,
@@ -198,11 +215,12 @@ def _pose_servo(context: LawContext) -> PoseServo:
             None if context.is_fixed else context.solids,
             _POSE_DEPTHS,
             context.joints[context.cell.task.arm],
+            clearance=context.clearance,
         ),
     )
 
 
-def _mounting(context: LawContext, name: str) -> CameraMounting:
+def mounting_of(context: LawContext, name: str) -> CameraMounting:
     """Return where a camera is: the task's at the arm's tip unless it is fixed."""
     camera = context.camera(name)
     fixed = context.T_world_camera(name)
@@ -222,19 +240,17 @@ def _limits(context: LawContext) -> Limits | None:
     if given is None and not isinstance(cell.law.solver, QuadraticProgram):
         return None
     limits: Limits = given or Limits()
+    margins = _plan_margins(cell)
+    return limits if margins is None else limits_on_plan(limits, *margins, context.period_s())
+
+
+def _plan_margins(cell: Cell) -> tuple[float, float] | None:
+    """Return a plan's margins, px and share of half a joint's range; None for no plan."""
     if isinstance(cell.task, ReachTable):
-        margin_px, margin_joint = cell.task.margin_px, cell.task.margin_joint
-    elif isinstance(cell.task, TrackTable) and cell.task.approach == "auto":
-        margin_px, margin_joint = PLAN_MARGIN_PX, PLAN_MARGIN_JOINT
-    else:
-        return limits
-    view_px, joint = limits.view_margin_px, limits.joint_margin
-    return replace(
-        limits,
-        view_margin_px=_OF_PLAN * margin_px if view_px is None else view_px,
-        # The plan's margin is a share of half a range.
-        joint_margin=_OF_PLAN * margin_joint / 2.0 if joint is None else joint,
-    )
+        return cell.task.margin_px, cell.task.margin_joint
+    if isinstance(cell.task, TrackTable) and cell.task.approach == "auto":
+        return PLAN_MARGIN_PX, PLAN_MARGIN_JOINT
+    return None
 
 
 def _require_motion(context: LawContext) -> None:
@@ -248,7 +264,7 @@ def _require_motion(context: LawContext) -> None:
     axes = objective.axes if isinstance(objective, OptimalTracking) else None
     mask = np.ones(6, dtype=np.bool_) if axes is None else axis_mask(axes)
     arm, q = context.arm, context.joints[cell.task.arm]
-    mounting = _mounting(context, name)
+    mounting = mounting_of(context, name)
 
     def jacobian(posture: FloatArray) -> FloatArray:
         A = mounting.twist_map(arm.forward_kinematics(posture))

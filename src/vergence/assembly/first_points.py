@@ -10,9 +10,11 @@ from vergence.cell.schema import TrackTable
 from vergence.errors import InputError
 from vergence.estimation import TrackedPoints
 from vergence.geometry import se3_inverse, transform_points
+from vergence.parts import kind_of
 from vergence.runtime.stages import Perception
 from vergence.signals import Frame
 from vergence.simulation import ExactPoints, SimulatedDriver
+from vergence.vision import PointTracker
 
 _WINDOW_PX = 32.0  # of the tracker, at the finest level
 _LEAST_RADIUS_PX = 1.0  # within which a predicted place is as good as a measured one
@@ -34,7 +36,8 @@ def first_points(
         InputError: if a feature is not in sight, or too few can be picked.
     """
     frame = driver.frames[camera]
-    if any(begin <= 0 < end for begin, end in context.cell.cameras[camera].blind_s):
+    now = max(frame.time, 0.0)
+    if any(begin <= now < end for begin, end in context.cell.cameras[camera].blind_s):
         given = f"at the start camera {camera} is blind, by cameras.{camera}.blind_s"
         raise InputError(str(context.cell.path), key, given, "a camera that sees at the start")
     if not images:
@@ -45,11 +48,26 @@ def first_points(
         points_px = _predicted_points(context, key, camera, frame.image)
     elif points_px is None:
         points_px = _pick(context, camera, frame.image)
-    if not _are_known(context, camera) and isinstance(driver.driver, SimulatedDriver):
-        driver.driver.anchor(camera, points_px)  # so that reports know where they truly are
     assert isinstance(context.cell.task, TrackTable)
     tracker = started_tracker(context, context.cell.task.tracker, frame.image, points_px)
+    if context.curve is not None:
+        points_px = _first_curve(context, tracker, frame.image)
+    elif not _are_known(context, camera) and isinstance(driver.driver, SimulatedDriver):
+        driver.driver.anchor(camera, points_px)  # so that reports know where they truly are
     return points_px, TrackedPoints(camera, tracker, len(points_px))
+
+
+def _first_curve(context: LawContext, tracker: PointTracker, image: ImageArray) -> FloatArray:
+    """Return the points (M, 2) that stand for a curve where its tracker finds it.
+
+    Raises:
+        InputError: if it does not.
+    """
+    tracks = tracker.track(image)
+    if not tracks.found.all():
+        given = f"{kind_of(context.curve)}, {next(filter(None, tracks.reasons))} in the first image"
+        raise InputError(str(context.cell.path), "task.tracker", given, "a curve that is seen")
+    return tracks.points_px
 
 
 def _exact_points(
@@ -86,7 +104,7 @@ def _given_points(context: LawContext, camera: str) -> FloatArray | None:
         return None
     points, lens = np.array(task.points_px, dtype=np.float64), context.cameras[camera]
     known, source = context.cell.target.features, str(context.cell.path)
-    if known is not None and len(known) != len(points):
+    if context.curve is None and known is not None and len(known) != len(points):
         given, allowed = f"{len(points)} points", f"{len(known)}, as target.features"
         raise InputError(source, "task.points_px", given, allowed)
     if not lens.contains(points).all():
@@ -111,7 +129,8 @@ def _predicted_points(context: LawContext, key: str, camera: str, image: ImageAr
     distance, angle = context.cell.placement_error
     away = distance + np.deg2rad(angle) * np.ptp(points, axis=0).max()
     radius = float((lens.focal_px.max() * away / points[:, 2]).max())
-    return points_px if radius < _LEAST_RADIUS_PX else _corners_near(image, points_px, radius)
+    exact = radius < _LEAST_RADIUS_PX or context.curve is not None
+    return points_px if exact else _corners_near(image, points_px, radius)
 
 
 def _corners_near(image: ImageArray, points_px: FloatArray, radius_px: float) -> FloatArray:
@@ -150,6 +169,10 @@ def _pick(context: LawContext, camera: str, image: ImageArray) -> FloatArray:
     """Choose features in the middle of the image, on the target as it is placed."""
     task = context.cell.task
     assert isinstance(task, TrackTable)
+    if context.curve is not None:
+        given = f"nothing, for the tracker {kind_of(task.tracker)}"
+        allowed = "where its curve is in the first image, or target.features on it"
+        raise InputError(str(context.cell.path), "task.points_px", given, allowed)
     points = _far_apart(context, camera, image, task.feature_count)
     if len(points) < task.feature_count:
         raise InputError(

@@ -10,12 +10,14 @@ from vergence.arrays import FloatArray
 from vergence.assembly.started_driver import StartedDriver
 from vergence.camera import Camera
 from vergence.cell import Cell
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
+from vergence.features import inverse_depth_plane
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.parts import kind_of
-from vergence.robot import Arm
+from vergence.robot import Arm, Clearance
 from vergence.simulation import placement_pose
 from vergence.simulation.solids import Solids
+from vergence.vision import CurveTracking
 
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
@@ -36,6 +38,10 @@ class LawContext:
     points_px: Mapping[str, FloatArray]  # (M, 2) features in the first image, by camera name
 
     joints_now: Callable[[], Mapping[str, FloatArray]]  # newest positions by arm name, (n,)
+    clearance: Clearance  # distances of the task's arm from what it must not touch, for the loop
+    bodies: Clearance  # and the same for planners, which may run beside it
+    # Whether the points may lie on anything in the cell, so that nothing is known to hide them.
+    points_on_anything: bool = False
 
     @classmethod
     def of(cls, cell: Cell, driver: StartedDriver, model: "CellModel | None" = None) -> Self:
@@ -49,13 +55,25 @@ class LawContext:
         Raises:
             InputError: if the models of the cell cannot be read.
         """
+        from vergence.assembly.clearance import cell_clearance
         from vergence.simulation.cell_model import CellModel
 
-        model, joints = model or CellModel(cell), driver.joints
+        model, joints = model or CellModel(cell, hulls=True), driver.joints
         model.move_target(placement_pose(cell.target))
+        model.place(driver.start)
+        clearance = cell_clearance(cell, model, lambda: driver.states)
+        bodies = clearance.twin()
         model.place(joints)
         return cls(
-            cell, model, driver.cameras, driver.inner_rate_hz, joints, {}, lambda: driver.joints
+            cell,
+            model,
+            driver.cameras,
+            driver.inner_rate_hz,
+            joints,
+            {},
+            lambda: driver.joints,
+            clearance,
+            bodies,
         )
 
     def with_points(self, points_px: Mapping[str, FloatArray]) -> Self:
@@ -123,9 +141,13 @@ class LawContext:
         count = len(self.points_px[camera])
         if given is not None:
             return np.full(count, given)
-        depth: FloatArray = self.features_in_camera(camera)[:, 2]
+        depth: FloatArray = (
+            self.features_in_camera(camera)[:, 2]
+            if self.curve is None
+            else self._depth_of_curve(camera)
+        )
         if not (depth > 0).all():  # false for NaN too
-            given_text = "no depth, and the target's placement implies none"
+            given_text = Absent("no depth, and the target's placement implies none")
             raise InputError("law", "depth_m", given_text, "a depth in metres")
         return depth
 
@@ -164,13 +186,46 @@ class LawContext:
         holder = target.carried_by
         return holder in (None, self.cell.task.arm) or self.cell.arms[holder].motion is None
 
+    @property
+    def curve(self) -> CurveTracking | None:
+        """What follows a curve rather than points, if the task does."""
+        tracker = getattr(self.cell.task, "tracker", None)
+        return tracker if isinstance(tracker, CurveTracking) else None
+
     def known_features(self, camera: str) -> FloatArray | None:
-        """Return the features that the cell states for a camera, (M, 3), m; None if it has none."""
+        """Return the features that the cell states for a camera, (M, 3), m; None if it has none.
+
+        Those of a curve say where it is; which of its points are measured they do not.
+        """
+        if self.curve is not None:
+            return None
         tool = self.cell.tool
         if tool is not None and tool.camera == camera:
             return np.array(tool.features)
         known = self.cell.target.features
         return None if known is None else np.array(known)
+
+    def _depth_of_curve(self, camera: str) -> FloatArray:
+        """Return the depth of the points that stand for a curve, (M,), m, by the placements.
+
+        They lie on the plane of the features, or of the target's surface inside the curve.
+        """
+        lens, points_px = self.cameras[camera], self.points_px[camera]
+        points = self.features_in_camera(camera)
+        if not self._has_features(camera):
+            inside = self.with_points({camera: 0.9 * points_px + 0.1 * points_px.mean(axis=0)})
+            points = inside.features_in_camera(camera)
+        points = points[points[:, 2] > 0.0]  # false for NaN too
+        if not len(points):
+            return np.full(len(points_px), np.nan)
+        A, B, C = inverse_depth_plane(points[:, :2] / points[:, 2:], points[:, 2])
+        x, y = lens.normalize(points_px).T
+        depth: FloatArray = 1.0 / (A * x + B * y + C)
+        return depth
+
+    def _has_features(self, camera: str) -> bool:
+        tool = self.cell.tool
+        return (tool is not None and tool.camera == camera) or bool(self.cell.target.features)
 
     def _features(self, camera: str) -> tuple[FloatArray, FloatArray]:
         """Return what a camera looks at: points (M, 3) in a frame, and its pose (4, 4)."""

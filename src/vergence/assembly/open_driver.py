@@ -11,10 +11,11 @@ from vergence.errors import InputError, VergenceError
 from vergence.loading import Place, load_part, make_part
 from vergence.registry import find, kinds
 from vergence.runtime import Driver
+from vergence.runtime.hardware import LateStamps
 
 
 def open_driver(cell: Cell, named: str) -> Driver:
-    """Return a driver for a cell.
+    """Return a driver for a cell, its images at the times of their exposure.
 
     Args:
         cell: whose arms and cameras it drives; its table `[driver]` has the settings, if it is of
@@ -26,6 +27,35 @@ def open_driver(cell: Cell, named: str) -> Driver:
         InputError: if there is no such driver, or it cannot be opened.
         DriverSilent: if the robot does not answer.
     """
+    kind, _ = split_name(named)
+    driver = _opened(cell, named)
+    table = _table(cell, kind)
+    if table is None or not table.stamp_latency_s:
+        return driver
+    return LateStamps(driver, table.stamp_latency_s)
+
+
+def check_driver(cell: Cell, named: str) -> None:
+    """Check what can be known of a driver without opening it; for arguments see `open_driver`.
+
+    Raises:
+        InputError: if there is no such driver, or its settings or cameras cannot be used.
+    """
+    kind, address = split_name(named)
+    cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
+    settings, place = _settings(cell, kind)
+    if hasattr(cls, "open"):
+        _made(cls, kind, settings | ({"address": address} if address else {}), place)
+    _sources(cell)
+
+
+def servo_lag_s(cell: Cell, named: str) -> float:
+    """Return by how much a driver's arm follows late, as the cell's table `[driver]` has it, s."""
+    table = _table(cell, split_name(named)[0])
+    return 0.0 if table is None else table.servo_lag_s
+
+
+def _opened(cell: Cell, named: str) -> Driver:
     kind, address = split_name(named)
     cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
     settings, place = _settings(cell, kind)
@@ -33,8 +63,20 @@ def open_driver(cell: Cell, named: str) -> Driver:
         return _own(cls, cell, named, {"address": address, **settings})
     if address:
         settings["address"] = address
-    driver: Driver = _guarded(named, lambda: make_part(cls, settings, place).open(equipment(cell)))
+    part = _made(cls, kind, settings, place)
+    driver: Driver = _guarded(named, lambda: part.open(equipment(cell)))
     return driver
+
+
+def _made(cls: Any, kind: str, settings: Mapping[str, Any], place: Place) -> Any:
+    """Return a driver's part; of one without an address, say where that is given."""
+    try:
+        return make_part(cls, settings, place)
+    except InputError as error:
+        if error.given == "nothing" and error.key.split(".")[-1] == "address":
+            needed = f"{kind}:ADDRESS, or address in the cell's table [driver]"
+            raise InputError("--driver", "", kind, needed) from None
+        raise
 
 
 def split_name(named: str) -> tuple[str, str]:
@@ -62,10 +104,22 @@ def equipment(cell: Cell) -> Equipment:
 
 def _settings(cell: Cell, kind: str) -> tuple[dict[str, Any], Place]:
     """Return the fields of the cell's `[driver]`, if that is of this kind, and where they stand."""
-    table = cell.driver
-    if table is None or table.kind != kind:
+    table = _table(cell, kind)
+    if table is None:
         return {}, Place("--driver", "", cell.path.parent)
     return dict(table.model_extra or {}), Place(str(cell.path), "driver", cell.path.parent)
+
+
+def _table(cell: Cell, kind: str) -> DriverTable | None:
+    """Return the cell's `[driver]`, if that is of this kind."""
+    table = cell.driver
+    if table is None or table.kind != kind:
+        return None
+    for name in table.stamp_latency_s:
+        if name not in cell.cameras:
+            key, allowed = "driver.stamp_latency_s", f"cameras: {', '.join(cell.cameras)}"
+            raise InputError(str(cell.path), key, name, allowed)
+    return table
 
 
 def _sources(cell: Cell) -> Mapping[str, CameraSource]:

@@ -1,5 +1,6 @@
 """What a task's tracker and planner answer before anything moves, held to what they promise."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ from vergence.assembly.law_context import LawContext
 from vergence.errors import InputError
 from vergence.loading import asking
 from vergence.parts import kind_of
-from vergence.planning import Path, PlanFailure, PlanningProblem
+from vergence.planning import Obstacle, Path, PlanFailure, PlanningProblem
+from vergence.planning.collisions import collision_along
 from vergence.vision import PointTracker
 
 _AT_START = 1e-6  # rad or m, by which a path may miss where the arm is
@@ -35,6 +37,8 @@ def started_tracker(
 def planned_path(context: LawContext, part: Any, problem: PlanningProblem) -> Path | PlanFailure:
     """Return the path that a task's planner finds, or what stood in the way.
 
+    A path on which the arm would collide, whoever planned it, is no path.
+
     Raises:
         InputError: if the part raises, or returns no path that begins where the arm is.
     """
@@ -44,6 +48,7 @@ def planned_path(context: LawContext, part: Any, problem: PlanningProblem) -> Pa
         allowed = "a Path from the arm's joint positions, or a PlanFailure"
         return InputError(source, key, f"{kind_of(part)}, whose plan returned {what}", allowed)
 
+    problem = replace(problem, bodies=context.bodies)
     with asking(part, source, key):
         path = part.plan(problem)
     if isinstance(path, PlanFailure):
@@ -56,4 +61,6 @@ def planned_path(context: LawContext, part: Any, problem: PlanningProblem) -> Pa
         raise refuse("waypoints that are not finite")
     if np.abs(path.q[0] - problem.q_start).max() > _AT_START:
         raise refuse("a path that begins elsewhere")
+    if touching := collision_along(context.bodies, path.q):
+        return PlanFailure(Obstacle.COLLISION, f"the path brings {touching}")
     return path

@@ -14,14 +14,13 @@ from vergence.camera.photograph import Photograph, read_photograph
 from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
-from vergence.errors import InputError
+from vergence.cell.tasks import require_one_task
+from vergence.errors import NOTHING, InputError
 from vergence.planning.approach import (
     Approach,
     ApproachSettings,
     GoalImage,
-    InlineWorker,
     KnownLength,
-    ThreadWorker,
 )
 from vergence.planning.failure import PlanFailure
 from vergence.planning.path import Path as PlannedPath
@@ -43,25 +42,40 @@ def photograph_parts(
     context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
 ) -> Parts | Outcome:
     """Put together what goes to where a photograph was taken; or why it cannot."""
-    if not images:
-        raise InputError(str(context.cell.path), "task.goal", "no images", "images to recognise it")
+    require_photograph(context, images)
     approach = make_approach(context, task, driver)
     plan = approach.begin(driver.frames[task.camera])
     if isinstance(plan, TwoViewFailure):
         return Outcome(OutcomeKind.INFEASIBLE, str(plan), 0.0)
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
-    if plan.duration > context.cell.duration_s:
-        longest = context.cell.duration_s
-        reason = f"the path takes {plan.duration:.1f} s, duration_s is {longest:g}"
+    left = driver.time_left(context.cell.duration_s)
+    if plan.duration > left:
+        reason = f"the path takes {plan.duration:.1f} s, and duration_s leaves {left:.4g} s"
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
     seen = approach.recognition
     assert seen is not None
     # The points followed change on the way, so no motion of theirs can be told from image to image.
     cell = context.cell
     cell = cell.model_copy(update={"law": replace(cell.law, feed_forward=False)})
-    context = replace(context, cell=cell).with_points({task.camera: seen.points_px})
+    context = replace(context, cell=cell, points_on_anything=True)
+    context = context.with_points({task.camera: seen.points_px})
     return Parts(driver, approach, approach, build_law(context), context)
+
+
+def require_photograph(context: LawContext, images: bool) -> None:
+    """Refuse a photograph that cannot be read, and a run that would not recognise it.
+
+    Raises:
+        InputError: that names it.
+    """
+    cell = context.cell
+    if not images:
+        given = "--no-images, which leaves nothing to recognise the goal in"
+        raise InputError(str(cell.path), "task.goal", given, "images")
+    assert isinstance(cell.task, ReachTable)
+    if cell.task.goal is not None:
+        read_photograph(cell.path.parent / cell.task.goal, context.cameras[cell.task.camera])
 
 
 def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) -> Approach:
@@ -81,7 +95,6 @@ def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) 
         margin_joint=task.margin_joint,
         camera_speed_m_s=task.camera_speed_m_s,
     )
-    simulated = isinstance(driver.driver, SimulatedDriver)
     return Approach(
         GoalImage.of(taken.image, camera, task.matcher, taken.shown),
         task.camera,
@@ -89,7 +102,7 @@ def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) 
         context.arm_to_camera(task.camera),
         lambda problem: planned_path(context, task.planner, problem),
         settings,
-        InlineWorker() if simulated else ThreadWorker(),
+        driver.worker(),
     )
 
 
@@ -99,7 +112,11 @@ def take_goal(context: LawContext, task: ReachTable, driver: StartedDriver) -> P
     if task.goal is not None:
         return read_photograph(cell.path.parent / task.goal, camera)
     if task.goal_deg is None or not isinstance(driver.driver, SimulatedDriver):
-        raise InputError(str(cell.path), "task.goal", "nothing", "a photograph taken at the goal")
+        needed = (
+            "a photograph taken at the goal, see `vergence goal`; or task.goal_deg with "
+            "target.features, four or more known points"
+        )
+        raise InputError(str(cell.path), "task.goal", NOTHING, needed)
     arm = context.model.arms[task.arm]
     goal = goal_positions(cell, arm)
     image = driver.driver.frame_at(task.camera, task.arm, goal).image
@@ -116,7 +133,12 @@ def plan_approach(
 
 
 def with_goal(cell: Cell, photograph: Path) -> Cell:
-    """Return a cell whose task is to go where a photograph was taken, with the same camera."""
+    """Return a cell whose task is to go where a photograph was taken, with the same camera.
+
+    Raises:
+        InputError: if it has several tasks.
+    """
+    require_one_task(cell, "one [task] for --goal; else `goal` in one of the tasks")
     task = cell.task
     kept = task.model_dump() if isinstance(task, ReachTable) else {}
     goal = {

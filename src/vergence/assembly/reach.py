@@ -14,12 +14,14 @@ from vergence.assembly.started_driver import StartedDriver
 from vergence.camera.image_file import read_image_file
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.estimation import SelectedPoints, TrackedPoints
 from vergence.geometry import transform_points
+from vergence.parts import kind_of
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.path import Path
 from vergence.planning.problem import PlanningProblem
+from vergence.planning.replanner import PlanFromHere, Replanner
 from vergence.planning.trajectory import Trajectory
 from vergence.runtime.stages import Perception
 from vergence.signals import Frame, ImagePoints, Outcome, OutcomeKind
@@ -50,6 +52,9 @@ def reach_parts(
     context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
 ) -> Parts | Outcome:
     """Put together what plans a path in the image and tracks it; or why there is none."""
+    if context.curve is not None:
+        given, allowed = kind_of(task.tracker), "a tracker of points, for the task reach"
+        raise InputError(str(context.cell.path), "task.tracker", given, allowed)
     pair = measure_twice(context, task, driver, images)
     if isinstance(pair, PlanFailure):
         return pair.outcome(0.0)
@@ -59,15 +64,34 @@ def reach_parts(
     pair = pair.only(view.inliers)
     context = context.with_points({task.camera: pair.points_px})
     law = build_law(context)
-    plan = _plan(context, task, view)
+    plan = _plan(context, task, view, context.joints[task.arm])
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
     trajectory = Trajectory.of(plan, task.camera_speed_m_s)
+    again = _plan_again(context, task, pair.desired_px)
+    planner = Replanner(trajectory, again, driver.worker())
     duration = trajectory.duration + SETTLE_S
-    if duration > context.cell.duration_s:
-        reason = f"the way takes {duration:.1f} s, duration_s is {context.cell.duration_s:g}"
+    if duration > (left := driver.time_left(context.cell.duration_s)):
+        reason = f"the path takes {duration:.1f} s, and duration_s leaves {left:.4g} s"
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
-    return Parts(driver, pair.perception, trajectory, law, context, duration)
+    return Parts(driver, pair.perception, planner, law, context, duration)
+
+
+def _plan_again(context: LawContext, task: ReachTable, desired_px: FloatArray) -> PlanFromHere:
+    """Return what plans to marks as desired, (N, 2), from where they are seen then."""
+
+    def plan(points_px: FloatArray, q: FloatArray) -> Trajectory | str:
+        view = estimate_two_view(points_px, desired_px, context.cameras[task.camera])
+        if not isinstance(view, TwoView):
+            return str(view)
+        if not view.inliers.all():
+            return "not all marks agree with one motion of the camera"
+        found = _plan(context, task, view, q)
+        if isinstance(found, PlanFailure):
+            return str(found)
+        return Trajectory.of(found, task.camera_speed_m_s)
+
+    return plan
 
 
 def plan_reach(
@@ -75,21 +99,26 @@ def plan_reach(
 ) -> Path | PlanFailure | TwoViewFailure:
     """Reconstruct the object from two images, up to the believed d*, and plan a path."""
     view = estimate_two_view(pair.points_px, pair.desired_px, context.cameras[task.camera])
-    return _plan(context, task, view) if isinstance(view, TwoView) else view
+    if not isinstance(view, TwoView):
+        return view
+    return _plan(context, task, view, context.joints[task.arm])
 
 
-def _plan(context: LawContext, task: ReachTable, view: TwoView) -> Path | PlanFailure:
+def _plan(
+    context: LawContext, task: ReachTable, view: TwoView, q: FloatArray
+) -> Path | PlanFailure:
+    """Plan from joint positions q (n,) by two images, one of them taken there."""
     camera = context.cameras[task.camera]
     if task.distance_m is None:
         raise InputError(
-            str(context.cell.path), "task.distance_m", "nothing", "the distance at the goal, m"
+            str(context.cell.path), "task.distance_m", NOTHING, "the distance at the goal, m"
         )
     problem = PlanningProblem.from_two_view(
         view,
         task.distance_m,
         context.arm_to_camera(task.camera),
         camera,
-        context.joints[task.arm],
+        q,
         margin_px=task.margin_px,
         margin_joint=task.margin_joint,
     )
@@ -160,7 +189,7 @@ def _goal_frame(
     if task.goal is None:
         if isinstance(driver.driver, SimulatedDriver):
             return driver.driver.frame_at(task.camera, task.arm, goal)
-        raise InputError(str(cell.path), "task.goal", "nothing", "an image taken at the goal")
+        raise InputError(str(cell.path), "task.goal", NOTHING, "an image taken at the goal")
     path = cell.path.parent / task.goal
     image, reason = grey_image(read_image_file(path))
     if image is None:

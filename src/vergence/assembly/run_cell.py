@@ -1,20 +1,22 @@
 """From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from vergence.assembly.assemble import assemble_parts
 from vergence.assembly.parts import Parts
-from vergence.assembly.warm_up import warm_up
+from vergence.assembly.self_calibrating import SELF_CALIBRATION, SelfCalibrating, words
+from vergence.assembly.task_sequence import TaskSequence
+from vergence.assembly.task_stages import stages_of, timeouts_of
+from vergence.assembly.under_actuation import under_actuation
 from vergence.cell import Cell
-from vergence.cell.schema import FollowTable, ReachTable, Task
-from vergence.errors import RenderingError
-from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder, Timeouts
-from vergence.runtime.arrival import Goal
+from vergence.cell.tasks import naming_task
+from vergence.errors import InputError, RenderingError
+from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder
 from vergence.runtime.driver import Driver
 from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
-from vergence.signals import Outcome
+from vergence.runtime.results import UNDER_ACTUATED
+from vergence.signals import Frame, Outcome
 from vergence.simulation import SimulatedDriver
 
 _LOG = logging.getLogger(__name__)
@@ -42,15 +44,23 @@ def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True
 def rehearse(cell: Cell, duration_s: float = 0.2) -> None:
     """Run a cell in simulation for a moment, so that no kernel is compiled while a robot waits.
 
-    Without a renderer on this machine nothing is rehearsed.
+    Of several tasks each is, from the start; one that cannot begin there is left out. Without a
+    renderer on this machine nothing is rehearsed.
 
     Raises:
         InputError: if the cell cannot be run as it is written; no robot has been touched then.
     """
-    try:
-        run_cell(cell.replace(duration_s=duration_s))
-    except RenderingError as error:
-        _LOG.info("no rehearsal: %s", error)
+    for number, stage in enumerate(cell.stages):
+        try:
+            with naming_task(number if cell.tasks else None):
+                run_cell(stage.replace(duration_s=duration_s))
+        except RenderingError as error:
+            _LOG.info("no rehearsal: %s", error)
+            return
+        except InputError as error:
+            if number == 0:
+                raise
+            _LOG.info("task %d is not rehearsed: %s", number + 1, error)
 
 
 def run_driver(
@@ -62,6 +72,9 @@ def run_driver(
     duration_s: float | None = None,
     attend: Callable[[Loop, Parts], None] | None = None,
     most_ticks: int | None = None,
+    frames: Mapping[str, Frame] | None = None,
+    servo_lag_s: float = 0.0,
+    self_calibration: bool = False,
 ) -> Run:
     """Run a cell with a driver that is open already, and stays open.
 
@@ -71,35 +84,60 @@ def run_driver(
         listeners: hear of every tick.
         images: look through images; if not, at the exact projections of a simulated driver.
         duration_s: in place of the cell's; may be infinite.
-        attend: is given the loop and its parts before it runs, to change the law during the run.
+        attend: is given the loop and its parts before each task, to change the law meanwhile.
         most_ticks: how many to keep of a run without an end; all if None.
+        frames: images to begin with, by camera, at times of the driver; else the next that come.
+        servo_lag_s: by which the driver's arm follows its set-points.
+        self_calibration: whether to tell at the end, as an event, what the run says of latency and
+            mounting, if its one task is beside a target that rests. Nothing is changed by it.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
     """
-    parts = assemble_parts(cell, driver, images)
     recorder = RunRecorder(most_ticks)
     everyone = (recorder, *listeners)
+    loops: list[Loop] = []
+    sequence = TaskSequence(
+        cell, images, everyone, lambda parts: attend(loops[0], parts) if attend else None
+    )
+    parts = sequence.first(driver, frames)
     path = str(cell.path)
     info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path)
     Listeners(everyone).begin(info)
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        warm_up(parts, cell.task.arm, 1.0 / cell.outer_rate_hz)
-        loop = _loop(cell, parts, everyone)
+        if limits := under_actuation(parts.context):
+            Listeners(everyone).event(0.0, UNDER_ACTUATED, limits)
+        calibrating: SelfCalibrating | None = None
+        if self_calibration and len(cell.tasks) <= 1 and SelfCalibrating.suits(parts.context):
+            calibrating = SelfCalibrating(parts.context)
+        heard = everyone if calibrating is None else (*everyone, calibrating)
+        loop = _loop(cell, parts, heard, sequence, servo_lag_s)
+        loops.append(loop)
         if attend is not None:
             attend(loop, parts)
-        outcome = loop.run(parts.duration_s or duration_s or cell.duration_s)
+        sequence.begin()
+        outcome = loop.run(duration_s or cell.duration_s)
+        if calibrating is not None:
+            said = words(calibrating.estimate())
+            Listeners(everyone).event(outcome.time, SELF_CALIBRATION, said)
+    outcome = sequence.outcome(outcome)
     recorder.close(outcome, {})
     run = recorder.run()
     Listeners(listeners).close(outcome, run.summary)
     return run
 
 
-def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
+def _loop(
+    cell: Cell,
+    parts: Parts,
+    listeners: Sequence[Listener],
+    sequence: TaskSequence,
+    servo_lag_s: float,
+) -> Loop:
     servo_hz = cell.arms[cell.task.arm].servo_bandwidth_hz
-    return Loop(
+    loop = Loop(
         parts.driver,
         cell.task.arm,
         parts.perception,
@@ -107,13 +145,10 @@ def _loop(cell: Cell, parts: Parts, listeners: Sequence[Listener]) -> Loop:
         parts.law,
         outer_rate_hz=cell.outer_rate_hz,
         listeners=listeners,
-        following=FollowingBound(servo_hz=servo_hz),
-        timeouts=Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s),
-        goal=_goal(cell.task),
+        following=FollowingBound(servo_hz=servo_hz, servo_lag_s=servo_lag_s),
+        timeouts=timeouts_of(cell.task),
+        next_stages=sequence.next_stages,
+        clearance=parts.context.clearance,
     )
-
-
-def _goal(task: Task) -> Goal | None:
-    if isinstance(task, FollowTable):
-        return None
-    return Goal(task.tolerance_px, ends=isinstance(task, ReachTable))
+    loop.take_up(stages_of(cell, parts))
+    return loop

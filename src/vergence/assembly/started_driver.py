@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from time import monotonic
 
 from vergence.arrays import FloatArray
-from vergence.camera import Camera
-from vergence.robot import Arm
-from vergence.runtime.driver import Driver
-from vergence.signals import Frame, Sample, Setpoint
+from vergence.planning.approach import InlineWorker, ThreadWorker, Worker
+from vergence.runtime import Driver, DriverWrapper
+from vergence.signals import Frame, JointState, Sample
+from vergence.simulation import SimulatedDriver
 
 _TIMEOUT_S = 5.0  # for a first image
 
 
-class StartedDriver:
+class StartedDriver(DriverWrapper):
     """Passes on to a driver, after it has waited for an image of each camera without a set-point.
 
     What a task begins with is read off these images. The run begins with the first `read` after
@@ -22,55 +23,64 @@ class StartedDriver:
     Args:
         driver: of arms and cameras.
         cameras: names of those that are needed.
+        frames: images to begin with, by camera, at times of the driver; nobody waits for those.
 
     Attributes:
         driver: the same.
-        frames: the newest image of each camera that delivered one, by name, at times up to 0.
+        frames: what a task begins with: an image of each camera that delivered one, by name; of
+            the first task at times up to 0, of another when the arm had come to rest before it.
         missing: names of cameras that delivered none in time.
+        start: positions when they had, by arm name, (n,), rad or m.
 
     Raises:
         DriverSilent: if the driver does not answer.
     """
 
-    def __init__(self, driver: Driver, cameras: Sequence[str]) -> None:
-        self.driver = driver
-        first: dict[str, Frame] = {}
+    def __init__(
+        self,
+        driver: Driver,
+        cameras: Sequence[str],
+        frames: Mapping[str, Frame] | None = None,
+    ) -> None:
+        super().__init__(driver)
+        given = frames or {}
+        first: dict[str, Frame] = dict(given)
         sample = driver.read()
         for _ in range(int(_TIMEOUT_S * driver.inner_rate_hz)):
-            first |= {frame.camera: frame for frame in sample.frames}
+            first |= {f.camera: f for f in sample.frames if f.camera not in given}
             if all(name in first for name in cameras):
                 break
             driver.step({})  # a watchdog that has heard a set-point would not wait for the rest
             sample = driver.read()
         self.missing = tuple(name for name in cameras if name not in first)
         self._sample = sample  # the newest
+        self.start = self.joints
         self.frames = {name: _since(sample.time, frame) for name, frame in first.items()}
-        self._waited_until = sample.time
+        self._waited_until, self._read_at = sample.time, monotonic()
         self._begin: float | None = None
 
-    @property
-    def arms(self) -> Mapping[str, Arm]:
-        """The arms by name."""
-        return self.driver.arms
-
-    @property
-    def cameras(self) -> Mapping[str, Camera]:
-        """The cameras by name."""
-        return self.driver.cameras
-
-    @property
-    def inner_rate_hz(self) -> float:
-        """How often `step` returns."""
-        return self.driver.inner_rate_hz
+    def worker(self) -> Worker:
+        """Return who does what takes longer than an image, without delaying the loop."""
+        return InlineWorker() if self._waits_for_us else ThreadWorker()
 
     @property
     def joints(self) -> dict[str, FloatArray]:
         """Newest positions by arm name, (n,), rad or m."""
         return {name: state.position for name, state in self._sample.joints.items()}
 
+    @property
+    def states(self) -> Mapping[str, JointState]:
+        """Newest joint states by arm name."""
+        return self._sample.joints
+
+    def time_left(self, duration_s: float) -> float:
+        """Return how much of the time of a run is left to a task that begins with the images, s."""
+        return duration_s - max([0.0, *(frame.time for frame in self.frames.values())])
+
     def read(self) -> Sample:
         """Return joints now and the images that arrived since the last call."""
-        sample = self._sample = self.driver.read()
+        sample = self.driver.read() if self._begin is not None else self._first()
+        self._sample = sample
         if self._begin is None:
             self._begin = sample.time
             if sample.time == self._waited_until:  # nothing moved: what was seen is of the run
@@ -83,13 +93,32 @@ class StartedDriver:
         of_run = (frame for frame in sample.frames if not frame.time < self._begin)
         return replace(sample, frames=tuple(sorted(of_run, key=lambda frame: frame.time)))
 
-    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-        """Hand set-points to the arms and wait for the next inner tick."""
-        self.driver.step(setpoints)
+    @property
+    def _waits_for_us(self) -> bool:
+        """Whether the driver's time stands while the loop does something else."""
+        driver = self.driver
+        while isinstance(driver, DriverWrapper):
+            driver = driver.driver
+        return isinstance(driver, SimulatedDriver)
 
-    def close(self) -> None:
-        """Let go of the cell."""
-        self.driver.close()
+    def _first(self) -> Sample:
+        """Return a sample of now, with all images since the last one.
+
+        Joints are those of the last step, which is as old as it took to assemble the loop. A run
+        that began with them would miss that time, and its images, in its second tick.
+        """
+        sample = self.driver.read()
+        if self._waits_for_us:
+            return sample
+        now = self._waited_until + monotonic() - self._read_at
+        period_s, frames = 1.0 / self.driver.inner_rate_hz, sample.frames
+        for _ in range(int((now - sample.time) / period_s)):
+            if sample.time > now - 2.0 * period_s:
+                break
+            self.driver.step({})
+            sample = self.driver.read()
+            frames += sample.frames
+        return replace(sample, frames=frames)
 
 
 def _since(begin: float, frame: Frame) -> Frame:

@@ -36,8 +36,9 @@ def warm_up(parts: Parts, arm: str, period_s: float) -> None:
     try:
         perception, planner, law = copied((parts.perception, parts.planner, parts.law))
         guard = Guard(parts.driver.arms[arm], parts.driver.joints[arm], period_s)
+        newest = max(frame.time for frame in parts.driver.frames.values())
         for number, moved in enumerate(_MOTION):
-            time = number * period_s
+            time = max(newest, 0.0) + number * period_s
             q = parts.driver.joints[arm] + (moved or 0.0)
             joints = JointState(time, q, np.zeros_like(q))
             frames = tuple(_images(parts.driver, time, moved))

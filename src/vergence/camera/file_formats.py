@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.tables import numbers
 
 # A file of camera_info, the message itself in ROS 1 and 2, OpenCV's samples.
@@ -123,7 +123,7 @@ def _from_visp(root: Mapping[str, Any], source: str) -> dict[str, Any]:
     models = {str(m.get("type")): m for m in _listed(cameras[0].get("model"))}
     model = next((models[name] for name in _VISP_MODELS if name in models), None)
     if model is None:
-        given = ", ".join(models) or "nothing"
+        given = ", ".join(models) or NOTHING
         allowed = f"{' or '.join(_VISP_MODELS)}; {_UNDISTORT}"
         raise InputError(source, "camera.model.type", given, allowed)
     theirs = {"fx": "px", "fy": "py", "cx": "u0", "cy": "v0"}

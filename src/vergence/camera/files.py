@@ -11,7 +11,7 @@ from vergence.camera.distortion import COEFFICIENTS
 from vergence.camera.file_formats import own_table
 from vergence.camera.pinhole import Camera
 from vergence.camera.sensor_window import LARGEST_PX, WINDOW_KEYS, read_window
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.tables import KINDS, numbers, read_tables, require_known
 
 _KEYS = ("width", "height", "fx", "fy", "cx", "cy", "distortion")
@@ -133,7 +133,7 @@ def _side(table: Mapping[str, Any], key: str, shown: int | None, least: int, sou
     """
     if key not in table:
         if shown is None:
-            raise InputError(source, key, "nothing", "the images' size in pixels")
+            raise InputError(source, key, NOTHING, "the images' size in pixels")
         return max(shown, least)
     have = float(numbers(table, key, (), source))
     if not (1 <= have <= LARGEST_PX and have == int(have)):

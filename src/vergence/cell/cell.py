@@ -10,12 +10,15 @@ from vergence.cell.schema import (
     TABLES,
     ArmTable,
     CameraTable,
+    CollisionTable,
     DriverTable,
     Duration,
     Name,
+    OutputTable,
     Part,
     PerceptionTable,
     SceneTable,
+    SwitchTable,
     Table,
     TargetTable,
     Task,
@@ -23,6 +26,7 @@ from vergence.cell.schema import (
     TrackTable,
 )
 from vergence.cell.settings_text import is_whole, settings_text
+from vergence.cell.tasks import check_sequence, naming_task, with_first_task
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
 from vergence.loading import Place, load_part, names_law
@@ -41,9 +45,14 @@ class Cell(Table):
     scene: SceneTable = SceneTable()  # what stands around the arms
     arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # by name
     cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # by name
+    collision: CollisionTable = CollisionTable()  # what must not be touched
     target: TargetTable  # what is looked at
     task: Task  # what is to be done about it
+    tasks: Annotated[tuple[Task, ...], Field(max_length=64)] = ()  # or several, one after another
     perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
+    outputs: dict[Name, OutputTable] = Field(  # of the driver, such as a gripper, by name
+        default_factory=dict, max_length=16
+    )
     driver: DriverTable | None = None  # the real robot; a simulation does not need it
     law: Part  # how the arm is moved
     laws: dict[Name, Part] = Field(  # others, by name, to compare it with
@@ -75,7 +84,7 @@ class Cell(Table):
     @property
     def placement_error(self) -> tuple[float, float]:
         """How well the target's placement is known, m and degrees."""
-        usual = (0.01, 2.0) if self.task.kind == "follow" else (0.0, 0.0)
+        usual = (0.01, 2.0) if self._follows else (0.0, 0.0)
         table = self.perception
         return (
             usual[0] if table.start_error_m is None else table.start_error_m,
@@ -85,15 +94,41 @@ class Cell(Table):
     @property
     def watched(self) -> tuple[str, ...]:
         """The cameras that are looked through: all, unless the file names some to follow by."""
-        named = self.perception.cameras if self.task.kind == "follow" else None
+        named = (
+            self.perception.cameras if all(t.kind == "follow" for t in self._all_tasks) else None
+        )
         return named or tuple(self.cameras)
+
+    @property
+    def stages(self) -> tuple["Cell", ...]:
+        """The cell with each of its tasks alone, in order, under the law of that task."""
+        if not self.tasks:
+            return (self,)
+        laws = [self.law if task.law is None else self.laws[task.law] for task in self.tasks]
+        return tuple(
+            self.model_copy(
+                update={"task": task.model_copy(update={"law": None}), "law": law, "tasks": ()}
+            )
+            for task, law in zip(self.tasks, laws, strict=True)
+        )
+
+    @property
+    def _all_tasks(self) -> tuple[Task, ...]:
+        return self.tasks or (self.task,)
+
+    @property
+    def _follows(self) -> bool:
+        return any(task.kind == "follow" for task in self._all_tasks)
 
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some values replaced, by nested dictionaries as in the file.
 
-        A table that names its kind, or a law its objectives, replaces the whole table.
+        A table that names its kind, or a law its objectives, replaces the whole table, and `tasks`
+        the one task.
         """
-        values = _merge(self.model_dump(), tables)
+        several = bool(self.tasks) or "tasks" in tables
+        own = self.model_dump(exclude={"task"} if several else {"tasks"})
+        values = _merge(own, tables)
         return _validate(values, self._path, self._text + settings_text(tables, values))
 
 
@@ -114,7 +149,9 @@ def load_cell(
     path = find_cell(name_or_path)
     text, values = read_toml(path)
     for key, value in (overrides or {}).items():
-        values = _with(values, *setting(key, value))
+        if key == "tasks":  # in place of the one task, as `Cell.replace` has it
+            values.pop("task", None)
+        values = _with(values, *setting(key, value), key)
         text += f"\n# set: {key} = {value}"
     if seed is not None:
         values["seed"] = seed
@@ -122,21 +159,24 @@ def load_cell(
     return _validate(values, path, text)
 
 
-def _with(values: Any, keys: list[str], value: Any) -> Any:
+def _with(values: Any, keys: list[str], value: Any, place: str) -> Any:
     """Return tables with the value at a place replaced, or removed where it is None.
 
     What stands beside it stays, so a table that becomes one of another kind keeps its keys.
     """
     key, *deeper = keys
-    if isinstance(values, list) and key.isdigit() and int(key) < len(values):
+    if isinstance(values, list) and key.isdigit():
+        if int(key) >= len(values):
+            allowed = f"0 to {len(values) - 1}" if values else "none: the list is empty"
+            raise InputError("--set", place, f"number {key}", allowed)
         changed = list(values)
-        changed[int(key)] = _with(values[int(key)], deeper, value) if deeper else value
+        changed[int(key)] = _with(values[int(key)], deeper, value, place) if deeper else value
         return changed
     table = dict(values) if isinstance(values, Mapping) else {}
     if isinstance(values, str):  # the name of a part stands for its table
         table = {"kind": values}
     if deeper:
-        table[key] = _with(table.get(key), deeper, value)
+        table[key] = _with(table.get(key), deeper, value, place)
     elif value is None:
         table.pop(key, None)
     else:
@@ -156,13 +196,18 @@ def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = _with_calibrations(values, path)
-    try:
-        cell = Cell.model_validate(values)
-    except ValidationError as error:
-        raise explain(error, str(path), values, _known_keys) from None
+    values = with_first_task(_with_calibrations(values, path), str(path))
+    number = 0 if "tasks" in values else None
+    with naming_task(number):
+        try:
+            cell = Cell.model_validate(values)
+        except ValidationError as error:
+            raise explain(error, str(path), values, _known_keys) from None
     cell._path, cell._text = path, text
-    _check_names(cell)
+    check_sequence(cell)
+    for number, stage in enumerate(cell.stages):
+        with naming_task(number if cell.tasks else None):
+            _check_names(stage)
     return _with_parts(cell)
 
 
@@ -189,8 +234,12 @@ def _with_parts(cell: Cell) -> Cell:
                 update[key] = load_part(role, given, place.at(f"{at}.{key}"), usual or "")
         return table.model_copy(update=update)
 
-    roles = {"tracker": "tracker", "planner": "planner", "matcher": "matcher"}
-    of_task = {key: role for key, role in roles.items() if hasattr(cell.task, key)}
+    def task_filled(table: Task, at: str) -> Table:
+        roles = {"tracker": "tracker", "planner": "planner", "matcher": "matcher"}
+        of_task = {key: role for key, role in roles.items() if hasattr(table, key)}
+        return filled(table, at, until="task_end", **of_task)
+
+    tasks = tuple(task_filled(table, f"tasks.{i}") for i, table in enumerate(cell.tasks))
     update = {
         "law": law("law", cell.law),
         "laws": {name: law(f"laws.{name}", table) for name, table in cell.laws.items()},
@@ -199,7 +248,8 @@ def _with_parts(cell: Cell) -> Cell:
             name: filled(arm, f"arms.{name}", motion="arm_motion")
             for name, arm in cell.arms.items()
         },
-        "task": filled(cell.task, "task", **of_task),
+        "task": tasks[0] if tasks else task_filled(cell.task, "task"),
+        "tasks": tasks,
         "perception": filled(cell.perception, "perception", filter="filter"),
     }
     return cell.model_copy(update=update)
@@ -259,6 +309,10 @@ def _check_names(cell: Cell) -> None:
         check("perception.cameras", name, cell.cameras)
     if cell.target.carried_by is not None:
         check("target.carried_by", cell.target.carried_by, cell.arms)
+    for name, output in cell.outputs.items():
+        check(f"outputs.{name}.arm", output.arm, cell.arms)
+    if isinstance(cell.task, SwitchTable):
+        check("task.output", cell.task.output, cell.outputs)
     _check_sight(cell)
     if cell.tool is not None:
         check("task.tool.camera", cell.tool.camera, cell.cameras)

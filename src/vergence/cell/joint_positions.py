@@ -11,7 +11,7 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.cell.cell import Cell
 from vergence.cell.schema import ReachTable
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.robot import Arm
 
 _ROUNDING = 1e-3  # of a limit written with few digits
@@ -48,7 +48,7 @@ def goal_positions(cell: Cell, arm: Arm) -> FloatArray:
     given = cell.task.goal_deg if isinstance(cell.task, ReachTable) else None
     if given is None:
         allowed = "the joints at which the desired image was taken"
-        raise InputError(str(cell.path), "task.goal_deg", "nothing", allowed)
+        raise InputError(str(cell.path), "task.goal_deg", NOTHING, allowed)
     return joint_positions(cell, "task.goal_deg", given, arm)
 
 

@@ -28,19 +28,19 @@ def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> s
         if isinstance(change, Mapping) and not is_whole(change):
             text += settings_text(change, now, f"{above}{key}.")
         else:
-            text += f"\n# set: {above}{key} = {_toml(now)}"
+            text += f"\n# set: {above}{key} = {toml_value(now)}"
     return text
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """Return a value in TOML, nothing for None."""
     if value is None:
         return ""
     if isinstance(value, Mapping):
         known = {key: one for key, one in value.items() if one is not None}
-        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in known.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_value(one)}" for key, one in known.items()) + " }"
     if isinstance(value, list | tuple | np.ndarray):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     if isinstance(value, np.generic):
         value = value.item()
     return json.dumps(value, default=str)

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 
 _MOST_BYTES = 1 << 18  # of a file: a cell of fifty arms has a fifth of it
 _LONGEST_SETTING = 1 << 14  # characters
@@ -24,7 +24,10 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
     except OSError as error:
-        raise InputError(str(path), "", error.strerror or str(error), "a TOML file") from None
+        why = Absent(error.strerror or str(error))
+        raise InputError(str(path), "", why, "a TOML file") from None
+    if b"\0" in data:
+        raise InputError(str(path), "", Absent("not TOML: not even text"), "a TOML file")
     if len(data) > _MOST_BYTES:
         raise InputError(
             str(path), "", "a longer file", f"a TOML file of at most {_MOST_BYTES} bytes"
@@ -35,7 +38,8 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     except RecursionError:
         raise InputError(str(path), "", "values nested too deep", _depth()) from None
     except ValueError as error:  # no UTF-8, no TOML, an integer of thousands of digits
-        raise InputError(str(path), "", _first_line(error), "a TOML file") from None
+        why = Absent(f"not TOML: {_first_line(error)}")
+        raise InputError(str(path), "", why, "a TOML file") from None
     _check(values, str(path), "")
     return text, values
 

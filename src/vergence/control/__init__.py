@@ -1,14 +1,17 @@
 """Control: objectives, limits, solvers, the servo that sums them, and the guard behind it."""
 
+from vergence.control.clear_braking import ClearBraking
 from vergence.control.depth import (
     CarriedDepth,
     Depth,
+    DepthFromCamera,
     DepthFromFeatures,
     DepthFromMotion,
     DepthFromPose,
     HeldDepth,
 )
 from vergence.control.guard import (
+    Braking,
     Guard,
     closing_rates,
     guarded_step,
@@ -25,6 +28,7 @@ from vergence.control.moving_pose import MovingPose, moved, pose_difference
 from vergence.control.objectives import (
     AXES,
     CameraState,
+    CameraVelocity,
     ImageBased,
     InteractionModel,
     JointQuadratic,
@@ -52,15 +56,19 @@ from vergence.control.solvers import (
     resolve_redundant,
     singular_fault,
 )
+from vergence.control.successor import Successor
 from vergence.control.term import Term
 
 __all__ = [
     "AXES",
+    "Braking",
     "CameraMounting",
     "CameraState",
     "CarriedDepth",
+    "ClearBraking",
     "DampedPseudoInverse",
     "Depth",
+    "DepthFromCamera",
     "DepthFromFeatures",
     "DepthFromMotion",
     "DepthFromPose",
@@ -84,6 +92,7 @@ __all__ = [
     "PointPose",
     "PoseServo",
     "PositionBased",
+    "CameraVelocity",
     "Posture",
     "PseudoInverse",
     "Quadratic",
@@ -92,6 +101,7 @@ __all__ = [
     "ServoSettings",
     "Situation",
     "Solver",
+    "Successor",
     "TargetView",
     "Term",
     "TrackingSetup",

@@ -1,6 +1,6 @@
 """Final safety stage: set-points that keep every position, rate and acceleration limit."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -26,7 +26,7 @@ class GuardedStep(NamedTuple):
 def guarded_step(
     position: FloatArray,
     velocity: FloatArray,
-    wanted: FloatArray,
+    commanded: FloatArray,
     limits: FloatArray,
     dt: float,
 ) -> GuardedStep:
@@ -39,7 +39,7 @@ def guarded_step(
     Args:
         position: of the last set-point, (n,).
         velocity: of the last set-point, (n,).
-        wanted: the rates asked for, (n,).
+        commanded: the rates asked for, (n,).
         limits: rows q_min, q_max, rate_max, acceleration_max, (4, n).
         dt: inner period, s.
     """
@@ -48,14 +48,14 @@ def guarded_step(
     at_limit = np.zeros(n, dtype=np.bool_)
     for i in range(n):
         new_position[i], new_velocity[i], at_limit[i] = guarded_joint(
-            position[i], velocity[i], wanted[i], limits[:, i], dt
+            position[i], velocity[i], commanded[i], limits[:, i], dt
         )
     return GuardedStep(new_position, new_velocity, at_limit)
 
 
 @njit(cache=True, error_model="numpy")
 def guarded_joint(
-    position: float, velocity: float, wanted: float, limits: FloatArray, dt: float
+    position: float, velocity: float, commanded: float, limits: FloatArray, dt: float
 ) -> tuple[float, float, bool]:
     """Do one joint's part of `guarded_step`; limits (4,).
 
@@ -63,7 +63,7 @@ def guarded_joint(
     there.
     """
     a = limits[3]
-    v = reachable_rate(wanted, limits[2])
+    v = reachable_rate(commanded, limits[2])
     if position > limits[1]:
         v = min(v, -min(closing_speed(position - limits[1], a, dt), limits[2]))
     elif position < limits[0]:
@@ -80,16 +80,16 @@ def guarded_joint(
 
 
 @njit(cache=True, error_model="numpy")
-def reachable_rate(wanted: float, rate_max: float) -> float:
+def reachable_rate(commanded: float, rate_max: float) -> float:
     """Return the rate that is meant: within its limit, and rest where it is not a number."""
-    return min(max(wanted, -rate_max), rate_max) if np.isfinite(wanted) else 0.0
+    return min(max(commanded, -rate_max), rate_max) if np.isfinite(commanded) else 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def guarded_steps(
     position: FloatArray,
     velocity: FloatArray,
-    wanted: FloatArray,
+    commanded: FloatArray,
     limits: FloatArray,
     dt: float,
     count: int,
@@ -103,14 +103,14 @@ def guarded_steps(
     Args:
         position: set-points, (n,); moved.
         velocity: their rates, (n,); changed.
-        wanted: as for `guarded_step`, and so are the rest.
+        commanded: as for `guarded_step`, and so are the rest.
         limits: (4, n).
         dt: inner period, s.
         count: how many steps.
         stuck: says which joints a limit held back at every step, (n,); filled.
     """
     for i in range(len(position)):
-        step, v = limits[3, i] * dt, reachable_rate(wanted[i], limits[2, i])
+        step, v = limits[3, i] * dt, reachable_rate(commanded[i], limits[2, i])
         change = v - velocity[i]
         ramp = min(np.floor(abs(change) / step), float(count))
         up, down = max(velocity[i], v, 0.0), max(-velocity[i], -v, 0.0)
@@ -129,7 +129,7 @@ def guarded_steps(
         stuck[i] = True
         for _ in range(count):
             position[i], velocity[i], at_limit = guarded_joint(
-                position[i], velocity[i], wanted[i], limits[:, i], dt
+                position[i], velocity[i], commanded[i], limits[:, i], dt
             )
             stuck[i] &= at_limit
 
@@ -167,6 +167,14 @@ def closing_rates(gap: FloatArray, limits: FloatArray, dt: float) -> FloatArray:
     return rates
 
 
+class Braking(Protocol):
+    """Knows what an arm would touch."""
+
+    def hindrance(self, setpoint: Setpoint) -> str:
+        """Return what the arm would touch if it braked from here; else nothing."""
+        ...
+
+
 class Guard:
     """Set-points of one arm, stepped at the inner rate and kept inside all its limits.
 
@@ -177,13 +185,19 @@ class Guard:
         arm: the arm with its limits.
         start: joint positions at the start, (n,) rad or m.
         period_s: of the steps.
+        braking: finds what the arm would touch if it braked from a set-point; None for nothing.
+
+    Attributes:
+        hindrance: what it would have touched, from then on only braking; else nothing.
 
     Raises:
         InputError: if the positions are not finite numbers, or the period is not above zero.
         ShapeError: if there is not one position a joint.
     """
 
-    def __init__(self, arm: Arm, start: ArrayLike, period_s: float) -> None:
+    def __init__(
+        self, arm: Arm, start: ArrayLike, period_s: float, braking: Braking | None = None
+    ) -> None:
         if not 0.0 < period_s < np.inf:
             raise InputError("Guard", "period_s", period_s, "a number of seconds above zero")
         position = as_floats(start, (arm.joint_count,), "start")
@@ -195,6 +209,7 @@ class Guard:
         self._velocity: FloatArray = np.zeros(arm.joint_count)
         self._wanted = np.zeros(arm.joint_count)  # writeable and contiguous, as the kernel expects
         self.joint_count = arm.joint_count
+        self._braking, self.hindrance = braking, ""
         self.at_limit: BoolArray = np.zeros(arm.joint_count, dtype=np.bool_)
 
     @property
@@ -221,9 +236,14 @@ class Guard:
             ShapeError: if there is not one rate a joint; no set-point is made.
         """
         self._wanted[:] = as_floats(rates, (self.joint_count,), "rates")
-        self._position, self._velocity, self.at_limit = guarded_step(
+        position, velocity, at_limit = guarded_step(
             self._position, self._velocity, self._wanted, self._limits, self._dt
         )
+        if self._braking is not None and not self.hindrance:
+            self.hindrance = self._braking.hindrance(Setpoint(position, velocity))
+        if self.hindrance:
+            return self.brake()
+        self._position, self._velocity, self.at_limit = position, velocity, at_limit
         return self.setpoint
 
     def brake(self) -> Setpoint:

@@ -11,6 +11,7 @@ from vergence.arrays import FloatArray
 from vergence.control.depth import Depth, Depths, HeldDepth, MeasuredPoints
 from vergence.control.depth.depth import in_front
 from vergence.control.mounting import CameraMounting
+from vergence.control.target_flow import TargetFlow
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import Arm, forward_kinematics
 from vergence.signals import ImagePoints, JointState, TargetState
@@ -34,13 +35,13 @@ class MotionSettings(NamedTuple):
             motion that a wrong depth feigns would be fed forward like any other.
         prediction: whether features are carried from their exposure to now; else they are taken as
             they are, late.
-        flow_smoothing_s: time constant of the target's motion in the image, s.
+        flow_smoothing_s: time constant of the target's motion in the image, s; see `TargetFlow`.
         depth: where the depth of the features is had from.
     """
 
     feed_forward: bool | None = None
     prediction: bool = True
-    flow_smoothing_s: float = 0.1
+    flow_smoothing_s: float = 0.2
     depth: Depth = HeldDepth()
 
     @property
@@ -70,8 +71,8 @@ class ImageMotion:
 
     A feature seen at exposure is lifted to its depth, moved with the camera's motion since, which
     the joints tell, and projected again; what consecutive images then leave unexplained is the
-    target's own motion, smoothed to a flow and extrapolated. So a servo acts on the present
-    although images are late, and can feed the target's motion forward.
+    target's own motion, smoothed to a flow with its trend and extrapolated. So a servo acts on the
+    present although images are late, and can feed the target's motion forward.
 
     Args:
         arm: up to its tip.
@@ -94,14 +95,13 @@ class ImageMotion:
     ) -> None:
         settings = settings or MotionSettings()
         self._arm, self._mounting, self._memory_s = arm, mounting, memory_s
-        self._smoothing_s = settings.flow_smoothing_s if settings.feeds_forward else np.inf
+        self._flow = TargetFlow(settings.flow_smoothing_s if settings.feeds_forward else np.inf)
         self._prediction = settings.prediction
         self._held = isinstance(settings.depth, HeldDepth)
         self._bind = partial(settings.depth.bind, features)
         self._depth_source = self._bind()
         self._history: deque[tuple[float, FloatArray]] = deque()
         self._last: _Exposure | None = None
-        self._flow: FloatArray | None = None
 
     def update(
         self,
@@ -122,22 +122,23 @@ class ImageMotion:
         q_exposed = self._joints_at(view.time)
         points = self._mounting.camera.normalize(view.points_px)
         if self._last is not None and len(points) != len(self._last.points):
-            self._last = self._flow = None  # other features
+            self._last = None  # other features
+            self._flow.clear()
             self._depth_source = self._bind()
         if self._last is None or view.time > self._last.time:
             self._expose(view, points, depth, q_exposed, target)
         assert self._last is not None
-        assert self._flow is not None
-        flow, exposed = self._flow, self._last.depths
+        exposed = self._last.depths
         if self._held:
             exposed = Depths(depth)
         if not self._prediction:
-            return FeatureState(points, flow, *exposed)
+            return FeatureState(points, self._flow.at(0.0), *exposed)
         now = self._seen_from(points, exposed.depth_m, q_exposed, joints.position)
-        ahead = now[:, :2] + flow * (joints.time - view.time)
+        elapsed = joints.time - view.time
+        ahead = now[:, :2] + self._flow.moved(elapsed)
         moved = np.where(np.isfinite(now[:, 2]), now[:, 2], exposed.depth_m)
         depth_now = depth if self._held else in_front(moved, depth)
-        return FeatureState(ahead, flow, depth_now, exposed.share)
+        return FeatureState(ahead, self._flow.at(elapsed), depth_now, exposed.share)
 
     def _expose(
         self,
@@ -156,18 +157,18 @@ class ImageMotion:
             self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q)),
             depth,
             target,
+            view.depth_m,
+            view.depth_deviation_m,
         )
         depths = self._depth_source.update(measured)
-        if self._flow is None:
-            self._flow = np.zeros_like(points)
-        if self._last is not None:
+        if self._last is None:
+            self._flow.start(len(points))
+        else:
             last, elapsed = self._last, view.time - self._last.time
             before = depth if self._held else last.depths.depth_m
             stationary = self._seen_from(last.points, before, last.q, q)
-            share = elapsed / (elapsed + self._smoothing_s)
-            change = share * ((points - stationary[:, :2]) / elapsed - self._flow)
-            known = view.found & np.isfinite(change).all(axis=1)
-            self._flow = self._flow + np.where(known[:, None], change, 0.0)
+            flow = (points - stationary[:, :2]) / elapsed
+            self._flow.measure(flow, view.found, elapsed)
         self._last = _Exposure(view.time, q, points, depths)
 
     def _seen_from(

@@ -54,7 +54,7 @@ class PoseServo:
         self._arm, self._mounting, self._situation = arm, mounting, situation
         setting = Setting(
             arm, mounting, limits, situation.period_s, situation.obstacles,
-            situation.depth_range, situation.start,
+            situation.depth_range, situation.start, situation.clearance,
         )  # fmt: skip
         self._solver = (QuadraticProgram() if solver is None else solver).bind(setting)
         self._trajectory = PoseTrajectory(objective, arm, situation.period_s)
@@ -65,6 +65,14 @@ class PoseServo:
             self._view = TargetView(mounting, corners, *self._solver.view)
         count = len(self._solver.names)
         self._active, self._slack, self._solved = np.zeros(count), np.zeros(count), True
+
+    def take_over(self, previous: object) -> bool:
+        """Go on along the trajectory of another servo of this kind; return whether it is one."""
+        if not isinstance(previous, PoseServo):
+            return False
+        self._trajectory.take_over(previous._trajectory)
+        self._null_space = previous._null_space
+        return True
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -93,6 +101,7 @@ class PoseServo:
             pressure.active,
             solution.fault,
             slack=pressure.slack,
+            clearance=solution.clearance,
         )
 
     def follow(self, setpoint: Setpoint) -> FloatArray:

@@ -31,9 +31,9 @@ from vergence.control.solvers import (
 )
 from vergence.control.solvers.solver import NO_JOINTS, Solution
 from vergence.control.term import Term
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 from vergence.features import Points
-from vergence.robot import Arm
+from vergence.robot import Arm, Clearance
 from vergence.signals import (
     ImagePoints,
     JointCommand,
@@ -45,6 +45,7 @@ from vergence.signals import (
 
 Cameras: TypeAlias = Camera | CameraMounting | Mapping[str, CameraMounting]
 _STALE_S = 0.3  # beside other cameras, what one saw longer ago no longer counts
+_PLAN_WEIGHT = 1e-3  # of a plan's joint rates: where the image says little, joints go its way
 AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
 NO_FEATURES = pack_features(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
 
@@ -61,6 +62,7 @@ class Situation(NamedTuple):
         fewest: found features below which the target is lost.
         features: in the target's frame, (M, 3), m, by camera, where they are known; "" for the only
             camera.
+        clearance: gives the distances between what must not touch; None for nothing.
     """
 
     period_s: float = 1 / 30
@@ -70,6 +72,7 @@ class Situation(NamedTuple):
     start: FloatArray | None = None
     fewest: int = 1
     features: Mapping[str, FloatArray] = MappingProxyType({})
+    clearance: Clearance | None = None
 
 
 class Servo:
@@ -121,6 +124,7 @@ class Servo:
                 self._situation.obstacles,
                 self._situation.depth_range,
                 self._situation.start,
+                self._situation.clearance,
             )
         )
         motion = self._situation.motion
@@ -150,6 +154,21 @@ class Servo:
     def feeds_forward(self) -> bool:
         """Whether features or depth are carried to now, or the target's motion is fed forward."""
         return self._motions[self._first] is not None
+
+    def take_over(self, previous: object) -> bool:
+        """Go on with the target's motion in the image and the depth as another servo has them.
+
+        Where the two estimate them differently, they are estimated afresh.
+
+        Returns:
+            Whether the other is a servo, whose command holds until the next image.
+        """
+        if not isinstance(previous, Servo):
+            return False
+        if self._situation.motion == previous._situation.motion:
+            for name in self._motions.keys() & previous._motions.keys():
+                self._motions[name] = previous._motions[name]
+        return True
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
@@ -223,7 +242,7 @@ class Servo:
     def _believed(self, camera: str) -> FloatArray:
         depth = self._depth_m[camera]
         if depth is None:
-            raise InputError("Servo", "depth_m", "nothing", "the depth of the features in metres")
+            raise InputError("Servo", "depth_m", NOTHING, "the depth of the features in metres")
         return depth
 
     def _too_few(
@@ -310,7 +329,12 @@ class Servo:
             state = states.get(camera)
             if state is None:
                 continue
-            quadratic = objective.quadratic(state)
+            try:
+                quadratic = objective.quadratic(state)
+            except InputError as error:  # the points make no such feature, such as a line end on
+                reason = f"{error.source}: {error.given}; needs {error.allowed}"
+                lost = OutcomeKind.TARGET_LOST, reason
+                return JointCommand(self._rest, np.zeros(6), fault=lost)
             if isinstance(quadratic, JointQuadratic):
                 n = len(self._rest)
                 if not len(g_joints):
@@ -343,6 +367,7 @@ class Servo:
             H_joints,
             g_joints,
             A,
+            _PLAN_WEIGHT if rates is not None and rates.any() else 0.0,
             float("nan") if first is None else first.depth_share,
         )
         return command_of(self._solver.solve(problem), A, self._solver.names)
@@ -359,6 +384,7 @@ def command_of(solution: Solution, A: FloatArray, names: tuple[str, ...]) -> Joi
         said.active,
         solution.fault,
         slack=said.slack,
+        clearance=solution.clearance,
     )
 
 
@@ -379,7 +405,7 @@ def _by_name(cameras: Cameras) -> dict[str, CameraMounting]:
     if isinstance(cameras, CameraMounting):
         return {"": cameras}
     if not cameras:
-        raise InputError("Servo", "cameras", "none", "one camera or more")
+        raise InputError("Servo", "cameras", Absent("none"), "one camera or more")
     return dict(cameras)
 
 
@@ -389,7 +415,7 @@ def _terms(
     """Return objectives as terms, each with the name of its camera."""
     listed = objectives if isinstance(objectives, Sequence) else [objectives]
     if not listed:
-        raise InputError("Servo", "objectives", "none", "one objective or more")
+        raise InputError("Servo", "objectives", Absent("none"), "one objective or more")
     first = next(iter(cameras))
     terms = []
     for given in listed:

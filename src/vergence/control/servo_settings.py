@@ -9,7 +9,7 @@ from vergence.control.limits import Limits
 from vergence.control.objectives import Objective
 from vergence.control.solvers import QuadraticProgram, Solver
 from vergence.control.term import Term
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 from vergence.loading import Place, load_part, make_part, part_class
 from vergence.parts import field_names, kind_of, knob, part, slot, table_of
 
@@ -43,12 +43,12 @@ class ServoSettings:
     )  # the target's own motion; if None, where it moves and the depth is right for that
     prediction: bool = knob(True)  # features are carried from their exposure to now
     flow_smoothing_s: float = knob(
-        0.1, "s", least=0, upto=10
-    )  # of the target's motion in the image
+        0.2, "s", least=0, upto=10
+    )  # of the target's motion in the image, which is followed with its trend
 
     def __post_init__(self) -> None:
         if not self.objectives:
-            raise InputError("law", "objectives", "none", "one objective or more")
+            raise InputError("law", "objectives", Absent("none"), "one objective or more")
 
     @property
     def kind(self) -> str:
@@ -130,7 +130,7 @@ def _term(given: Any, place: Place) -> WeightedObjective:
     rest = {key: value for key, value in given.items() if key not in beside}
     if "kind" not in rest:
         key = f"{place.key}.kind"
-        raise InputError(place.source, key, "nothing", "a value; this key is required")
+        raise InputError(place.source, key, NOTHING, "a value")
     objective = part_class("objective", rest.pop("kind"), place)
     known = {*field_names(objective), *field_names(ServoSettings)}
     for key in rest:

@@ -11,6 +11,7 @@ from vergence.drivers.equipment import Equipment
 from vergence.drivers.local_cameras import LocalCameras
 from vergence.errors import DriverSilent
 from vergence.robot import Arm
+from vergence.runtime.driver import HasOutputs, outputs_of
 from vergence.runtime.hardware import JointHistory
 from vergence.signals import JointState, Sample, Setpoint
 
@@ -47,7 +48,7 @@ class ArmDriver:
     def read(self) -> Sample:
         """Return joints now, and the images that arrived since the last call."""
         reading = self._reading
-        frames = self._cameras.frames(self._joints_at)
+        frames = self._cameras.frames(self._joints_at, reading.time)
         joints = {self._name: JointState(reading.time, reading.position, reading.velocity)}
         return Sample(reading.time, joints, frames, {self._name: reading.robot})
 
@@ -60,6 +61,16 @@ class ArmDriver:
         self._due = period + (self._reading.time if missed else self._due)
         self._wait()
         self._note()
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the link's outputs; none if it has none."""
+        return outputs_of(self._link)
+
+    def set_output(self, name: str, value: float) -> None:
+        """Set an output of the link."""
+        assert isinstance(self._link, HasOutputs), "only an output that there is can be set"
+        self._link.set_output(name, value)
 
     def close(self) -> None:
         """Let go of arm and cameras."""
@@ -80,7 +91,7 @@ class ArmDriver:
                 last, deadline = self._reading.time, now + self._timeout_s
             if now > deadline:
                 raise DriverSilent(f"the controller's clock has stood for {self._timeout_s:g} s")
-            sleep(min(max(0.5 * left, _POLL_S), 0.01))
+            sleep(min(max(left - _POLL_S, _POLL_S), 0.01))  # each reading costs more than sleep
 
     def _note(self) -> None:
         time, position, velocity, _ = self._reading

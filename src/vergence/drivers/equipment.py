@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from vergence.camera import Camera
 from vergence.drivers.camera_source import CameraSource
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.robot import Arm
 
 
@@ -55,4 +55,4 @@ class Equipment:
                 allowed = (
                     f'a source, such as {{ kind = "video", source = 0 }}: {kind} has no camera'
                 )
-                raise InputError(self.source, f"driver.cameras.{name}", "nothing", allowed)
+                raise InputError(self.source, f"driver.cameras.{name}", NOTHING, allowed)

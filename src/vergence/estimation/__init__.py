@@ -13,6 +13,7 @@ from vergence.estimation.held_target import (
 from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure
+from vergence.estimation.measured_depth import WithMeasuredDepth, depth_of_points
 from vergence.estimation.perception import PosePerception
 from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.pose_filter import PoseFilter
@@ -22,6 +23,7 @@ from vergence.estimation.rpy_belief import RpyBelief
 from vergence.estimation.rpy_filter import RpyPoseFilter
 from vergence.estimation.selected_points import SelectedPoints
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
+from vergence.estimation.self_calibration import SelfCalibration, SelfCalibrator
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.tracked_points import TrackedPoints
@@ -79,4 +81,8 @@ __all__ = [
     "predict_visibility",
     "seen_from_tip",
     "view_of",
+    "SelfCalibration",
+    "SelfCalibrator",
+    "WithMeasuredDepth",
+    "depth_of_points",
 ]

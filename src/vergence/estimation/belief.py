@@ -6,7 +6,6 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.estimation.consistency import Consistency
-from vergence.signals import TargetState
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +28,3 @@ class Belief:
     def honest_covariance(self) -> FloatArray:
         """The covariance, (12, 12), enlarged while the innovations say that it is too small."""
         return self.covariance * self.consistency.scale
-
-    def state(self) -> TargetState:
-        """Return the belief as perception hands it on."""
-        return TargetState(
-            self.time,
-            self.T_world_target,
-            self.velocity,
-            self.honest_covariance,
-            self.consistency.holds and self.disagreeing < 0.5,
-        )

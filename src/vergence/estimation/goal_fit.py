@@ -88,6 +88,8 @@ def fit_goal(
     """
     T, X = guess.T_world_goal.copy(), guess.points_world.copy()
     damping, system = 1e-6, _System.at(T, X, goal, images, prior)
+    if not np.isfinite(system.cost):
+        return None
     for _ in range(_ITERATIONS):
         step, dX = system.solve(max(damping, _FLOOR))
         T_new, X_new = _moved(T, step), X + dX
@@ -101,8 +103,6 @@ def fit_goal(
         T, X, system, damping = T_new, X_new, new, 0.1 * damping
         if small < _ENOUGH:
             break
-    if not np.isfinite(system.cost):
-        return None
     S, _ = system.reduced(_FLOOR)
     freedom = system.measured - 6 - 3 * len(X)
     covariance: FloatArray = np.linalg.inv(S).astype(np.float64)

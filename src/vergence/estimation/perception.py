@@ -23,7 +23,7 @@ from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
-from vergence.estimation.target_filter import B, TargetFilter, Verdict
+from vergence.estimation.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.view import View, view_of
 from vergence.estimation.visibility import (
@@ -137,7 +137,7 @@ class PosePerception(Generic[B]):
             time, [look.view for look in looks], [prediction.frame for prediction in predictions]
         )
         points = self._points(predictions, visibility, looks, agreeing)
-        return Observation(time, points, None if self._lost else self.belief.state())
+        return Observation(time, points, None if self._lost else state_of(self.belief))
 
     def _expected(self, time: float) -> Expected:
         belief = self._last_seen if self._lost else self._history.at(time)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.belief import Belief
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
@@ -15,8 +15,7 @@ from vergence.estimation.target_filter import (
     Update,
     Verdict,
     fading_share,
-    require_covariance,
-    require_finite,
+    first_values,
     unused,
 )
 from vergence.estimation.view import Seen
@@ -156,15 +155,8 @@ class PoseFilter:
         Raises:
             InputError: if the covariance is not one, or anything is not finite.
         """
-        if covariance is None:
-            covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
-        covariance = frozen(covariance, (12, 12), "covariance")
-        pose = frozen(T_world_target, (4, 4), "T_world_target")
-        rates = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
-        require_finite(pose, "PoseFilter", "T_world_target")
-        require_finite(rates, "PoseFilter", "velocity")
-        require_covariance(covariance, "PoseFilter")
-        return Belief(time, pose, rates, covariance)
+        given = first_values("PoseFilter", T_world_target, velocity, covariance)
+        return Belief(time, *given)
 
     def predict(self, belief: Belief, time: float) -> Belief:
         """Return the belief at another time, later or (for a look back over latency) earlier.

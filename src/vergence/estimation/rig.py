@@ -9,7 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.camera.lens import FX, FY, pack_lens
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class CameraRig:
             InputError: if there is no camera, or a noise is missing or not above zero.
         """
         if not cameras:
-            raise InputError("CameraRig", "cameras", "none", "at least one camera")
+            raise InputError("CameraRig", "cameras", Absent("none"), "at least one camera")
         names = tuple(cameras)
         noise = [_noise_of(name, noise_px) for name in names]
         lenses = [pack_lens(camera) for camera in cameras.values()]
@@ -50,7 +50,7 @@ class CameraRig:
 def _noise_of(name: str, noise_px: float | Mapping[str, float]) -> float:
     if isinstance(noise_px, Mapping):
         if name not in noise_px:
-            raise InputError("CameraRig", f"noise_px.{name}", "nothing", nearest(name, noise_px))
+            raise InputError("CameraRig", f"noise_px.{name}", NOTHING, nearest(name, noise_px))
         value = float(noise_px[name])
     else:
         value = float(noise_px)

@@ -8,7 +8,6 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.estimation.consistency import Consistency
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3
-from vergence.signals import TargetState
 
 
 @njit(cache=True)
@@ -67,13 +66,3 @@ class RpyBelief:
     def honest_covariance(self) -> FloatArray:
         """The covariance, (12, 12), enlarged while the innovations say that it is too small."""
         return self.covariance * self.consistency.scale
-
-    def state(self) -> TargetState:
-        """Return the belief as perception hands it on."""
-        return TargetState(
-            self.time,
-            self.T_world_target,
-            self.velocity,
-            self.honest_covariance,
-            self.consistency.holds and self.disagreeing < 0.5,
-        )

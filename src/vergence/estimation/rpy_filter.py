@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import FloatArray
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
 from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
@@ -14,8 +14,7 @@ from vergence.estimation.target_filter import (
     Update,
     Verdict,
     fading_share,
-    require_covariance,
-    require_finite,
+    first_values,
     unused,
 )
 from vergence.estimation.view import Seen
@@ -108,14 +107,8 @@ class RpyPoseFilter:
         Raises:
             InputError: if the covariance is not one, or anything is not finite.
         """
-        if covariance is None:
-            covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
-        covariance = frozen(covariance, (12, 12), "covariance")
-        pose = frozen(T_world_target, (4, 4), "T_world_target")
-        twist = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
-        require_finite(pose, "RpyPoseFilter", "T_world_target")
-        require_finite(twist, "RpyPoseFilter", "velocity")
-        require_covariance(covariance, "RpyPoseFilter")
+        given = first_values("RpyPoseFilter", T_world_target, velocity, covariance)
+        pose, twist, covariance = given
         rpy = matrix_to_rpy(pose)
         w = np.concatenate((pose[:3, 3], rpy, twist))
         if twist[3:].any():

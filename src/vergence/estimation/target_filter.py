@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.errors import InputError
 from vergence.estimation.consistency import Consistency
 from vergence.estimation.view import Seen, View
@@ -38,6 +38,11 @@ class TargetBelief(Protocol):
         ...
 
     @property
+    def velocity(self) -> FloatArray:
+        """Twist (v, ω) of the target's origin along world axes, (6,), m/s and rad/s."""
+        ...
+
+    @property
     def honest_covariance(self) -> FloatArray:
         """Of (δp, δθ, δv, δω), world axes, (12, 12); enlarged while the filter is inconsistent."""
         ...
@@ -60,10 +65,6 @@ class TargetBelief(Protocol):
     @property
     def disagreeing(self) -> float:
         """Share of the last points that fell outside the gate, fading."""
-        ...
-
-    def state(self) -> TargetState:
-        """Return the belief as perception hands it on."""
         ...
 
 
@@ -140,7 +141,43 @@ def fading_share(share: float, kept: int, count: int, fading: float = 0.93) -> f
     return weight * share + (1.0 - weight) * (1.0 - kept / count)
 
 
-def require_covariance(covariance: FloatArray, source: str) -> None:
+def state_of(belief: TargetBelief) -> TargetState:
+    """Return a belief as perception hands it on."""
+    return TargetState(
+        belief.time,
+        belief.T_world_target,
+        belief.velocity,
+        belief.honest_covariance,
+        belief.consistency.holds and belief.disagreeing < 0.5,
+    )
+
+
+def first_values(
+    source: str,
+    T_world_target: FloatArray,
+    velocity: FloatArray | None,
+    covariance: FloatArray | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a filter starts from: pose (4, 4), twist (6,) and covariance (12, 12).
+
+    The target is at rest unless a twist is given; the covariance of (δp, δθ, δv, δω) is that of
+    3 cm, 0.1 rad, 0.2 m/s and 0.5 rad/s unless one is given.
+
+    Raises:
+        InputError: of the source, if the covariance is not one, or anything is not finite.
+    """
+    if covariance is None:
+        covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
+    covariance = frozen(covariance, (12, 12), "covariance")
+    pose = frozen(T_world_target, (4, 4), "T_world_target")
+    twist = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
+    _require_finite(pose, source, "T_world_target")
+    _require_finite(twist, source, "velocity")
+    _require_covariance(covariance, source)
+    return pose, twist, covariance
+
+
+def _require_covariance(covariance: FloatArray, source: str) -> None:
     """Raise InputError unless a matrix is finite, symmetric and at least semidefinite."""
     size = float(np.abs(covariance).max())
     allowed = "a finite, symmetric, positive semidefinite matrix"
@@ -153,7 +190,7 @@ def require_covariance(covariance: FloatArray, source: str) -> None:
         raise InputError(source, "covariance", f"eigenvalue {least:.3g}", allowed)
 
 
-def require_finite(values: FloatArray, source: str, key: str) -> None:
+def _require_finite(values: FloatArray, source: str, key: str) -> None:
     """Raise InputError unless every entry is finite."""
     if not np.isfinite(values).all():
         raise InputError(source, key, values.tolist(), "finite numbers")

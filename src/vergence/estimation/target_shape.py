@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, IntArray, frozen
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 
 TOUCHING = 1e-4  # of the target's size: a feature this near a face lies on it
 
@@ -48,7 +48,7 @@ class TargetShape:
         """
         features = frozen(points, (None, 3), "points")
         if not len(features):
-            raise InputError("TargetShape", "points", "none", "at least one feature")
+            raise InputError("TargetShape", "points", Absent("none"), "at least one feature")
         corners = frozen(vertices, (None, 3), "vertices")
         index = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         if index.size and not (index.min() >= 0 and index.max() < len(corners)):

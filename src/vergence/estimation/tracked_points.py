@@ -89,4 +89,5 @@ class TrackedPoints:
             found,
             tracks.reasons,
             tracks.windows,
+            getattr(tracks, "joined", None),
         )

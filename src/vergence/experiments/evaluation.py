@@ -12,6 +12,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 _ENDINGS = {
     OutcomeKind.JOINT_LIMIT: Ending.JOINT_LIMIT,
+    OutcomeKind.COLLISION: Ending.COLLISION,
     OutcomeKind.SINGULARITY: Ending.SINGULAR,
 }
 

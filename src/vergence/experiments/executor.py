@@ -124,12 +124,18 @@ class Executor:
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
+            client.run(_keep_quiet)
             yield client
+
+
+def _keep_quiet() -> None:
+    """Leave warnings about a cell, in a worker, to the process that shares out its runs."""
+    logging.getLogger("vergence").setLevel(logging.ERROR)
 
 
 def _distributed(executor: Executor) -> Any:
     if executor.scheduler is None:
-        given = f"{executor.workers} processes"
+        given = f"sharing runs among {executor.workers} processes"
         return optional_package(given, "distributed", "cluster", "--workers")
     return optional_package("a Dask scheduler", "distributed", "cluster", "--scheduler")
 

@@ -8,26 +8,35 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.assembly import assemble_parts
 from vergence.cell import Cell
 from vergence.cell.joint_positions import joint_positions
+from vergence.cell.schema import TrackTable
 from vergence.control import OptimalTracking, PseudoInverse, ServoSettings
 from vergence.experiments.batch import KinematicRun
 from vergence.geometry import transform_points
+from vergence.robot import Clearance
 from vergence.runtime.timeouts import Timeouts
 from vergence.signals import Outcome
 from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 from vergence.simulation.as_built import as_built
 from vergence.simulation.cell_model import CellModel
 from vergence.simulation.kinematic_driver import Sees
+from vergence.vision import CurveTracking
 
 
 def is_ideal(cell: Cell) -> bool:
-    """Tell whether a cell is one arm that tracks known features with the one camera it carries."""
+    """Tell whether a cell is one arm that tracks known features with the one camera it carries.
+
+    A planned way to them is not ideal: its runs are made in physics, where they may plan again.
+    """
     camera = cell.cameras[cell.task.camera]
     return (
-        cell.task.kind == "track"
+        isinstance(cell.task, TrackTable)
+        and cell.task.approach == "direct"
+        and cell.task.until is None
         and len(cell.arms) == len(cell.cameras) == 1
         and camera.arm == cell.task.arm
         and not camera.blind_s
         and cell.target.features is not None
+        and not isinstance(cell.task.tracker, CurveTracking)
         and cell.target.carried_by is None
         and cell.arms[cell.task.arm].motion is None
     )
@@ -50,6 +59,7 @@ class KinematicRuns:
     def __init__(self) -> None:
         self._key = ""
         self._made: tuple[SimulatedDriver, CellModel] | None = None
+        self._clearance: Clearance | None = None  # of the same world
 
     def run_of(self, cell: Cell) -> KinematicRun:
         """Return the run of a cell that `is_ideal`.
@@ -82,13 +92,27 @@ class KinematicRuns:
             seed=cell.seed,
             sees=_eyesight(driver, arm, camera),
         )
+        assert isinstance(cell.task, TrackTable), "an ideal cell tracks"
         timeouts = Timeouts(cell.task.image_timeout_s, cell.task.target_timeout_s)
-        return KinematicRun(ideal, parts.law, desired, cell.duration_s, timeouts=timeouts)
+        if self._clearance is None:
+            self._clearance = parts.context.clearance
+        return KinematicRun(
+            ideal,
+            parts.law,
+            desired,
+            cell.duration_s,
+            timeouts=timeouts,
+            clearance=self._clearance,
+        )
 
     def _driver_of(self, cell: Cell) -> tuple[SimulatedDriver, CellModel]:
         key = as_built(cell).model_dump_json(exclude=_apart_from(cell))
         if self._made is None or key != self._key:
-            self._made, self._key = (SimulatedDriver(cell, images=False), CellModel(cell)), key
+            self._clearance = None
+            self._made, self._key = (
+                (SimulatedDriver(cell, images=False), CellModel(cell, hulls=True)),
+                key,
+            )
         return self._made
 
 

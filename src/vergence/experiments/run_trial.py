@@ -1,6 +1,7 @@
 """Trials, in whatever process."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_bat
 from vergence.experiments.evaluation import TrueTracks, trial_result
 from vergence.experiments.kinematic import KinematicRuns, is_ideal
 from vergence.experiments.source import CellSource
+from vergence.experiments.stays_clear import stays_clear
 from vergence.experiments.trial import Ending, Trial, TrialResult
 from vergence.runtime import Run
 from vergence.signals import OutcomeKind
@@ -28,7 +30,9 @@ def run_trials(
     """Run trials on exact projections; the same arguments give the same results anywhere.
 
     Where the cell is one arm with one camera it moves exactly as it is told: in the batch kernel
-    if that knows the law, else in the loop. Any other cell runs in simulated physics.
+    if that knows the law, else in the loop. The kernel knows neither bodies nor surfaces: a run on
+    which the arm may touch something, or a feature is hidden, is made in the loop as well. Any
+    other cell runs in simulated physics.
 
     Args:
         source: of the cell.
@@ -59,8 +63,9 @@ def run_trials(
             results[trial.key] = _in_loop(run, trial, tolerance_px)
     traces = run_batch([run for _, run in waiting], threads)
     for (trial, run), trace in zip(waiting, traces, strict=True):
-        made = _in_loop(run, trial, tolerance_px) if _hidden(run, trace) else None
-        results[trial.key] = made or _of_batch(run, trace, trial, tolerance_px)
+        again = _hidden(run, trace) or _touches(run, trace)
+        made = _in_loop if again else partial(_of_batch, trace=trace)
+        results[trial.key] = made(run, trial=trial, tolerance_px=tolerance_px)
     return [results[trial.key] for trial in trials]
 
 
@@ -115,6 +120,13 @@ def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
     return any(
         not cell.sees(q, T).all() for q, T in zip(trace.position[::step], poses, strict=True)
     )
+
+
+def _touches(run: KinematicRun, trace: BatchTrace) -> bool:
+    """Tell whether the guard may have stopped the arm before it touched something."""
+    cell = run.cell
+    assert run.clearance is not None
+    return not stays_clear(run.clearance, cell.arm, trace.position, 1.0 / cell.rate_hz)
 
 
 def _refused(trial: Trial, reason: str) -> TrialResult:

@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from vergence.cell import Cell, load_cell
+from vergence.cell.tasks import require_one_task
 from vergence.experiments.goal import merged
 from vergence.places import CELLS
+
+_ONE_TASK = "one [task]: laws are compared at one task"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +30,10 @@ class CellSource:
     def of(
         cls, name_or_path: str | Path, overrides: Mapping[str, str], seed: int | None
     ) -> "CellSource":
-        """Return the source of a cell; refuse what `load_cell` refuses."""
-        path = load_cell(name_or_path, overrides, seed).path
+        """Return the source of a cell; refuse what `load_cell` refuses, and several tasks."""
+        cell = load_cell(name_or_path, overrides, seed)
+        require_one_task(cell, _ONE_TASK)
+        path = cell.path
         name = path.parent.name if path.parent.parent == CELLS.resolve() else str(path)
         return cls(name, dict(overrides), seed)
 
@@ -37,7 +42,9 @@ class CellSource:
         """Return the source of a cell, given or by its name or file, with tables replaced."""
         if isinstance(cell, Cell):
             source = cls.of(cell.path, {}, None)
-            return replace(source, changes=merged(cell.model_dump(mode="json"), changes))
+            require_one_task(cell, _ONE_TASK)
+            given = cell.model_dump(mode="json", exclude={"tasks"})
+            return replace(source, changes=merged(given, changes))
         return replace(cls.of(cell, {}, None), changes=changes)
 
     def load(self) -> Cell:

@@ -12,6 +12,7 @@ class Ending(StrEnum):
     CONVERGED = "converged"  # to its end, and the features where they should be
     OFF_GOAL = "off goal"  # to its end, but the features elsewhere
     JOINT_LIMIT = "joint limit"
+    COLLISION = "collision"  # braked before one
     OUT_OF_VIEW = "out of view"  # the features left the image
     SINGULAR = "singular"
     LOST = "lost"  # in the image, but not found

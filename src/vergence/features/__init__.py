@@ -1,12 +1,14 @@
 """Visual features: what is seen, and how it moves when the camera does."""
 
 from vergence.features.centre import Centre
+from vergence.features.ellipse import Ellipse
 from vergence.features.feature import Feature
 from vergence.features.interaction import interaction_matrix_points
 from vergence.features.lines import Lines
 from vergence.features.log_depth import LogDepth
 from vergence.features.moments import Moments, RegionMoments
 from vergence.features.orientation import Orientation
+from vergence.features.plane import inverse_depth_plane
 from vergence.features.points import Points
 from vergence.features.points_3d import Points3d
 from vergence.features.polar_points import PolarPoints
@@ -17,6 +19,7 @@ from vergence.features.vanishing_point import VanishingPoint
 
 __all__ = [
     "Centre",
+    "Ellipse",
     "Feature",
     "Lines",
     "LogDepth",
@@ -31,4 +34,5 @@ __all__ = [
     "SphericalPoints",
     "VanishingPoint",
     "interaction_matrix_points",
+    "inverse_depth_plane",
 ]

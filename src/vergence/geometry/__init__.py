@@ -1,10 +1,11 @@
 """Rotations and rigid motions: exponentials, logarithms, their Jacobians, changes of frame.
 
-Every function but `flat_normal` is a numba kernel: it may be called from Python and from other
-kernels, takes float64 arrays and validates nothing.
+Functions take float64 arrays and validate nothing; all but `flat_normal` and those of ellipses are
+numba kernels, which other kernels may call.
 """
 
-from vergence.geometry.flat import flat_normal
+from vergence.geometry.ellipse import EllipseShape, ellipse_through, unit_vectors
+from vergence.geometry.flat import FLAT, flat_normal
 from vergence.geometry.quaternion import matrix_to_quaternion, quaternion_to_matrix
 from vergence.geometry.rpy import matrix_to_rpy, rpy_rates_to_omega, rpy_to_matrix
 from vergence.geometry.se3 import (
@@ -27,6 +28,9 @@ from vergence.geometry.so3 import (
 )
 
 __all__ = [
+    "FLAT",
+    "EllipseShape",
+    "ellipse_through",
     "flat_normal",
     "matrix_to_quaternion",
     "matrix_to_rpy",
@@ -47,4 +51,5 @@ __all__ = [
     "so3_left_jacobian_inverse",
     "so3_log",
     "transform_points",
+    "unit_vectors",
 ]

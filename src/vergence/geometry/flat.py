@@ -4,7 +4,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 
-_FLAT = 0.01  # of the smaller extent: points as close as this to a plane are flat
+FLAT = 0.01  # of the smaller extent: points as close as this to a plane are flat
 
 
 def flat_normal(points: FloatArray) -> FloatArray | None:
@@ -16,6 +16,6 @@ def flat_normal(points: FloatArray) -> FloatArray | None:
     if len(points) < 3:
         return None
     _, extent, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    if extent[1] <= 1e-6 * extent[0] or extent[2] > _FLAT * extent[1]:
+    if extent[1] <= 1e-6 * extent[0] or extent[2] > FLAT * extent[1]:
         return None
     return np.array(axes[2])

@@ -13,6 +13,7 @@ class Obstacle(StrEnum):
     REACH = "reach"
     JOINT_LIMIT = "joint limit"
     VISIBILITY = "visibility"
+    COLLISION = "collision"
     LOCAL_MINIMUM = "local minimum"
 
 

@@ -7,11 +7,12 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.parts import knob, part
+from vergence.planning.collisions import collision_along, collision_at
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.path import Path
 from vergence.planning.potential_field import PotentialFieldPlanner
 from vergence.planning.problem import PlanningProblem
-from vergence.planning.separation import proves_no_path
+from vergence.planning.separation import Separation
 from vergence.planning.smoothing import SplineProblem, least_clearance, optimise_spline
 from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
 from vergence.planning.tree import connect_trees, pull_into_view, shorten
@@ -22,6 +23,7 @@ from vergence.robot.inverse_kinematics import finite_range, goal_configurations
 PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
 WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last
 MARGINS = (0.2, 0.0)  # shares of the margins that do where no path keeps them whole
+_DETOURS, _ASIDE = 150, 0.15  # random postures to go through, and how far aside, of the ranges
 SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
 
 
@@ -63,37 +65,57 @@ class OptimisedPlanner:
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
-        plan = self._with_margins(problem, WRIST_CELLS[0])
-        if isinstance(plan, Path) or plan.proved:
+        separation = Separation(problem)
+        plan = self._with_margins(problem, WRIST_CELLS[0], separation)
+        if isinstance(plan, Path) or plan.proved or plan.obstacle is Obstacle.COLLISION:
             return plan
-        if proves_no_path(problem, PROOF_CELLS[1]):
+        if separation.proves_no_path(PROOF_CELLS[1]):
             return _proved(plan)
+        if separation.bars_wrist(self._goals(problem)):
+            return plan  # without margins there is no way either
         for share in MARGINS:
             px, joint = share * problem.margin_px, share * problem.margin_joint
             nearer = replace(problem, margin_px=px, margin_joint=joint)
-            found = self._with_margins(nearer, WRIST_CELLS[1])
+            found = self._with_margins(nearer, WRIST_CELLS[1], separation)
             if found:
                 return found
         return plan
 
-    def _with_margins(self, problem: PlanningProblem, wrist_cells: int) -> Path | PlanFailure:
-        goals = goal_configurations(
-            problem.arm, problem.T_world_goal, problem.q_start, self.branches
-        )
+    def _goals(self, problem: PlanningProblem) -> FloatArray:
+        """Return goal configurations without collisions, (G, n)."""
+        bodies = problem.bodies
+        return goal_configurations(
+            problem.arm, problem.T_world_goal, problem.q_start, self.branches,
+            None if bodies is None else lambda q: not collision_at(bodies, q),
+        )  # fmt: skip
+
+    def _with_margins(
+        self, problem: PlanningProblem, wrist_cells: int, separation: Separation
+    ) -> Path | PlanFailure:
+        goals = self._goals(problem)
         if not len(goals):
             return _unreachable(problem)
         view = problem.view(_margin_kept(problem))
-        best = self._from_guesses(problem, view, goals)
+        best = self._from_guesses(problem, view, goals) or self._from_detours(problem, view, goals)
         if best is None:
-            if proves_no_path(problem, PROOF_CELLS[0]):
+            if separation.proves_no_path(PROOF_CELLS[0]):
                 return _proved(self._obstacle(problem, view, goals))
             best = self._from_wrist(problem, view, goals, wrist_cells)
             if best is None and self.tree_samples > 0:
                 best = self._from_tree(problem, view, goals)
         if best is None:
             return self._obstacle(problem, view, goals)
-        samples = spline_basis(len(best.controls), self.waypoints).values
-        return Path.through(problem, samples @ best.controls, "optimised")
+        return Path.through(problem, self._waypoints(best.controls), "optimised")
+
+    def _waypoints(self, controls: FloatArray) -> FloatArray:
+        """Return the path of a spline's control points (K, n) as it comes out, (W, n)."""
+        return spline_basis(len(controls), self.waypoints).values @ controls
+
+    def _collision(self, problem: PlanningProblem, controls: FloatArray) -> str:
+        """Return which bodies come too near on the path of control points; else nothing."""
+        if problem.bodies is None:
+            return ""
+        return collision_along(problem.bodies, self._waypoints(controls))
 
     def _from_guesses(
         self, problem: PlanningProblem, view: View, goals: FloatArray
@@ -140,11 +162,45 @@ class OptimisedPlanner:
             task = SplineProblem(view, margin, basis.values, basis.roughness, scale**2, low, high)
             controls, roughness, least = optimise_spline(arm.chain, task, start, 5, 15)
             if least > 0.0 and least_clearance(arm.chain, view, fine, controls) > 0.0:
-                return _Candidate(controls, basis, roughness)
+                touching = self._collision(problem, controls)
+                return None if touching else _Candidate(controls, basis, roughness)
             if least < -0.02:
                 return None
             start = controls
         return None
+
+    def _from_detours(
+        self, problem: PlanningProblem, view: View, goals: FloatArray
+    ) -> _Candidate | None:
+        """Return the least rough of the splines through a random posture that keep everything.
+
+        They are not smoothed further: that would pull them straight, into what they go around.
+        """
+        if problem.bodies is None:
+            return None
+        arm, random = problem.arm, np.random.default_rng(0)
+        basis = spline_basis(self.controls, self.samples, self.smoothing)
+        fine = spline_basis(self.controls, 8 * self.samples).values
+        scale, best = 1.0 / arm.rate_max, None
+        for draw in range(_DETOURS):
+            goal = goals[draw % len(goals)]
+            low, high = problem.joint_range(goal)
+            aside = random.normal(0.0, _ASIDE, arm.joint_count) * np.abs(high - low).clip(0.0, 2.0)
+            middle = np.clip(0.5 * (problem.q_start + goal) + aside, low, high)
+            bow = np.sin(np.linspace(0.0, np.pi, self.samples))[:, None]
+            straight = np.linspace(problem.q_start, goal, self.samples)
+            guess = straight + bow * (middle - straight[self.samples // 2])
+            controls = fit_controls(basis, guess, scale)
+            weighed = controls * scale
+            roughness = float(np.einsum("ai,ab,bi", weighed, basis.roughness, weighed))
+            if best is not None and roughness >= best.roughness:
+                continue
+            inside = (controls >= low - 1e-9).all() and (controls <= high + 1e-9).all()
+            if not inside or least_clearance(arm.chain, view, fine, controls) <= 0.0:
+                continue
+            if not self._collision(problem, controls):
+                best = _Candidate(controls, basis, roughness)
+        return best
 
     def _from_tree(
         self, problem: PlanningProblem, view: View, goals: FloatArray
@@ -184,6 +240,11 @@ class OptimisedPlanner:
 
     def _obstacle(self, problem: PlanningProblem, view: View, goals: FloatArray) -> PlanFailure:
         """Name the constraint without which there would be a path."""
+        if problem.bodies is not None:
+            free = self._from_guesses(replace(problem, bodies=None), view, goals)
+            if free is not None:
+                touching = self._collision(problem, free.controls)
+                return PlanFailure(Obstacle.COLLISION, f"every path found brings {touching}")
         basis = spline_basis(self.controls, self.samples, self.smoothing)
         for guess in self._guesses(problem, view, goals):
             free = self._smooth(problem, view, basis, guess, limited=False)
@@ -252,7 +313,12 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
 
 
 def _unreachable(problem: PlanningProblem) -> PlanFailure:
-    """Say whether limits or the arm's reach keep it from the goal."""
+    """Say whether collisions, limits or the arm's reach keep it from the goal."""
+    if problem.bodies is not None:
+        touching = goal_configurations(problem.arm, problem.T_world_goal, problem.q_start, 1)
+        if len(touching):
+            reason = f"the goal brings {collision_at(problem.bodies, touching[0])}"
+            return PlanFailure(Obstacle.COLLISION, reason)
     free = np.full(problem.arm.joint_count, np.inf)
     unlimited = replace(problem.arm, q_min=-free, q_max=free)
     solutions = goal_configurations(unlimited, problem.T_world_goal, problem.q_start, 1)

@@ -10,7 +10,7 @@ from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.geometry import flat_normal, se3_inverse, transform_points
 from vergence.planning.visibility import NO_FACES, View, clearance_at, make_view
-from vergence.robot import Arm
+from vergence.robot import Arm, Clearance
 from vergence.vision.two_view import TwoView
 
 
@@ -26,6 +26,7 @@ class PlanningProblem:
     margin_px: float = 10.0  # distance to keep from the border of the image
     margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
     margin_face_deg: float = 1.0  # least angle between a line of sight and a face of the object
+    bodies: Clearance | None = None  # distances of what must not touch; None for nothing
 
     def __post_init__(self) -> None:
         q = frozen(self.q_start, (self.arm.joint_count,), "q_start")

@@ -141,8 +141,8 @@ def spline_step(
     moved = C.copy()
     for r in range(len(g)):
         i = r % n
-        wanted = C[1 + r // n, i] - step[r]
-        moved[1 + r // n, i] = min(max(wanted, problem.low[i]), problem.high[i])
+        desired = C[1 + r // n, i] - step[r]
+        moved[1 + r // n, i] = min(max(desired, problem.low[i]), problem.high[i])
     return moved
 
 

@@ -50,9 +50,9 @@ def fit_controls(basis: SplineBasis, waypoints: FloatArray, scale: FloatArray) -
     lengths = np.linalg.norm(np.diff(waypoints, axis=0) * scale, axis=1)
     at = np.concatenate(([0.0], np.cumsum(lengths + 1e-9)))
     samples = np.linspace(0, 1, len(basis.values))
-    wanted = np.column_stack([np.interp(samples, at / at[-1], column) for column in waypoints.T])
+    desired = np.column_stack([np.interp(samples, at / at[-1], column) for column in waypoints.T])
     ends = waypoints[[0, -1]]
-    rest = wanted - basis.values[:, [0, -1]] @ ends
+    rest = desired - basis.values[:, [0, -1]] @ ends
     inner = basis.values[:, 1:-1]
     regular = inner.T @ inner + 1e-6 * np.eye(inner.shape[1])
     controls = np.linalg.solve(regular, inner.T @ rest)

@@ -80,7 +80,7 @@ class Trajectory:
 
 
 def _way(path: Path) -> float:
-    """Return the length of the camera's way, m, turning weighed with the object's distance."""
+    """Return the length of the camera's path, m, turning weighed with the object's distance."""
     from vergence.geometry import se3_distance
 
     poses, lever = path.T_world_camera, float(path.depth_m.mean())

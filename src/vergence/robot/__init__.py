@@ -9,6 +9,7 @@ from vergence.robot.chain import (
     jacobian,
     world_jacobian,
 )
+from vergence.robot.clearance import Clearance, NearPairs
 from vergence.robot.inverse_kinematics import goal_configurations
 from vergence.robot.manipulability import (
     Manipulability,
@@ -19,13 +20,17 @@ from vergence.robot.manipulability import (
     transmissibility_measure,
     yoshikawa_measure,
 )
+from vergence.robot.unserved_directions import UnservedDirections, unserved_directions
 
 __all__ = [
     "goal_configurations",
     "Arm",
     "Chain",
     "ChainState",
+    "Clearance",
     "Manipulability",
+    "NearPairs",
+    "UnservedDirections",
     "chain_state",
     "forward_kinematics",
     "jacobian",
@@ -34,6 +39,7 @@ __all__ = [
     "manipulability_measure",
     "per_joint_limit_penalty",
     "transmissibility_measure",
+    "unserved_directions",
     "world_jacobian",
     "yoshikawa_measure",
 ]

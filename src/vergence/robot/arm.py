@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import BoolArray, FloatArray, as_floats, frozen
-from vergence.errors import InputError, nearest
-from vergence.robot.chain import Chain, axis_positions, forward_kinematics, jacobian
+from vergence.errors import Absent, InputError, nearest
+from vergence.robot.chain import Chain, forward_kinematics, jacobian
 
 if TYPE_CHECKING:
     import mujoco
@@ -59,7 +59,7 @@ class Arm:
         from vergence.robot.urdf import read_urdf
 
         if not Path(path).is_file():
-            raise InputError(str(path), "", "no such file", "a URDF file")
+            raise InputError(str(path), "", Absent("no such file"), "a URDF file")
         return cls.from_mujoco(read_urdf(Path(path), tip).compile(), tip, kind="body")
 
     def with_tip(self, T_tip_new: ArrayLike) -> Self:
@@ -151,8 +151,11 @@ class Arm:
     def axis_positions(self, q: FloatArray) -> FloatArray:
         """Return how far joint positions q (n,) move every axis of the chain, (m,), rad or m."""
         positions = frozen(q, (self.joint_count,), "q")
-        coupled = len(self.chain.coupling) > 0
-        return axis_positions(self.chain, positions) if coupled else positions
+        if len(self.chain.coupling) == 0:
+            return positions
+        joint, ratio, offset = self.chain.coupling.T
+        moved: FloatArray = ratio * positions[joint.astype(int)] + offset
+        return moved
 
     def outside(self, q: ArrayLike) -> BoolArray:
         """Tell which joints of q (n,) are at or beyond a limit, (n,)."""

@@ -7,7 +7,7 @@ from typing import TypeAlias, cast
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 
 _Events: TypeAlias = Iterator[tuple[str, Element]]
 _BYTES_MAX = 16 << 20
@@ -28,7 +28,9 @@ def read_xml(path: Path) -> Element:
         size = path.stat().st_size
         text = path.read_bytes() if size <= _BYTES_MAX else b""
     except OSError as error:
-        raise InputError(source, "", error.strerror or "no file", "a file to read") from None
+        raise InputError(
+            source, "", error.strerror or Absent("no file"), "a file to read"
+        ) from None
     if size > _BYTES_MAX:
         raise InputError(source, "", f"{size} bytes", f"at most {_BYTES_MAX >> 20} MB")
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
@@ -55,9 +57,9 @@ def _parse(text: bytes, source: str) -> Element:
     except (ET.ParseError, LookupError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(source, "", str(error), "XML") from None
+        raise InputError(source, "", f"text that breaks off or is none ({error})", "XML") from None
     if root is None:
-        raise InputError(source, "", "no element", "XML")
+        raise InputError(source, "", Absent("no element"), "XML")
     return root
 
 

@@ -36,17 +36,16 @@ class ChainState(NamedTuple):
     p: FloatArray  # (3,) of T_world_tip, m
 
 
-@njit(cache=True, error_model="numpy")
-def axis_positions(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return how far joint positions q (n,) move every axis of a coupled chain, (m,), rad or m."""
-    positions = np.empty(len(chain.coupling))
-    for i in range(len(positions)):
-        j = int(chain.coupling[i, 0])
-        positions[i] = chain.coupling[i, 1] * q[j] + chain.coupling[i, 2]
-    return positions
+@njit(cache=True, error_model="numpy", inline="always")
+def axis_position(chain: Chain, q: FloatArray, i: int) -> float:
+    """Return how far joint positions q (n,) move axis i, rad or m."""
+    if len(chain.coupling) == 0:
+        return float(q[i])
+    joint, ratio, offset = int(chain.coupling[i, 0]), chain.coupling[i, 1], chain.coupling[i, 2]
+    return float(ratio * q[joint] + offset)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def joint_columns(chain: Chain, J_axes: FloatArray, joint_count: int) -> FloatArray:
     """Return J (r, n) by joint from J_axes (r, m) by axis: J_j = Σ ratio_i J_axes,i."""
     if len(chain.coupling) == 0:
@@ -98,33 +97,19 @@ def joint_step(frame: Axes, q: float, sliding: bool) -> Axes:
 @njit(cache=True, error_model="numpy")
 def tip_frame(chain: Chain, q: FloatArray) -> Axes:
     """Return the tip's axes and its place along world axes, at joint positions q (n,)."""
-    if len(chain.coupling) == 0:
-        return tip_at(chain, q)
-    return tip_at(chain, axis_positions(chain, q))
-
-
-@njit(cache=True, error_model="numpy")
-def tip_at(chain: Chain, s: FloatArray) -> Axes:
-    """Return what `tip_frame` does, at axis positions s (m,)."""
     R, t = chain.rotation, chain.position
     frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     m = len(chain.sliding)
     for i in range(m):
-        frame = joint_step(fixed_step(frame, R[i], t[i]), s[i], chain.sliding[i])
+        frame = joint_step(
+            fixed_step(frame, R[i], t[i]), axis_position(chain, q, i), chain.sliding[i]
+        )
     return fixed_step(frame, R[m], t[m])
 
 
 @njit(cache=True, error_model="numpy")
 def chain_state(chain: Chain, q: FloatArray) -> ChainState:
     """Walk the chain at joint positions q (n,)."""
-    if len(chain.coupling) == 0:
-        return state_at(chain, q)
-    return state_at(chain, axis_positions(chain, q))
-
-
-@njit(cache=True, error_model="numpy")
-def state_at(chain: Chain, s: FloatArray) -> ChainState:
-    """Walk the chain at axis positions s (m,)."""
     m, R, t = len(chain.sliding), chain.rotation, chain.position
     axis, anchor = np.empty((m, 3)), np.empty((m, 3))
     frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
@@ -132,7 +117,7 @@ def state_at(chain: Chain, s: FloatArray) -> ChainState:
         frame = fixed_step(frame, R[i], t[i])
         axis[i, 0], axis[i, 1], axis[i, 2] = frame[2]
         anchor[i, 0], anchor[i, 1], anchor[i, 2] = frame[3]
-        frame = joint_step(frame, s[i], chain.sliding[i])
+        frame = joint_step(frame, axis_position(chain, q, i), chain.sliding[i])
     x, y, z, p = fixed_step(frame, R[m], t[m])
     tip_R, tip_p = np.empty((3, 3)), np.empty(3)
     for a in range(3):
@@ -177,17 +162,15 @@ def forward_kinematics(chain: Chain, q: FloatArray) -> FloatArray:
     return T
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def jacobian(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the tip's Jacobian (6, n) in its own frame: v_tip = J q̇, v_camera for a camera."""
-    if len(chain.coupling) == 0:
-        return jacobian_at(chain, q)
-    return joint_columns(chain, jacobian_at(chain, axis_positions(chain, q)), len(q))
+    return joint_columns(chain, axis_jacobian(chain, q), len(q))
 
 
-@njit(cache=True, error_model="numpy")
-def jacobian_at(chain: Chain, s: FloatArray) -> FloatArray:
-    """Return the tip's Jacobian (6, m) in its own frame by axis, at axis positions s (m,).
+@njit(cache=True, error_model="numpy", inline="always")
+def axis_jacobian(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the tip's Jacobian (6, m) in its own frame by axis, at joint positions q (n,).
 
     The chain is walked from the tip to the base, every axis z and a point o on it drawn in the
     tip's frame: a turning joint moves the tip by (o × z, z), a sliding one by (z, 0).
@@ -203,15 +186,16 @@ def jacobian_at(chain: Chain, s: FloatArray) -> FloatArray:
         )
         step = along(x, y, z, t[i + 1, 0], t[i + 1, 1], t[i + 1, 2])
         o = (o[0] - step[0], o[1] - step[1], o[2] - step[2])
+        s = axis_position(chain, q, i)
         if chain.sliding[i]:
             J[0, i], J[1, i], J[2, i] = z
             J[3, i] = J[4, i] = J[5, i] = 0.0
-            o = (o[0] - s[i] * z[0], o[1] - s[i] * z[1], o[2] - s[i] * z[2])
+            o = (o[0] - s * z[0], o[1] - s * z[1], o[2] - s * z[2])
         else:
             J[0, i] = o[1] * z[2] - o[2] * z[1]
             J[1, i] = o[2] * z[0] - o[0] * z[2]
             J[2, i] = o[0] * z[1] - o[1] * z[0]
             J[3, i], J[4, i], J[5, i] = z
-            c, d = np.cos(s[i]), np.sin(s[i])
+            c, d = np.cos(s), np.sin(s)
             x, y = along(x, y, z, c, -d, 0.0), along(x, y, z, d, c, 0.0)
     return J

@@ -1,5 +1,8 @@
 """Joint positions that bring the tip to a pose: all branches that random seeds find."""
 
+from collections.abc import Callable
+from itertools import islice
+
 import numpy as np
 from numba import njit
 
@@ -59,7 +62,13 @@ def solve_from_seeds(
     return found[:count]
 
 
-def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4) -> FloatArray:
+def goal_configurations(
+    arm: Arm,
+    T: FloatArray,
+    near: FloatArray,
+    most: int = 4,
+    allowed: Callable[[FloatArray], bool] | None = None,
+) -> FloatArray:
     """Return joint positions (K, n) inside the limits that bring the tip to T, nearest first.
 
     Branches are found from fixed seeds, so the same question has the same answer; turning joints
@@ -71,6 +80,8 @@ def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4
         T: desired pose of the tip in the world, (4, 4).
         near: joint positions from which distances count, (n,), measured in travel time.
         most: how many to return.
+        allowed: tells which of them (n,) may be, such as those at which nothing collides; all may
+            if None.
     """
     low, high = finite_range(arm, near)
     random = np.random.default_rng(0)
@@ -78,7 +89,8 @@ def goal_configurations(arm: Arm, T: FloatArray, near: FloatArray, most: int = 4
     solutions = solve_from_seeds(arm.chain, seeds, np.ascontiguousarray(T), low, high)
     turned = [shifted for q in solutions for shifted in _full_turns(arm, q, low, high)]
     turned.sort(key=lambda q: float(np.abs((q - near) / arm.rate_max).max()))
-    return np.array(turned[:most]).reshape(-1, arm.joint_count)
+    fitting = islice((q for q in turned if allowed is None or allowed(q)), most)
+    return np.array(list(fitting)).reshape(-1, arm.joint_count)
 
 
 def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:

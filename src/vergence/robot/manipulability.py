@@ -1,4 +1,8 @@
-"""How far an arm is from singularities and joint limits, and which way leads further."""
+"""How far an arm is from singularities and joint limits, and which way leads further.
+
+Kernels that take or return a container are inlined into the tick that calls them: handing a
+container of arrays on costs as much as the arithmetic of a joint.
+"""
 
 from typing import NamedTuple
 
@@ -6,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.robot.chain import Chain, axis_positions, jacobian_at, joint_columns
+from vergence.robot.chain import Chain, axis_jacobian, jacobian, joint_columns
 from vergence.robot.positive_definite import (
     invert_spd,
     invert_spd_any,
@@ -26,7 +30,6 @@ class Manipulability(NamedTuple):
     J_camera: FloatArray  # (6, n)
     J_inverse: FloatArray  # (n, 6) damped pseudo-inverse of J_camera
     smallest_singular_value: float  # of J, bounded from below: 1/√tr((J Jᵀ)⁻¹)
-    J_axes: FloatArray  # (6, m) by axis; J_camera itself where no joint moves several axes
 
 
 def yoshikawa_measure(J: FloatArray) -> float:
@@ -110,21 +113,15 @@ class Posture(NamedTuple):
     damped: FloatArray  # (6, 6) (J Jᵀ + λ² I)⁻¹; the inverse itself away from singularities
     det_JJt: float  # det(J Jᵀ), or det(Jᵀ J) with fewer than six joints
     sigma: float  # smallest singular value of J, bounded from below: 1/√tr((J Jᵀ)⁺)
-    J_axes: FloatArray  # (6, m) by axis; J itself where no joint moves several axes
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
     """Return the arm's Jacobian at q (n,), with what its inverse and determinant need.
 
     Where σ < damping, λ² = (damping - σ)²: the inverse stays bounded through a singularity.
     """
-    if len(chain.coupling) == 0:
-        J_axes = jacobian_at(chain, q)
-        J = J_axes
-    else:
-        J_axes = jacobian_at(chain, axis_positions(chain, q))
-        J = joint_columns(chain, J_axes, len(q))
+    J = jacobian(chain, q)
     A = outer_square(J)
     inverse, det_JJt = invert_spd(A) if J.shape[1] >= 6 else pseudo_invert_square(J)
     trace = 0.0
@@ -136,7 +133,7 @@ def posture(chain: Chain, q: FloatArray, damping: float) -> Posture:
         for i in range(6):
             A[i, i] += (damping - sigma) ** 2
         damped = invert_spd(A)[0]
-    return Posture(J, inverse, damped, det_JJt, sigma, J_axes)
+    return Posture(J, inverse, damped, det_JJt, sigma)
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,33 +168,13 @@ def pseudo_inverse_transposed(inverse: FloatArray, J: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def determinant_gradient(
-    chain: Chain, J_axes: FloatArray, X: FloatArray, determinant: float
-) -> FloatArray:
-    """Return ∂det(J Jᵀ)/∂q (n,), exactly, in O(m).
+def determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) -> FloatArray:
+    """Return ∂det(J Jᵀ)/∂q (n,), exactly, in O(n), of a chain without coupling.
 
-    J_axes (6, m) along any axes, X = (J Jᵀ)⁻¹ J (6, n). Written for one joint an axis: with Jᵥᵢ,
-    J_ωᵢ the halves of column i, ∂Jᵢ/∂qⱼ is (J_ωⱼ × Jᵥᵢ, J_ωⱼ × J_ωᵢ) for j < i and
-    (J_ωᵢ × Jᵥⱼ, 0) for j ≥ i, so
+    J (6, n) in the tip's frame, X = (J Jᵀ)⁻¹ J (6, n). With Jᵥᵢ, J_ωᵢ the halves of column i,
+    ∂Jᵢ/∂qⱼ is (J_ωⱼ × Jᵥᵢ, J_ωⱼ × J_ωᵢ) for j < i and (J_ωᵢ × Jᵥⱼ, 0) for j ≥ i, so
     ∂det/∂qⱼ = 2 det [J_ωⱼ · Σ_{i>j} (Jᵥᵢ × Xᵥᵢ + J_ωᵢ × X_ωᵢ) + Jᵥⱼ · Σ_{i≤j} (Xᵥᵢ × J_ωᵢ)].
-    A joint of several axes is weighed by its ratios twice: in X and in the sum over its axes.
     """
-    n, m = X.shape[1], J_axes.shape[1]
-    if len(chain.coupling) == 0:
-        return axes_determinant_gradient(J_axes, X, determinant)
-    X_axes = np.empty((6, m))
-    for i in range(m):
-        j, ratio = int(chain.coupling[i, 0]), chain.coupling[i, 1]
-        for r in range(6):
-            X_axes[r, i] = ratio * X[r, j]
-    by_axis = axes_determinant_gradient(J_axes, X_axes, determinant)
-    gradient: FloatArray = joint_columns(chain, by_axis.reshape(1, m), n)[0]
-    return gradient
-
-
-@njit(cache=True, error_model="numpy")
-def axes_determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) -> FloatArray:
-    """Return ∂det(J Jᵀ)/∂s (m,) of `determinant_gradient` by axis, J and X (6, m)."""
     n = J.shape[1]
     gradient = np.zeros(n)
     s0 = s1 = s2 = 0.0
@@ -218,6 +195,25 @@ def axes_determinant_gradient(J: FloatArray, X: FloatArray, determinant: float) 
 
 
 @njit(cache=True, error_model="numpy")
+def coupled_determinant_gradient(
+    chain: Chain, q: FloatArray, X: FloatArray, determinant: float
+) -> FloatArray:
+    """Return ∂det(J Jᵀ)/∂q (n,) of a coupled chain at q, X = (J Jᵀ)⁻¹ J (6, n).
+
+    A joint of several axes is weighed by its ratios twice: in X and in the sum over its axes.
+    """
+    m = len(chain.coupling)
+    J_axes, X_axes = axis_jacobian(chain, q), np.empty((6, m))
+    for i in range(m):
+        j, ratio = int(chain.coupling[i, 0]), chain.coupling[i, 1]
+        for r in range(6):
+            X_axes[r, i] = ratio * X[r, j]
+    by_axis = determinant_gradient(J_axes, X_axes, determinant)
+    gradient: FloatArray = joint_columns(chain, by_axis.reshape(1, m), len(q))[0]
+    return gradient
+
+
+@njit(cache=True, error_model="numpy")
 def limit_penalty(
     q: FloatArray, q_min: FloatArray, q_max: FloatArray, k: float, per_joint: bool
 ) -> tuple[float, FloatArray]:
@@ -227,17 +223,27 @@ def limit_penalty(
     return joint_limit_penalty(q, q_min, q_max, k)
 
 
-@njit(cache=True, error_model="numpy")
-def measure_gradient(chain: Chain, arm: Posture, P: float, gradient_P: FloatArray) -> FloatArray:
-    """Return ∂w'/∂q (n,) of w' = P det(J Jᵀ), exactly."""
+@njit(cache=True, error_model="numpy", inline="always")
+def determinant_slope(chain: Chain, q: FloatArray, arm: Posture) -> FloatArray:
+    """Return ∂det(J Jᵀ)/∂q (n,) of any chain at q, exactly."""
     X = pseudo_inverse_transposed(arm.inverse, arm.J)
-    gradient = determinant_gradient(chain, arm.J_axes, X, arm.det_JJt)
+    if len(chain.coupling) == 0:
+        return determinant_gradient(arm.J, X, arm.det_JJt)
+    return coupled_determinant_gradient(chain, q, X, arm.det_JJt)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def measure_gradient(
+    arm: Posture, slope: FloatArray, P: float, gradient_P: FloatArray
+) -> FloatArray:
+    """Return ∂w'/∂q (n,) of w' = P det(J Jᵀ), given ∂det(J Jᵀ)/∂q and ∂P/∂q (n,)."""
+    gradient = np.empty(len(slope))
     for i in range(len(gradient)):
-        gradient[i] = P * gradient[i] + gradient_P[i] * arm.det_JJt
+        gradient[i] = P * slope[i] + gradient_P[i] * arm.det_JJt
     return gradient
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def camera_gradient(arm: Posture, gradient_q: FloatArray) -> FloatArray:
     """Return ∂w'/∂x (6,) along the tip's own axes: (J⁺)ᵀ ∂w'/∂q = (J Jᵀ)⁻¹ J ∂w'/∂q."""
     moved = np.zeros(6)
@@ -247,7 +253,7 @@ def camera_gradient(arm: Posture, gradient_q: FloatArray) -> FloatArray:
     return times_six(arm.damped, moved)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def joint_rates(arm: Posture, v_tip: FloatArray) -> FloatArray:
     """Return q̇ = J⁺ v_tip (n,), damped near singularities; v_tip (6,) in the tip's own frame."""
     y = times_six(arm.damped, v_tip)
@@ -283,7 +289,8 @@ def manipulability(
     """
     arm = posture(chain, q, damping)
     P, gradient_P = limit_penalty(q, q_min, q_max, k, per_joint)
-    gradient_q = measure_gradient(chain, arm, P, gradient_P)
+    slope = determinant_slope(chain, q, arm)
+    gradient_q = measure_gradient(arm, slope, P, gradient_P)
     return Manipulability(
         P * arm.det_JJt,
         P,
@@ -293,5 +300,4 @@ def manipulability(
         arm.J,
         pseudo_inverse_transposed(arm.damped, arm.J).T.copy(),
         arm.sigma,
-        arm.J_axes,
     )

@@ -12,6 +12,7 @@ from vergence.robot.bounded_xml import read_xml
 from vergence.robot.mesh_files import SHELL, use_triangles
 from vergence.robot.mujoco_chain import velocity_limit_name
 from vergence.robot.urdf_joints import settle_joints
+from vergence.robot.urdf_rods import add_rods
 from vergence.robot.urdf_shapes import Shapes, choose_shapes, mend_inertia, report_faults
 from vergence.robot.urdf_tree import read_tree
 
@@ -29,8 +30,8 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     - joints are locked where they cannot move, see `settle_joints`;
     - velocity limits are kept, as custom numbers that `Arm.from_mujoco` reads;
     - `package://NAME/…` is looked for in the folders above the file, as a ROS workspace lays them
-      out, and a link whose visual meshes cannot be drawn is drawn by its collision shapes, if it is
-      a link of an arm;
+      out, and a link whose visual meshes cannot be drawn is drawn by its collision shapes, or by
+      rods from joint to joint, if it is a link of an arm;
     - an inertia that no body can have loses its products of inertia;
     - arms touch nothing, as the arms of all our cells.
 
@@ -55,6 +56,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
         choose_shapes(link, shapes)
         mend_inertia(link, source)
     report_faults(shapes, last_body is None)
+    add_rods(tree, shapes)
     _set_compiler(robot)
     try:
         spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from vergence.errors import InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 from vergence.geometry import matrix_to_rpy, rpy_to_matrix, so3_exp
 from vergence.robot.bounded_xml import numbers
 from vergence.robot.urdf_tree import MOVING, Tree
@@ -143,7 +143,9 @@ def _limits(joint: Element, source: str, required: bool = True) -> tuple[float, 
     if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
         if required:
             allowed = "<limit lower=… upper=…>, or type continuous for a joint without limits"
-            raise InputError(source, f"limit of joint {name}", "no lower, no upper", allowed)
+            raise InputError(
+                source, f"limit of joint {name}", Absent("no lower, no upper"), allowed
+            )
         return -np.inf, np.inf
     low, high = (_number(joint, "limit", end, 0.0, source) for end in ("lower", "upper"))
     low, high = (np.copysign(np.inf, end) if abs(end) > _NO_LIMIT else end for end in (low, high))

@@ -16,6 +16,7 @@ _LOG = logging.getLogger(__name__)
 _SCHEMES = ("package", "model")  # of names that begin with that of a package
 _METRES_MAX = 20.0  # no link is larger
 _NAMED = 3  # links in a warning
+_INSTEAD = "Shapes that can be drawn, or rods, stand in for them; the arm moves as it should."
 _SIZES: dict[str, dict[str, int]] = {  # how many numbers the keys of a shape have
     "box": {"size": 3},
     "cylinder": {"radius": 1, "length": 1},
@@ -36,7 +37,8 @@ class Shapes(NamedTuple):
 def choose_shapes(link: Element, shapes: Shapes) -> None:
     """Keep a link's visual shapes if all can be drawn, else the collision shapes that can.
 
-    A shape that cannot be drawn costs the drawing, not the arm.
+    Where none is left, `add_rods` draws the link. A shape that cannot be drawn costs the drawing,
+    not the arm.
     """
     visual, collision = link.findall("visual"), link.findall("collision")
     for shape in (*visual, *collision):
@@ -67,12 +69,12 @@ def report_faults(shapes: Shapes, needed: bool) -> None:
     more = len(shapes.undrawn) - _NAMED
     names += f" and {more} more" if more > 0 else ""
     faults = dict.fromkeys(fault for faults in shapes.undrawn.values() for fault in faults)
-    others = f" (and {len(faults) - 1} like it)" if len(faults) > 1 else ""
+    others = f" (and {len(faults) - 1} more meshes)" if len(faults) > 1 else ""
     if needed:
         given = next(iter(faults)) + others
         raise InputError(str(shapes.path), f"shapes of {names}", given, "meshes that can be drawn")
-    text = "%s: drawn without some shapes of %s: %s%s; the arm moves as it should"
-    _LOG.warning(text, shapes.path, names, next(iter(faults)), others)
+    text = "%s: %s cannot be drawn as the file says: %s%s. %s"
+    _LOG.warning(text, shapes.path.name, names, next(iter(faults)), others, _INSTEAD)
 
 
 def mend_inertia(link: Element, source: str) -> None:

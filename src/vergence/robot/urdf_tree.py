@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from vergence.errors import InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 
 MOVING = ("revolute", "continuous", "prismatic")
 _KINDS = (*MOVING, "fixed", "floating", "planar")
@@ -85,7 +85,7 @@ def _check_connected(tree: Tree) -> None:
         reached.update(found)
         waiting += found
     if lost := [name for name in tree.links if name not in reached]:
-        given = f"joints in a circle, through link {lost[0]}" if tree.links else "none"
+        given = f"joints in a circle, through link {lost[0]}" if tree.links else Absent("none")
         raise InputError(tree.source, "joints", given, "a tree of links with one root")
     if not tree.links:
-        raise InputError(tree.source, "links", "none", "at least one")
+        raise InputError(tree.source, "links", Absent("none"), "at least one")

@@ -1,6 +1,7 @@
 """Runtime: the loop, what it asks of a driver, and what is kept of a run."""
 
-from vergence.runtime.driver import Driver
+from vergence.runtime.driver import Driver, HasOutputs, outputs_of
+from vergence.runtime.driver_wrapper import DriverWrapper
 from vergence.runtime.following import FollowingBound
 from vergence.runtime.listener import Listener
 from vergence.runtime.loop import Loop
@@ -14,7 +15,9 @@ from vergence.runtime.timeouts import Timeouts
 __all__ = [
     "ArmInfo",
     "Driver",
+    "DriverWrapper",
     "FollowingBound",
+    "HasOutputs",
     "Listener",
     "Loop",
     "Perception",
@@ -26,4 +29,5 @@ __all__ = [
     "RunRecorder",
     "TickRecord",
     "Timeouts",
+    "outputs_of",
 ]

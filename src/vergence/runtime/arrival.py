@@ -10,6 +10,8 @@ from vergence.runtime import endings
 from vergence.signals import ImagePoints, JointCommand, Observation, Outcome, Reference
 
 _WINDOW_S = 1.0  # over which errors are averaged and rest is judged
+_FALLING = 0.1  # share of the error by which it is less in the later half of a window, if it falls
+_FALLING_PX = 0.01  # and by how much at least
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _DESIRED_MOVED_PX = 0.1  # in a window, up to which the desired features are at rest
 
@@ -40,7 +42,8 @@ class Arrival:
     """Watches the error and the joints of a run.
 
     A run is stalled where arm and desired features have been at rest for a second, and the mean
-    error is above the tolerance. A target that moves keeps the arm moving: no stall.
+    error is above the tolerance and falls no longer. A target that moves keeps the arm moving: no
+    stall.
 
     Args:
         goal: of the task.
@@ -71,15 +74,24 @@ class Arrival:
     @property
     def error_px(self) -> float:
         """Mean distance of the farthest feature from its goal; NaN before any is known."""
-        if not self._rows:
-            return float("nan")
-        errors = np.array([row.error_px for row in self._rows])
-        known = np.isfinite(errors).all(axis=2)
-        counts = known.sum(axis=0)
-        total = np.where(known[:, :, None], errors, 0.0).sum(axis=0)
-        if not counts.any():
-            return float("nan")
-        return float(np.linalg.norm(total[counts > 0] / counts[counts > 0, None], axis=1).max())
+        return _mean_error(list(self._rows))
+
+    @property
+    def falls(self) -> bool:
+        """Whether the error is still falling."""
+        rows = list(self._rows)
+        half = len(rows) // 2
+        before, now = _mean_error(rows[:half]), _mean_error(rows[half:])
+        return before - now > max(_FALLING * before, _FALLING_PX)
+
+    @property
+    def points_px(self) -> FloatArray:
+        """Mean place of each feature in the last second, (M, 2); NaN where it was not found."""
+        places = np.array([row.desired_px + row.error_px for row in self._rows])
+        counts = np.isfinite(places).all(axis=2).sum(axis=0)
+        total = np.where(np.isfinite(places), places, 0.0).sum(axis=0)
+        mean: FloatArray = np.where(counts, total.T / np.maximum(counts, 1), np.nan).T
+        return mean
 
     @property
     def reached(self) -> bool:
@@ -88,13 +100,19 @@ class Arrival:
 
     @property
     def stalled(self) -> bool:
-        """Whether the arm is at rest away from its goal."""
-        return self._rests() and self.error_px > self._goal.tolerance_px
+        """Whether the arm is at rest away from its goal, and the error falls no longer."""
+        away = self._rests() and self.error_px > self._goal.tolerance_px
+        return away and not self.falls
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """The limits that shaped the motion in most of the last images."""
+        counts = Counter(name for row in self._rows for name in row.active)
+        return tuple(name for name, count in counts.items() if 2 * count > len(self._rows))
 
     def holder(self) -> str:
         """Say what holds a run that is stalled."""
-        counts = Counter(name for row in self._rows for name in row.active)
-        held = [name for name, count in counts.items() if 2 * count > len(self._rows)]
+        held = list(self.active)
         if _mirrored(self._rows[-1]):
             held.append("a goal that shows the mirror image of the features seen")
         return " and ".join(held) or "a local minimum of the law; no limit is active"
@@ -117,6 +135,19 @@ class Arrival:
         moved = np.ptp(positions, axis=0) / (self._rate_max * _WINDOW_S)
         desired = np.abs(last.desired_px - first.desired_px).max(initial=0.0)
         return bool(moved.max() < _REST and desired < _DESIRED_MOVED_PX)
+
+
+def _mean_error(rows: list[_Row]) -> float:
+    """Return how far the farthest feature is from its goal, on average; NaN if none is known."""
+    if not rows:
+        return float("nan")
+    errors = np.array([row.error_px for row in rows])
+    known = np.isfinite(errors).all(axis=2)
+    counts = known.sum(axis=0)
+    total = np.where(known[:, :, None], errors, 0.0).sum(axis=0)
+    if not counts.any():
+        return float("nan")
+    return float(np.linalg.norm(total[counts > 0] / counts[counts > 0, None], axis=1).max())
 
 
 def _mirrored(row: _Row) -> bool:

@@ -1,7 +1,7 @@
 """What the loop asks of a cell, simulated or real."""
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol, runtime_checkable
 
 from vergence.camera import Camera
 from vergence.robot import Arm
@@ -44,6 +44,30 @@ class Driver(Protocol):
     def close(self) -> None:
         """Let go of the cell."""
         ...
+
+
+@runtime_checkable
+class HasOutputs(Protocol):
+    """A driver that has more to switch than arms: grippers, lamps, valves."""
+
+    @property
+    def outputs(self) -> Sequence[str]:
+        """Their names, as in the table `[outputs]` of a cell file."""
+        ...
+
+    def set_output(self, name: str, value: float) -> None:
+        """Set an output; returns at once, whatever time it takes.
+
+        Args:
+            name: of the output.
+            value: 0 for off or open, to 1 for on or closed.
+        """
+        ...
+
+
+def outputs_of(driver: object) -> tuple[str, ...]:
+    """Return the names of the outputs of a driver, or of an arm's link; none if it has none."""
+    return tuple(driver.outputs) if isinstance(driver, HasOutputs) else ()
 
 
 # A class that inherits from it may be named by `--driver`, see `vergence.registry`.

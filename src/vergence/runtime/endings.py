@@ -64,6 +64,11 @@ def why_lost(reasons: Iterable[str]) -> str:
     return "no feature found: " + "; ".join(sorted(kinds.values()))
 
 
+def collision(hindrance: str, time: float) -> Outcome:
+    """Return the end of a run whose arm would have brought bodies together."""
+    return Outcome(OutcomeKind.COLLISION, f"braked, as {hindrance} of each other", time)
+
+
 def joint_limit(joints: Iterable[str], time: float) -> Outcome:
     """Return the end of a run with joints held at their limits."""
     reason = f"{' and '.join(joints)} at the end of its range, driven against it"

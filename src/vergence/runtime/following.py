@@ -6,10 +6,13 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.control import Guard
+from vergence.control import Braking, Guard
 from vergence.robot import Arm
 from vergence.runtime.endings import Fault
-from vergence.signals import OutcomeKind, RobotMode, RobotState, Setpoint
+from vergence.runtime.servo_lag import ServoLag
+from vergence.signals import JointState, OutcomeKind, RobotMode, RobotState, Setpoint
+
+_LAG_ROOM = 1.5  # how much longer a servo may lag than was measured, and still follow
 
 
 class FollowingBound(NamedTuple):
@@ -22,6 +25,7 @@ class FollowingBound(NamedTuple):
     lag_s: float = 0.1  # by which a servo may lag behind its set-points
     offset: float = 0.03  # rad or m that gravity, other joints and a late tick explain
     servo_hz: float = np.inf  # the bandwidth of the joints' servos
+    servo_lag_s: float = 0.0  # by which the joints follow, as it was measured
 
     def of(self, arm: Arm) -> FloatArray:
         """Return the bound for each joint of an arm (n,), rad or m."""
@@ -71,6 +75,7 @@ class Follower:
         dt: inner period, s.
         bound: how far the arm may be from its set-points.
         patience_s: how long to wait for it.
+        braking: finds what the arm would touch, see `Guard`.
     """
 
     def __init__(
@@ -81,14 +86,17 @@ class Follower:
         dt: float,
         bound: FollowingBound,
         patience_s: float,
+        braking: Braking | None = None,
     ) -> None:
-        self.guard = Guard(arm, start, dt)
+        self.guard = Guard(arm, start, dt, braking)
         self.guard.approach(start)  # compiles or loads what a hold needs; it moves nothing
         self.holding: Fault | None = None  # why the arm is held, if it is,
         self._held_for: Fault | None = None  # and why it was held last
         self._name, self._names = name, arm.names
         self._bound, self._patience_s = bound.of(arm), patience_s
-        recent = np.tile(start, (max(round(bound.lag_s / dt), 1), 1))
+        self._lag = ServoLag(round(bound.servo_lag_s / dt), dt)
+        lag_s = max(bound.lag_s, _LAG_ROOM * bound.servo_lag_s)
+        recent = np.tile(start, (max(round(lag_s / dt), 1), 1))
         self._memory = np.vstack((self._bound, recent))
         self._tick = 0
         self._scale = 1.0
@@ -112,8 +120,15 @@ class Follower:
     def step(self, rates: FloatArray) -> Setpoint:
         """Return the next set-point, at desired rates (n,) or on the way to the measured joints."""
         if self.holding is not None:
-            return self.guard.approach(self._anchor)
-        return self.guard.step(rates if self._scale == 1.0 else self._scale * rates)
+            setpoint = self.guard.approach(self._anchor)
+        else:
+            setpoint = self.guard.step(rates if self._scale == 1.0 else self._scale * rates)
+        self._lag.add(setpoint)
+        return setpoint
+
+    def ahead(self, joints: JointState) -> JointState:
+        """Return measured joints as they will be when a command is felt, one servo lag later."""
+        return self._lag.ahead(joints)
 
     def hindered(self, time: float, measured: FloatArray) -> Fault | None:
         """Return why the arm is held, or has hardly moved from where it last was."""

@@ -67,6 +67,11 @@ class ImageCheck:
             given = f"{image.dtype}, shape {image.shape}"
             asked = f"uint8, shape ({camera.height}, {camera.width})"
             return bad_sample(f"an image of {frame.camera} is {given}; the loop needs {asked}")
+        depth = frame.depth_m
+        if depth is not None and (depth.dtype != np.float32 or depth.shape != image.shape):
+            given = f"{depth.dtype}, shape {depth.shape}"
+            asked = f"float32, shape {image.shape}, as the image"
+            return bad_sample(f"a depth image of {frame.camera} is {given}; the loop needs {asked}")
         return None
 
     def _check_motion(self, frame: Frame, seen: _Seen | None, sample: Sample) -> Fault | None:

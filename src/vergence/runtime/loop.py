@@ -1,16 +1,17 @@
 """The one loop: driver, perception, planning, control, and back to the driver."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control import InnerLaw, Law
+from vergence.control import ClearBraking, InnerLaw, Law, Successor
 from vergence.errors import DriverSilent, VergenceError
+from vergence.robot import Clearance
 from vergence.runtime import endings
-from vergence.runtime.arrival import Arrival, Goal
+from vergence.runtime.arrival import Goal
 from vergence.runtime.border import Border
 from vergence.runtime.driver import Driver
 from vergence.runtime.endings import Fault
@@ -18,10 +19,11 @@ from vergence.runtime.following import Follower, FollowingBound
 from vergence.runtime.interrupt import Interrupt
 from vergence.runtime.listener import Listener
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.losses import LossReports, reasons, shows_target
+from vergence.runtime.losses import may_move, reasons
 from vergence.runtime.schedule import Schedule, command_share
-from vergence.runtime.stages import EndsTask, Perception, Planner
+from vergence.runtime.stages import Perception, Planner, Stages
 from vergence.runtime.stopping import brake, raised
+from vergence.runtime.task_watch import TaskWatch
 from vergence.runtime.tick import TickRecord
 from vergence.runtime.timeouts import Timeouts
 from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Reference, Sample
@@ -50,6 +52,10 @@ class Loop:
         timeouts: how long to hold before the run ends.
         following: how far the arm may be from its set-points.
         goal: when the task counts as reached, and whether it ends there; not judged if None.
+        next_stages: is told how a task ended; returns what the next one is done by, or None to end
+            the run as that task did. From one to the next the arm is braked, and goes on from the
+            set-points where it is.
+        clearance: distances between what the arm must not bring together; None for nothing.
     """
 
     def __init__(
@@ -65,28 +71,35 @@ class Loop:
         timeouts: Timeouts | None = None,
         following: FollowingBound | None = None,
         goal: Goal | None = None,
+        next_stages: Callable[[Outcome], Stages | None] | None = None,
+        clearance: Clearance | None = None,
     ) -> None:
         self._driver, self._arm = driver, arm
-        self._perception, self._planner, self._law = perception, planner, law
         self._timeouts, self._following = timeouts or Timeouts(), following or FollowingBound()
+        self._next_stages = next_stages
         self._period_s = 1.0 / outer_rate_hz
         self._schedule = Schedule(driver.inner_rate_hz, outer_rate_hz)
         age_s = max(self._timeouts.image_s, _IMAGE_AGE_S)
         self._border = Border(driver, lambda: not self._moving, age_s)
         self._listeners = Listeners(listeners)
-        self._losses = LossReports(self._listeners)
-        self._arrival = None if goal is None else Arrival(goal, driver.arms[arm].rate_max)
-        self._stalled = False  # as it was told last
+        self._clearance = clearance
         self._interrupt = Interrupt()
         self._part = "driver"  # the one at work, to be named if it raises
-        self._inner_law = law if isinstance(law, InnerLaw) else None
         self._followers: dict[str, Follower] = {}
         self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
         self._tick, self._now = 0, 0.0
-        self._last_image = self._last_seen = 0.0  # s, when an image came, and one with the target
-        self._command: JointCommand | None = None  # what the arm goes by; None while it is held
         self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
         self._held = ""  # kind of what the arm is held for, as it was told last
+        self.take_up(Stages(perception, planner, law, self._timeouts, goal))
+
+    def take_up(self, stages: Stages) -> None:
+        """Begin a task; until an image has come the arm is held."""
+        self._perception, self._planner, self._law = stages.perception, stages.planner, stages.law
+        self._inner_law = stages.law if isinstance(stages.law, InnerLaw) else None
+        self._timeouts, rate_max = stages.timeouts, self._driver.arms[self._arm].rate_max
+        self._task = TaskWatch(stages, self._now, rate_max, self._listeners)
+        self._last_image = self._last_seen = self._now  # s, when one came, and with the target
+        self._command: JointCommand | None = None  # what the arm goes by; None while it is held
 
     def run(self, duration_s: float) -> Outcome:
         """Run until the time is over, the task has failed, or a signal; then stop the arm.
@@ -115,11 +128,14 @@ class Loop:
         self._interrupt.asked = True
 
     def replace_law(self, law: Law) -> None:
-        """Go on with another law from the next image; until then the arm is held.
+        """Go on with another law from the next image.
 
-        To be called from the thread that runs the loop, such as by its driver.
+        Until then the arm is held, unless the law can take over from the one before. To be called
+        from the thread that runs the loop, such as by its driver.
         """
-        self._law, self._command = law, None
+        if not (isinstance(law, Successor) and law.take_over(self._law)):
+            self._command = None
+        self._law = law
         self._inner_law = law if isinstance(law, InnerLaw) else None
 
     def _outcome(self, duration_s: float) -> Outcome:
@@ -145,7 +161,12 @@ class Loop:
                 return outcome
             if self._interrupt.asked:
                 return self._stopped()
-            if outcome := self._turn(sample, duration_s) or self._step(sample):
+            if outcome := self._turn(sample, duration_s):
+                stages = self._next_stages(outcome) if self._next_stages else None
+                if stages is None:
+                    return outcome
+                self.take_up(stages)
+            if outcome := self._step(sample):
                 return outcome
 
     def _begin(self, sample: Sample) -> Outcome | None:
@@ -159,8 +180,11 @@ class Loop:
                 joint = f"{arm.names[int(outside.argmax())]} of {name}"
                 reason = f"{joint} starts {worst:.3g} outside its range"
                 return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
+            braking = None
+            if self._clearance is not None and name == self._arm:
+                braking = ClearBraking(arm, self._clearance, dt)
             self._followers[name] = Follower(
-                arm, name, start, dt, self._following, timeouts.robot_s
+                arm, name, start, dt, self._following, timeouts.robot_s, braking
             )
         return None
 
@@ -176,26 +200,31 @@ class Loop:
         if not turns:
             return None
         sample = self._border.in_run_time(sample)
-        if self._now >= duration_s:
-            return self._completed(duration_s, sample)
+        if self._now >= (end := self._task.end(duration_s)):
+            return self._completed(end, sample)
         self._part = "perception"
         observation = self._perception.observe(sample.frames)
         self._part = "planner"
         if observation is None:
             return self._wait(sample)
         self._last_image = self._now
-        self._losses.report(self._now, observation)
+        self._task.see(self._now, observation)
         reference = self._planner.reference(observation.time)
         self._part = "law"
-        return self._decide(sample, observation, reference) or self._concluded(self._now)
+        return self._decide(sample, observation, reference) or self._concluded(
+            sample, observation, reference
+        )
 
-    def _concluded(self, time: float) -> Outcome | None:
-        """Tell what the planner has to tell; return how the task ends, if it does."""
-        if not isinstance(self._planner, EndsTask):
-            return None
-        for event in self._planner.events():
-            self._listeners.event(*event)
-        return self._planner.conclusion(time)
+    def _concluded(
+        self, sample: Sample, observation: Observation, reference: Reference
+    ) -> Outcome | None:
+        """Return how the task ends, if it does by its planner or its `until`."""
+        self._part = "planner"
+        if outcome := self._task.planned_end(self._now):
+            return outcome
+        self._part = "end of the task"
+        q = sample.joints[self._arm].position
+        return self._task.asked_end(self._now, q, observation, reference)
 
     def _wait(self, sample: Sample) -> Outcome | None:
         """Go on without an image, for a while."""
@@ -210,7 +239,7 @@ class Loop:
     ) -> Outcome | None:
         """Ask the law for a command, unless the target is lost or the arm is held."""
         self._command = None
-        if not shows_target(observation):
+        if not may_move(observation):
             self._record(sample, observation, reference)
             if self._now - self._last_seen > self._timeouts.target_s:
                 return endings.target_lost(reasons(observation), self._now)
@@ -219,12 +248,14 @@ class Loop:
         if self._followers[self._arm].holding is not None:
             self._record(sample, observation, reference)
             return None
-        command = self._law.command(observation, reference, sample.joints[self._arm])
+        joints = self._followers[self._arm].ahead(sample.joints[self._arm])
+        command = self._law.command(observation, reference, joints)
         if fault := self._border.check_command(self._arm, command):
             return Outcome(*fault, self._now)
         self._command = command
         self._record(sample, observation, reference)
-        self._judge(observation, reference, command, sample)
+        q = sample.joints[self._arm].position
+        self._task.judge(self._now, observation, reference, command, q)
         return None if command.fault is None else Outcome(*command.fault, self._now)
 
     def _step(self, sample: Sample) -> Outcome | None:
@@ -247,7 +278,8 @@ class Loop:
         self._part = "driver"
         self._driver.step(setpoints)
         self._tick += 1
-        return None
+        hindrance = self._followers[self._arm].guard.hindrance
+        return endings.collision(hindrance, self._now) if hindrance else None
 
     def _rates(self) -> FloatArray | Fault:
         """Return the rates to move at: the command's, less what its age has taken from them."""
@@ -283,20 +315,6 @@ class Loop:
             reason = holding.reason if holding else f"{self._arm} follows again"
             self._listeners.event(self._now, kind or "following", reason)
 
-    def _judge(
-        self, observation: Observation, reference: Reference, command: JointCommand, sample: Sample
-    ) -> None:
-        """See how near the goal is; tell where the arm comes to rest before it."""
-        if self._arrival is None:
-            return
-        q = sample.joints[self._arm].position
-        self._arrival.observe(observation, reference, command, q)
-        stalled = self._arrival.stalled
-        if stalled != self._stalled:
-            self._stalled = stalled
-            text = f"held by {self._arrival.holder()}" if stalled else "the arm moves again"
-            self._listeners.event(self._now, "stalled" if stalled else "moving", text)
-
     def _record(
         self, sample: Sample, observation: Observation | None, reference: Reference
     ) -> None:
@@ -309,15 +327,11 @@ class Loop:
         record = TickRecord(self._now, sample, observation, reference, commands, setpoints)
         self._listeners.tick(record)
 
-    def _completed(self, duration_s: float, sample: Sample) -> Outcome:
+    def _completed(self, end: float, sample: Sample) -> Outcome:
         measured = sample.joints[self._arm].position
         if hindered := self._followers[self._arm].hindered(self._now, measured):
             return Outcome(*hindered, self._now)
-        if isinstance(self._planner, EndsTask):
-            return self._planner.unfinished(self._now)
-        if self._arrival is None:
-            return endings.completed(duration_s, self._now)
-        return self._arrival.outcome(duration_s, self._now)
+        return self._task.time_over(end, self._now)
 
     def _stopped(self) -> Outcome:
         return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)

@@ -12,6 +12,11 @@ def shows_target(observation: Observation) -> bool:
     return bool(observation.target) or any(view.found.any() for view in observation.views)
 
 
+def may_move(observation: Observation) -> bool:
+    """Tell whether an observation shows all that the law needs."""
+    return shows_target(observation) or not observation.needs_target
+
+
 def reasons(observation: Observation) -> list[str]:
     """Return why features were not found, of every view."""
     return [reason for view in observation.views for reason in view.reasons]
@@ -30,7 +35,9 @@ class LossReports:
         self._target_lost = False
 
     def report(self, time: float, observation: Observation) -> None:
-        """Tell what has changed since the last observation."""
+        """Tell what has changed since the last observation; nothing where no target is needed."""
+        if not observation.needs_target:
+            return
         lost = not shows_target(observation)
         if lost != self._target_lost:
             self._target_lost = lost

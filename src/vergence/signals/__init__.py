@@ -3,12 +3,20 @@
 from vergence.signals.command import JointCommand
 from vergence.signals.frame import Frame, FrameTruth
 from vergence.signals.joints import JointState, Sample, Setpoint
-from vergence.signals.observation import ImagePoints, Observation, SearchWindows, TargetState
-from vergence.signals.outcome import Outcome, OutcomeKind
+from vergence.signals.observation import (
+    Curve,
+    ImagePoints,
+    Observation,
+    SearchWindows,
+    TargetState,
+    curves_of,
+)
+from vergence.signals.outcome import Outcome, OutcomeKind, TaskOutcome
 from vergence.signals.reference import Reference
 from vergence.signals.robot_state import RobotMode, RobotState
 
 __all__ = [
+    "Curve",
     "Frame",
     "FrameTruth",
     "ImagePoints",
@@ -24,4 +32,6 @@ __all__ = [
     "SearchWindows",
     "Setpoint",
     "TargetState",
+    "TaskOutcome",
+    "curves_of",
 ]

@@ -20,3 +20,5 @@ class JointCommand:
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command
     fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
     slack: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much
+    # m, the arm's least distance to what is near: "self", "arms", "fixtures", "target".
+    clearance: Mapping[str, float] = field(default_factory=dict)

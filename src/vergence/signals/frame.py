@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray, frozen
+from vergence.arrays import BoolArray, DepthArray, FloatArray, ImageArray, frozen
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,9 @@ class Frame:
     image: ImageArray | None  # (height, width) grey; None from a driver that makes no images
     joints: Mapping[str, FloatArray]  # arm name to joint positions at exposure, rad or m
     truth: FrameTruth | None = None
+    # (height, width) m along the optical axis at each pixel of the image, of a depth camera; what
+    # is not finite or not above zero is not known.
+    depth_m: DepthArray | None = None
 
     def __post_init__(self) -> None:
         # Read-only like every value, whoever took the image: kernels are compiled for such once.
@@ -35,5 +38,9 @@ class Frame:
             image = np.ascontiguousarray(self.image).view()
             image.flags.writeable = False
             object.__setattr__(self, "image", image)
+        if self.depth_m is not None:
+            depth = np.ascontiguousarray(self.depth_m).view()
+            depth.flags.writeable = False
+            object.__setattr__(self, "depth_m", depth)
         joints = {arm: frozen(position) for arm, position in self.joints.items()}
         object.__setattr__(self, "joints", joints)

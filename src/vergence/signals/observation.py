@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
 
 
 class SearchWindows(NamedTuple):
@@ -15,9 +15,27 @@ class SearchWindows(NamedTuple):
     half_px: FloatArray  # (M, 2) half the width and height
 
 
+class Curve(NamedTuple):
+    """Points of a measurement that make a curve."""
+
+    points: IntArray  # (K,) their numbers, in order
+    closed: bool
+
+
+def curves_of(joined: BoolArray) -> tuple[Curve, ...]:
+    """Return the curves of a measurement, from its `joined` (M,); marks alone are none."""
+    numbers = np.arange(len(joined))
+    parts = np.split(numbers, numbers[~joined] + 1)
+    return tuple(Curve(part, bool(joined[part[-1]])) for part in parts if len(part) > 1)
+
+
 @dataclass(frozen=True, slots=True)
 class ImagePoints:
-    """The points measured in one image of one camera."""
+    """The points measured in one image of one camera.
+
+    A curve that was measured, such as an ellipse, is the points that stand for it: which ones they
+    are follows from the curve alone, and `joined` says that they make one.
+    """
 
     camera: str
     time: float  # s, of exposure
@@ -26,6 +44,12 @@ class ImagePoints:
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
     windows: SearchWindows | None = None  # None from what has no windows and looks for all points
+    # (M,) whether the curve goes on to the next point; after a last one that is joined it closes.
+    # None if every point is a mark alone.
+    joined: BoolArray | None = None
+    # (M,) m, measured by a depth camera, and its standard deviation; NaN where it does not tell.
+    depth_m: FloatArray | None = None
+    depth_deviation_m: FloatArray | None = None
 
     @property
     def asked(self) -> BoolArray:
@@ -55,3 +79,4 @@ class Observation:
     time: float  # s, of the newest image in it
     views: tuple[ImagePoints, ...]  # one an image that arrived
     target: TargetState | None = None
+    needs_target: bool = True  # whether the arm is held while the target is not seen

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 
 class OutcomeKind(StrEnum):
@@ -12,6 +13,7 @@ class OutcomeKind(StrEnum):
     NOT_REACHED = "not reached"  # at rest away from the goal, or out of time
     TARGET_LOST = "target lost"
     JOINT_LIMIT = "joint limit"
+    COLLISION = "collision"  # braked before bodies touched
     SINGULARITY = "singularity"
     IMAGE_LATE = "image late"
     CAMERA_FROZEN = "camera frozen"
@@ -34,6 +36,8 @@ class Outcome:
     kind: OutcomeKind
     reason: str  # one sentence for a person: what happened, to what
     time: float  # s since the start of the run
+    # How each task of several ended that was begun; the last as the run did. Empty for one task.
+    tasks: tuple["TaskOutcome", ...] = ()
 
     @property
     def succeeded(self) -> bool:
@@ -43,3 +47,11 @@ class Outcome:
     def __str__(self) -> str:
         """Kind, time and reason on one line."""
         return f"{self.kind.value} at {self.time:.2f} s: {self.reason}"
+
+
+class TaskOutcome(NamedTuple):
+    """How one of several tasks ended."""
+
+    name: str  # of the task
+    begun: float  # s since the start of the run
+    outcome: Outcome

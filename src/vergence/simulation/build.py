@@ -9,14 +9,16 @@ import numpy as np
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
 from vergence.cell.locate import locate_model
-from vergence.cell.schema import ArmTable, CameraTable, Placement
+from vergence.cell.schema import ArmTable, CameraTable, OutputTable, Placement
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion
+from vergence.robot.mesh_files import SHELL
 from vergence.robot.model_files import read_model
 from vergence.simulation.motion import placement_pose
 
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
-_FOLLOWS = mujoco.mjtEq.mjEQ_JOINT
+_FOLLOWS, _BALL = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtGeom.mjGEOM_SPHERE
+HULL_BITS = 1 << 30, 1 << 29  # neither mask has a bit of the other's, nor those that people use
 _ROOM = Path(__file__).with_name("scene.xml")
 
 
@@ -26,6 +28,7 @@ def assemble(cell: Cell) -> Any:
     spec.option.timestep = 1.0 / cell.inner_rate_hz
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.visual.quality.offsamples = 0
+    spec.visual.quality.numslices = 96  # a round edge to a few hundredths of a pixel
     spec.visual.map.znear = 0.01
     spec.stat.extent = 1.0
     spec.visual.headlight.active = 0
@@ -47,7 +50,39 @@ def assemble(cell: Cell) -> Any:
         spec.attach(
             model, frame=_held(spec, cell, "tool", model, cell.tool, cell.task.arm), prefix="tool/"
         )
+    for name, output in cell.outputs.items():
+        _add_output(spec, cell, name, output)
     return spec
+
+
+def with_hulls(spec: Any) -> Any:
+    """Return a description whose visible meshes get convex hulls, which makes distances fast.
+
+    MuJoCo makes hulls only of what may collide; such meshes may, by `HULL_BITS`, but with nothing.
+    """
+    meshes = {mesh.name: mesh for mesh in spec.meshes}
+    for geom in spec.geoms:
+        mesh = meshes.get(geom.meshname)
+        solid = mesh is not None and mesh.inertia != SHELL  # a flat one has no hull
+        if solid and not (geom.contype or geom.conaffinity):
+            geom.contype, geom.conaffinity = HULL_BITS
+    return spec
+
+
+def under_a_sky(cell: Cell) -> Any:
+    """Return the compiled model of a cell for people to look at: its state is that of any other.
+
+    The cameras of the cell see none of the sky.
+    """
+    spec = assemble(cell)
+    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    if not any(texture.type == sky for texture in spec.textures):
+        gradient = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+        spec.add_texture(
+            name="sky", type=sky, builtin=gradient, width=256, height=256,
+            rgb1=[0.75, 0.84, 0.93], rgb2=[0.93, 0.95, 0.97],
+        )  # fmt: skip
+    return spec.compile()
 
 
 def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, arm: str) -> Any:
@@ -57,6 +92,18 @@ def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, ar
     holder = spec.body(f"{arm}/{cell.arms[arm].body}").add_body(name=name)
     _place(holder, placement)
     return holder.add_frame()
+
+
+def _add_output(spec: Any, cell: Cell, name: str, output: OutputTable) -> None:
+    """Fix an output, and what it looks like, to the last body of its arm."""
+    if output.model is None:
+        model = mujoco.MjSpec()
+    else:
+        model = _read(cell, f"outputs.{name}.model", output.model)
+    place = f"output {name}"
+    frame = _held(spec, cell, place, model, output, output.arm)
+    if output.model is not None:
+        spec.attach(model, frame=frame, prefix=f"{place}/")
 
 
 def _add_target(spec: Any, cell: Cell) -> None:
@@ -143,13 +190,17 @@ def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
     camera = _rendered(cell, name)
     body = spec.worldbody
     if table.arm is not None:
-        wanted = table.body or cell.arms[table.arm].body
-        body = spec.body(f"{table.arm}/{wanted}")
+        given = table.body or cell.arms[table.arm].body
+        body = spec.body(f"{table.arm}/{given}")
         if body is None:
             known = (b.name.removeprefix(f"{table.arm}/") for b in spec.bodies)
-            raise InputError(str(cell.path), f"cameras.{name}.body", wanted, nearest(wanted, known))
+            raise InputError(str(cell.path), f"cameras.{name}.body", given, nearest(given, known))
     element = body.add_camera(name=name)
     _place(element, table, camera=True)
+    if table.radius_m is not None:
+        ball = body.add_geom(name=f"{name}/ball", type=_BALL, pos=element.pos)
+        ball.size[0], ball.rgba, ball.mass = table.radius_m, np.zeros(4), 0.0  # nothing sees it
+        ball.contype = ball.conaffinity = 0
     element.resolution = [camera.width, camera.height]
     # MuJoCo wants a sensor of some size: one metre a pixel keeps its numbers equal to ours.
     element.sensor_size = [camera.width, camera.height]

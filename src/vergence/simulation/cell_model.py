@@ -1,6 +1,7 @@
 """The cell as its file and its models describe it: geometry, arms, cameras, the target."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion, se3_inverse
 from vergence.robot import Arm
 from vergence.robot.mujoco_chain import read_chain
-from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics
+from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics, with_hulls
 from vergence.simulation.motion import placement_pose
 
 _SKIN_M = 0.003  # how deep under a surface a feature may lie and still be seen
@@ -26,6 +27,10 @@ class CellModel:
     It knows what the file and the models say: placements, joint positions that it is told, and
     nothing of what is truly there.
 
+    Args:
+        cell: what it is of.
+        hulls: whether distances between bodies will be asked for, which hulls of meshes make fast.
+
     Attributes:
         model: MuJoCo's model; everything of arm A is named "A/…", of the target "target/…".
         data: its state.
@@ -33,15 +38,9 @@ class CellModel:
         arms: by name, each up to the first camera it carries, else up to its last body.
     """
 
-    def __init__(self, cell: Cell) -> None:
+    def __init__(self, cell: Cell, hulls: bool = False) -> None:
         self.cell = cell
-        spec = assemble(cell)
-        try:
-            self.model: Any = spec.compile()
-        except ValueError as error:
-            raise InputError(
-                str(cell.path), "", str(error), "models that MuJoCo compiles"
-            ) from None
+        self.model: Any = _compiled(cell, hulls)
         self.data: Any = mujoco.MjData(self.model)
         self.cameras = {name: intrinsics(table) for name, table in cell.cameras.items()}
         self.arms = {name: self._arm(name) for name in cell.arms}
@@ -86,6 +85,10 @@ class CellModel:
         """Return T_world_tool (4, 4) of what the task's arm holds, as of the last `update`."""
         return self._body_pose(int(self.model.body("tool").id))
 
+    def output_pose(self, name: str) -> FloatArray:
+        """Return T_world_output (4, 4) of an output on an arm, as of the last `update`."""
+        return self._body_pose(int(self.model.body(f"output {name}").id))
+
     def move_target(self, T_world_target: FloatArray) -> None:
         """Put the target somewhere; it takes effect with the next step or `update`.
 
@@ -116,6 +119,13 @@ class CellModel:
     def write_position(self, data: Any, arm: str, position: FloatArray) -> None:
         """Write an arm's joint positions (n,) into a state, joints that follow them among them."""
         data.qpos[self._axis_qpos[arm]] = self.arms[arm].axis_positions(position)
+
+    def state(self) -> FloatArray:
+        """Return MuJoCo's state of the world, as `mj_setState` takes it."""
+        kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        state = np.empty(mujoco.mj_stateSize(self.model, kind))
+        mujoco.mj_getState(self.model, self.data, state, kind)
+        return state
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
         """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.
@@ -171,6 +181,10 @@ class CellModel:
             if self.model.body(self.model.body_rootid[body]).name.startswith(f"{arm}/")
         )
 
+    def axes_of(self, arm: str) -> list[int]:
+        """Return the numbers of the joints that are the axes of an arm's chain, base first."""
+        return [int(self.model.joint(f"{arm}/{n}").id) for n in self.arms[arm].axis_names]
+
     def arm_to_body(self, name: str) -> Arm:
         """Return an arm with its last body as its tip."""
         return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")
@@ -213,9 +227,7 @@ class CellModel:
         return np.array([self.model.joint(f"{arm}/{j}").id for j in self.arms[arm].names])
 
     def _axis_addresses(self, arm: str) -> IntArray:
-        names = self.arms[arm].axis_names
-        joints = [self.model.joint(f"{arm}/{name}").id for name in names]
-        return np.asarray(self.model.jnt_qposadr[joints], dtype=np.int64)
+        return np.asarray(self.model.jnt_qposadr[self.axes_of(arm)], dtype=np.int64)
 
     def _place_at_start(self) -> None:
         for name in self.cell.arms:
@@ -249,6 +261,18 @@ def hiding(model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: A
         model, data, eye, directions, groups, True, -1, geoms, met, None, len(rays), reach
     )
     return np.where(met < distance - _SKIN_M, geoms, -1)
+
+
+def _compiled(cell: Cell, hulls: bool) -> Any:
+    spec = assemble(cell)
+    if hulls:
+        with suppress(ValueError):  # a mesh of which there is no hull
+            return with_hulls(spec).compile()
+        spec = assemble(cell)
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise InputError(str(cell.path), "", str(error), "models that MuJoCo compiles") from None
 
 
 def _descendants(model: Any, root: int) -> frozenset[int]:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.errors import InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
 from vergence.robot.model_files import read_model
@@ -28,6 +28,7 @@ _WITHOUT_LIMITS = 2.0  # rad or m: how far such a joint is turned for a start
 _RATES = 0.25, np.pi / 2  # m/s if it slides, rad/s if not: where the model says nothing
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
 SPAN = 0.35  # half a side of the board as a share of its distance
+_FARTHEST = 1.5  # times its reach, from which an arm can still keep a target in view
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,18 @@ class Draft:
     T_world_target: FloatArray  # (4, 4) of a board before the camera, its z towards it
     height_m: float  # of the arm's base above the floor
     half_side_m: float  # of the board
+    distance_m: float  # of the board from the camera
     rates_from: str  # whose the rate limits of the arm are
 
+    @property
+    def J_camera(self) -> FloatArray:
+        """Jacobian (6, n) of the camera in its own axes, at the start."""
+        return self.arm.with_tip(self.T_body_camera).jacobian(self.start)
 
-def draft_cell(model_path: Path, body: str, span: float = SPAN) -> Draft:
+
+def draft_cell(
+    model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
+) -> Draft:
     """Find a posture from which a camera on an arm's last body looks well at a board.
 
     Well means: far from singular postures and joint limits, downwards rather than up, not twisted
@@ -54,17 +63,19 @@ def draft_cell(model_path: Path, body: str, span: float = SPAN) -> Draft:
         model_path: MJCF or URDF.
         body: the last body of the arm, which carries the camera.
         span: half a side of the board as a share of its distance.
+        half_side_m: of what is in the board's place; if None, the arm's reach decides.
 
     Raises:
-        InputError: if there is no such body, nothing moves it, or the arm is always in the way.
+        InputError: if there is no such body, nothing moves it, the arm is always in the way, or
+            the target is too large to be seen as a whole.
     """
     model = _compile(model_path, body)
     arm, rates_from = _arm(model, body)
     data = mujoco.MjData(model)
     postures = _postures(arm)
-    distance = float(np.clip(0.5 * _reach(arm, postures), 0.15, 0.6))
+    distance = _distance(_reach(arm, postures), span, half_side_m)
     own_height = _height(model, data)
-    half_side = span * distance
+    half_side = span * distance if half_side_m is None else half_side_m
     for highest in (own_height, np.inf):
         for T_body_camera, q in _candidates(model, data, arm, body, postures):
             T_world_camera = se3_compose(arm.forward_kinematics(q), T_body_camera)
@@ -74,7 +85,7 @@ def draft_cell(model_path: Path, body: str, span: float = SPAN) -> Draft:
             height = max(own_height, math.ceil(100 * (_ABOVE_FLOOR_M - lowest)) / 100)
             if height <= highest and _sees(model, data, arm, q, T_world_camera, points):
                 board[2, 3] += height
-                return Draft(q, arm, T_body_camera, board, height, half_side, rates_from)
+                return Draft(q, arm, T_body_camera, board, height, half_side, distance, rates_from)
     given = f"a camera on {body} that sees nothing but the arm in {_TRIED} postures"
     raise InputError(str(model_path), "", given, "an arm with room before its last body")
 
@@ -84,7 +95,9 @@ def _compile(path: Path, body: str) -> Any:
     try:
         bodies = {one.name: one for one in spec.bodies if one.name and one.name != "world"}
         if body not in bodies:
-            raise InputError(str(path), "--body", body or "none", nearest(body, bodies))
+            ends = ", ".join(name for name, one in bodies.items() if not one.bodies)
+            allowed = f"{nearest(body, bodies)}; the last of each branch: {ends}"
+            raise InputError(str(path), "--body", body or Absent("no body is named"), allowed)
         named_joints(bodies[body])
         return spec.compile()
     except InputError:
@@ -115,6 +128,19 @@ def _postures(arm: Arm) -> FloatArray:
     step = np.where(arm.sliding, 1e-3, np.deg2rad(0.1))
     postures: FloatArray = np.round((low + share * (high - low)) / step) * step
     return postures
+
+
+def _distance(reach: float, span: float, half_side_m: float | None) -> float:
+    """Return how far from the camera a board or a target is placed, m."""
+    if half_side_m is None:
+        return float(np.clip(0.5 * reach, 0.15, 0.6))
+    if half_side_m > span * _FARTHEST * reach:
+        allowed = (
+            f"up to {2 * span * _FARTHEST * reach:.2g} m for an arm with this reach; "
+            "--target-scale 0.001 if the file is in millimetres"
+        )
+        raise InputError("--target", "", f"an object {2 * half_side_m:.3g} m wide", allowed)
+    return max(half_side_m / span, 0.1)
 
 
 def _reach(arm: Arm, postures: FloatArray) -> float:

@@ -42,6 +42,8 @@ class ExactPoints:
             np.broadcast_to(covariance, (len(noise), 2, 2)),
             truth.visible,
             tuple("" if seen else OUT_OF_SIGHT for seen in truth.visible),
+            depth_m=truth.depth_m,
+            depth_deviation_m=np.zeros(len(noise)),
         )
 
 

@@ -6,16 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera, image_tick
 from vergence.cell.cell import Cell
-from vergence.cell.schema import FollowTable, TrackTable
+from vergence.cell.schema import FollowTable, Task, TrackTable
+from vergence.errors import InputError
+from vergence.features import inverse_depth_plane
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import Arm
+from vergence.runtime.task_ends import looks_for_target
 from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
 from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
 from vergence.simulation.motion import target_pose
 from vergence.simulation.renderer import CameraRenderer, choose_renderer
+from vergence.vision import CurveTracking
 
 
 class SimulatedDriver:
@@ -33,12 +37,15 @@ class SimulatedDriver:
     def __init__(self, cell: Cell, images: bool = True) -> None:
         choose_renderer(needed=images)
         from vergence.simulation.as_built import as_built
+        from vergence.simulation.gripper import Gripper
         from vergence.simulation.world import World
 
         self.cell = cell
         built = as_built(cell)
         self.world = World(built)
         self._pose = target_pose(built.target, cell.target.motion, cell.seed)
+        self._grippers = {n: Gripper(self.world, n, t) for n, t in cell.outputs.items()}
+        self._let_go: FloatArray | None = None  # (4, 4) where a target was let go last
         self._tick = 0
         self._exposed = dict.fromkeys(cell.cameras, 0)
         self._queue: deque[tuple[int, Frame]] = deque()  # tick of arrival, frame
@@ -59,7 +66,8 @@ class SimulatedDriver:
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self.world.move_target(self._pose(0.0))
         self.world.update()
-        self._features = self._first_features(images)
+        self._curve = _curve_of(cell.task)
+        self._features = self._features_of(cell.task, images)
         self.restart_cameras()
 
     @property
@@ -90,14 +98,23 @@ class SimulatedDriver:
     def look_for(self, features: FloatArray) -> None:
         """Make points (M, 3) in the target's frame those of which frames tell the truth.
 
-        To be called before the first `step`; what `read` has delivered it delivers again.
+        Before the first `step`, what `read` has delivered it delivers again. Later, images under
+        way are dropped: they tell of other points.
         """
         self._features = np.array(features, dtype=np.float64)
+        if self._tick:
+            self._queue.clear()
+            return
         self._queue = deque(
             (arrival, replace(frame, truth=self._truth(frame.camera, self._is_blind(frame.camera))))
             for arrival, frame in self._before_motion
         )
         self._before_motion = list(self._queue)
+
+    def take_up(self, task: Task) -> None:
+        """Tell the truth from now on of what another task of the cell looks at."""
+        self._curve = _curve_of(task)
+        self.look_for(self._features_of(task, images=bool(self._renderers)))
 
     def restart_cameras(self) -> None:
         """Begin again with what the cameras see now; to be called before the first `step`."""
@@ -126,10 +143,10 @@ class SimulatedDriver:
         return frame
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
-        """Make image points (M, 2) at the start the target's features, and return those, (M, 3).
+        """Make image points (M, 2) the target's features, and return those, (M, 3).
 
-        So frames tell the truth of features that were picked in the image. A ray that misses the
-        target gives NaN.
+        They are seen from where the camera is now. So frames tell the truth of features that were
+        picked in the image. A ray that misses the target gives NaN.
         """
         points = self.world.anchor(camera, points_px)
         self.look_for(points)
@@ -164,14 +181,40 @@ class SimulatedDriver:
         for name, trajectory in self._trajectories.items():
             self.world.command(name, *trajectory.at(self._tick))
         self._tick += 1
-        self.world.move_target(self._pose(self.time))
+        self.world.move_target(self._target_pose())
         self.world.step()
         self._expose()
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(self._grippers)
+
+    def set_output(self, name: str, value: float) -> None:
+        """Close a gripper, from a value of a half on, or open it; see `Gripper`."""
+        self.world.update()
+        gripper = self._grippers[name]
+        held = gripper.target_pose()
+        gripper.set(value)
+        if held is not None and not gripper.holds:
+            self._let_go = held
 
     def close(self) -> None:
         """Free the graphics contexts."""
         for renderer in self._renderers.values():
             renderer.close()
+
+    def _target_pose(self) -> FloatArray:
+        """Return T_world_target (4, 4): with the arm, where it was let go, or as it moves."""
+        poses = (gripper.target_pose() for gripper in self._grippers.values())
+        held = next((T for T in poses if T is not None), self._let_go)
+        return self._pose(self.time) if held is None else held
+
+    def _carry_target(self) -> None:
+        """Put a target that is held where the arm is now, rather than one tick ago."""
+        if any(gripper.holds for gripper in self._grippers.values()):
+            self.world.move_target(self._target_pose())
+            self.world.update()
 
     def _own_motion(self, name: str) -> JointTrajectory:
         carries = self.cell.target.carried_by == name
@@ -186,6 +229,7 @@ class SimulatedDriver:
                 continue
             if not fresh:
                 self.world.update()
+                self._carry_target()
                 fresh = True
             arrival = self._tick_of(self._exposed[name] + table.latency_frames, table.rate_hz)
             self._exposed[name] += 1
@@ -199,20 +243,23 @@ class SimulatedDriver:
         renderer = self._renderers.get(camera)
         image = None if renderer is None else renderer.take(self.world.data, blind)
         joints = {name: self.world.joint_position(name) for name in self.arms}
-        return Frame(camera, self.time, image, joints, self._truth(camera, blind))
+        sensor, depth = self.cell.cameras[camera].depth, None
+        if sensor is not None and renderer is not None:
+            depth = renderer.depth(self.world.data, sensor)
+        return Frame(camera, self.time, image, joints, self._truth(camera, blind), depth)
 
     def _is_blind(self, camera: str) -> bool:
         return any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
 
-    def _first_features(self, images: bool) -> FloatArray:
-        """Return the points (M, 3) of the target that its task follows, where they are known.
+    def _features_of(self, task: Task, images: bool) -> FloatArray:
+        """Return the points (M, 3) of the target that a task follows, where they are known.
 
         Without images nobody picks features: they are spread over the middle of the task's image.
         """
-        task, known = self.cell.task, self.cell.target.features
+        known = self.cell.target.features
         if known:
             return np.array(known, dtype=np.float64)
-        if isinstance(task, FollowTable):
+        if isinstance(task, FollowTable) or looks_for_target(task.until):
             from vergence.vision.known_object import object_model_of
 
             return object_model_of(self.world.model, "target").corners
@@ -237,7 +284,8 @@ class SimulatedDriver:
         if len(in_sight):
             points_world = transform_points(T_world_target, features[in_sight])
             visible[in_sight] = self.world.sees(camera, points_world)
-        return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
+        truth = FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
+        return truth if self._curve is None else _truth_of_curve(truth, self._curve, intrinsics)
 
     def _subject(self, camera: str) -> tuple[FloatArray, FloatArray]:
         """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""
@@ -245,6 +293,32 @@ class SimulatedDriver:
         if tool is None or tool.camera != camera:
             return self.world.target_pose(), self._features
         return self.world.tool_pose(), np.array(tool.features)
+
+
+def _curve_of(task: Task) -> CurveTracking | None:
+    """Return what follows a curve in a task, if anything does."""
+    tracker = getattr(task, "tracker", None)
+    return tracker if isinstance(tracker, CurveTracking) else None
+
+
+def _truth_of_curve(truth: FrameTruth, curve: CurveTracking, camera: Camera) -> FrameTruth:
+    """Return the truth of the points that stand for a curve, from points on it."""
+    before: BoolArray = np.isfinite(truth.points_px[:, 0])
+    nothing = replace(truth, visible=np.zeros(len(before), dtype=np.bool_))
+    if not len(before) or not before.all():
+        return nothing
+    try:
+        points_px = curve.points_on(truth.points_px, (camera.width, camera.height))
+    except InputError:  # a circle on edge, a line seen end on
+        return nothing
+    between = np.linalg.norm(points_px[:, None] - truth.points_px[None], axis=2)
+    A, B, C = inverse_depth_plane(camera.normalize(truth.points_px), truth.depth_m)
+    x, y = camera.normalize(points_px).T
+    depth_m = 1.0 / (A * x + B * y + C)
+    nearest = between.argmin(axis=1)
+    in_sight = truth.visible | ~camera.contains(truth.points_px)
+    visible = in_sight[nearest] & camera.contains(points_px)
+    return replace(truth, points_px=points_px, depth_m=depth_m, visible=visible)
 
 
 def grid_points(width: int, height: int, count: int) -> FloatArray:

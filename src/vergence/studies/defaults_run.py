@@ -9,6 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.assembly.limits_on_plan import (
+    PLAN_MARGIN_JOINT,
+    PLAN_MARGIN_PX,
+    limits_on_plan,
+)
 from vergence.control import (
     CarriedDepth,
     Depth,
@@ -19,13 +24,14 @@ from vergence.control import (
     InteractionModel,
     Limits,
     MotionSettings,
+    PseudoInverse,
     QuadraticProgram,
     Servo,
     Situation,
     guarded_steps,
 )
 from vergence.estimation import CornerView, NoPose, fit_pose
-from vergence.geometry import se3_inverse, so3_log, transform_points
+from vergence.geometry import se3_exp, se3_inverse, so3_log, transform_points
 from vergence.planning import (
     FixedReference,
     OptimisedPlanner,
@@ -43,7 +49,10 @@ RATE_HZ, INNER = 30.0, 4  # images a second, and set-points an image
 LONGEST_S = 20.0  # given to a law
 REACHED_PX, REACHED_M, REACHED_DEG = 1.0, 1e-3, 0.1
 BELIEF = (0.7, 1.4)  # range of the believed over the true depth at the start
-GAIN = 1.0  # 1/s
+GAIN, GAIN_OF_NEW = 1.0, 3.0  # 1/s: of a law without a plan, and as `new` writes it
+# Shares of the rate limits up to which an arm is at rest.
+_SLOW, _SLOW_WITH_NOISE = 4e-4, 4e-3
+_NOTICEABLE = 0.1  # 1/s: share of the error by which it falls
 CAMERA_SPEED, SETTLE_S = 0.25, 4.0  # m/s of a plan, and s after its end
 
 DEPTHS: dict[str, Depth] = {
@@ -63,6 +72,7 @@ class End(StrEnum):
     JOINT = "joint limit"
     STALLED = "stalled"
     UNNAMED = "stalled, unnamed"
+    OFF = "right image, wrong pose"
     LATE = "out of time"
     NO_PLAN = "no plan"
 
@@ -101,10 +111,15 @@ class TrueScene:
 
     Args:
         scene: with flat marks.
+        goal_noise_px: standard deviation of each coordinate of the marks in the desired image. No
+            one can tell the goal from poses that show the same within three deviations.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, goal_noise_px: float = 0.0) -> None:
         self._scene, self._points = scene, scene.points_world
+        m, rad = _pose_deviation(scene, goal_noise_px) if goal_noise_px else (0.0, 0.0)
+        self._tolerance_m = REACHED_M + 3.0 * m
+        self._tolerance_deg = REACHED_DEG + 3.0 * float(np.degrees(rad))
         self._normal = scene.T_world_target[:3, 2] * np.sign(
             scene.T_world_target[:3, 2] @ (scene.T_world_goal[:3, 3] - self._points.mean(axis=0))
         )
@@ -130,55 +145,71 @@ class TrueScene:
         off = se3_inverse(self._scene.T_world_goal.copy()) @ self._scene.arm.forward_kinematics(q)
         m = float(np.linalg.norm(off[:3, 3]))
         deg = float(np.degrees(np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))))
-        close = error < REACHED_PX and m < REACHED_M and deg < REACHED_DEG
-        if close and end in (End.STALLED, End.UNNAMED, End.LATE):
+        alike = m < self._tolerance_m and deg < self._tolerance_deg
+        close = error < REACHED_PX and alike
+        if close and end in (End.STALLED, End.UNNAMED, End.OFF, End.LATE):
             end = End.REACHED
         return Finish(end, error, m, deg, time, reason)
 
 
-def servo_of(
-    scene: Scene, choice: Choice, believed_m: FloatArray, limits: Limits | None = None
-) -> Servo:
+def _pose_deviation(scene: Scene, noise_px: float) -> tuple[float, float]:
+    """Return how well one image at the goal fixes the camera, m and rad, along the worst axes."""
+    step, J = 1e-5, np.empty((scene.goal_px.size, 6))
+    for k, twist in enumerate(step * np.eye(6)):
+        ends = (scene.seen_px(scene.T_world_goal @ se3_exp(t)) for t in (twist, -twist))
+        J[:, k] = np.subtract(*ends).ravel() / (2.0 * step)
+    covariance = noise_px**2 * np.linalg.inv(J.T @ J)
+    position, angle = (np.linalg.eigvalsh(covariance[k : k + 3, k : k + 3])[-1] for k in (0, 3))
+    return float(np.sqrt(position)), float(np.sqrt(angle))
+
+
+def servo_of(scene: Scene, choice: Choice, believed_m: FloatArray, limited: bool = True) -> Servo:
     """Make the servo of a choice: what `run` makes of a cell with these settings."""
     depth = DEPTHS[choice.depth]
+    limits = Limits(
+        manipulability_share=choice.manipulability_share, joint_margin=choice.joint_margin
+    )
     return Servo(
         scene.arm,
         scene.camera,
         ImageBased(gain=GAIN, interaction=choice.interaction),
-        limits=limits
-        or Limits(
-            manipulability_share=choice.manipulability_share, joint_margin=choice.joint_margin
-        ),
+        limits=limits if limited else None,
+        solver=None if limited else PseudoInverse(),
         depth_m=believed_m,
-        situation=Situation(
-            1.0 / RATE_HZ,
-            MotionSettings(feed_forward=False, depth=depth),
-            features={"": scene.marks},
-        ),
+        situation=_situation(scene, depth),
     )
+
+
+def _situation(scene: Scene, depth: Depth) -> Situation:
+    motion = MotionSettings(feed_forward=False, depth=depth)
+    return Situation(1.0 / RATE_HZ, motion, features={"": scene.marks})
 
 
 def drive(
     scene: Scene,
     law: Servo,
+    free: Servo,
     planner: Planner,
     random: np.random.Generator,
     noise_px: float = 0.0,
     longest_s: float = LONGEST_S,
     shortest_s: float = 0.0,
+    goal_noise_px: float = 0.0,
 ) -> Finish:
     """Servo until the arm rests, a rule is broken or time is over.
 
     Args:
         scene: what is true.
         law: what moves the arm.
+        free: the same without limits, to try whether it is a limit that holds a stalled arm.
         planner: what is desired.
         random: draws the noise.
         noise_px: standard deviation of each measured coordinate.
         longest_s: when to stop.
         shortest_s: before which rest does not count, such as the time of a plan.
+        goal_noise_px: as for `TrueScene`.
     """
-    arm, true = scene.arm, TrueScene(scene)
+    arm, true = scene.arm, TrueScene(scene, goal_noise_px)
     limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
     q, rates, stuck = (
         scene.q_start.copy(),
@@ -187,6 +218,7 @@ def drive(
     )
     arrival = Arrival(Goal(REACHED_PX), arm.rate_max)
     past: deque[FloatArray] = deque(maxlen=int(RATE_HZ) + 1)
+    seen: deque[FloatArray] = deque(maxlen=int(RATE_HZ) + 1)
     for k in range(int(longest_s * RATE_HZ)):
         time = k / RATE_HZ
         px, _, broken = true.look(q)
@@ -199,15 +231,35 @@ def drive(
             return true.finish(q, End.STALLED, time, command.fault[1])
         arrival.observe(Observation(time, (view,)), reference, command, q)
         past.append(q / arm.rate_max)
-        rests = len(past) > RATE_HZ and np.ptp(past, axis=0).max() < (
-            4e-4 if noise_px == 0 else 4e-3
-        )
-        if rests and time > shortest_s:
-            reason = arrival.holder()
-            end = End.STALLED if reason else End.UNNAMED
-            return true.finish(q, end, time, reason)
+        seen.append(view.points_px)
+        slow = _SLOW if noise_px == 0 else _SLOW_WITH_NOISE
+        rests = len(past) > RATE_HZ and np.ptp(past, axis=0).max() < slow and time > shortest_s
+        if rests and not arrival.falls:
+            if arrival.reached:
+                return true.finish(q, End.OFF, time, "")
+            mean = Observation(time, (_measured(np.mean(seen, axis=0), noise_px, time),))
+            wish = free.command(mean, reference, JointState(time, q, rates)).velocity
+            # Without limits an arm that they hold would move, and one held otherwise would not.
+            moves = (np.abs(wish) > slow * arm.rate_max).any() or _nears(scene, q, wish)
+            end = End.STALLED if moves == bool(arrival.active) else End.UNNAMED
+            return true.finish(q, end, time, arrival.holder())
         guarded_steps(q, rates, command.velocity, limits, 1.0 / RATE_HZ / INNER, INNER, stuck)
     return true.finish(q, End.LATE, longest_s, "")
+
+
+def _nears(scene: Scene, q: FloatArray, rates: FloatArray) -> bool:
+    """Tell whether the error falls noticeably at joint rates (n,), by its derivative along them."""
+    fastest = np.abs(rates).max()
+    if fastest == 0.0:
+        return False
+    step_s = 1e-5 / fastest
+
+    def error(time: float) -> float:
+        T = scene.arm.forward_kinematics(q + time * rates)
+        return float(np.linalg.norm(scene.seen_px(T) - scene.goal_px))
+
+    fall = (error(-step_s) - error(step_s)) / (2.0 * step_s)
+    return bool(fall > _NOTICEABLE * error(0.0))
 
 
 def _measured(px: FloatArray, noise_px: float, time: float) -> ImagePoints:
@@ -224,8 +276,10 @@ def serve(
     goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
     known = goal[:, 2].copy() if choice.depth == "from_features" else None
     reference = Reference(0.0, scene.goal_px, desired_depth_m=known)
-    law = servo_of(scene, choice, believed)
-    return drive(scene, law, FixedReference(reference), random, noise_px)
+    law, free = (servo_of(scene, choice, believed, limited=kept) for kept in (True, False))
+    averaged = noise_px * np.sqrt(0.5 * GAIN / RATE_HZ)  # what the law leaves of it at rest
+    planner = FixedReference(reference)
+    return drive(scene, law, free, planner, random, noise_px, goal_noise_px=averaged)
 
 
 class Planned(NamedTuple):
@@ -266,22 +320,23 @@ def plan(scene: Scene, random: np.random.Generator, noise_px: float = 0.0) -> Pl
 
 
 def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: float = 0.0) -> Finish:
-    """Follow a path as the task `reach` does, and settle at its end."""
+    """Follow a path as `track` does in a cell that `new` writes, and settle at its end."""
     trajectory = Trajectory.of(path, CAMERA_SPEED)
-    limits = Limits(
-        view_margin_px=0.5 * max(path.image_margin_px, 0.0),
-        joint_margin=0.25 * max(path.joint_margin, 0.0),
-        approach_rate_hz=8.0,
-        manipulability_share=0.0,
-    )
-    law = Servo(
-        scene.arm,
-        scene.camera,
-        ImageBased(gain=2.0 * GAIN, interaction="desired"),
-        limits=limits,
-        solver=QuadraticProgram(damping=1e-3),
-        depth_m=path.depth_m[-1],
-        situation=Situation(1.0 / RATE_HZ, MotionSettings(feed_forward=False)),
+    limits = limits_on_plan(Limits(), PLAN_MARGIN_PX, PLAN_MARGIN_JOINT, 1.0 / RATE_HZ)
+    law, free = (
+        Servo(
+            scene.arm,
+            scene.camera,
+            ImageBased(gain=GAIN_OF_NEW),
+            limits=kept,
+            solver=solver,
+            depth_m=path.depth_m[0],
+            situation=_situation(scene, DepthFromFeatures()),
+        )
+        for kept, solver in ((limits, QuadraticProgram()), (None, PseudoInverse()))
     )
     longest = trajectory.duration + SETTLE_S
-    return drive(scene, law, trajectory, random, noise_px, longest, trajectory.duration)
+    end = trajectory.duration
+    return drive(
+        scene, law, free, trajectory, random, noise_px, longest, end, goal_noise_px=noise_px
+    )

@@ -6,9 +6,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vergence.camera import Camera
-from vergence.robot import Arm
-from vergence.runtime.driver import Driver
+from vergence.runtime import Driver, DriverWrapper
 from vergence.signals import Frame, OutcomeKind, Sample, Setpoint
 
 Setpoints: TypeAlias = Mapping[str, Setpoint]
@@ -24,7 +22,7 @@ class DriverFault(NamedTuple):
     deaf: bool = False  # takes no set-point any more: only the robot's watchdog can brake
 
 
-class FaultyDriver:
+class FaultyDriver(DriverWrapper):
     """Another driver with one fault from a time on. Its images are noise: no two are alike.
 
     Args:
@@ -41,30 +39,16 @@ class FaultyDriver:
         at: float = 0.4,
         rng: np.random.Generator | None = None,
     ) -> None:
-        self._driver, self._fault, self.at = driver, fault, at
+        super().__init__(driver)
+        self._fault, self.at = fault, at
         self.rng = rng or np.random.default_rng(0)
         self.handed: list[Setpoints] = []  # every set-point, also those refused
         self.memory: dict[str, Any] = {}  # of the fault
         self.time = 0.0
 
-    @property
-    def arms(self) -> Mapping[str, Arm]:
-        """The arms by name."""
-        return self._driver.arms
-
-    @property
-    def cameras(self) -> Mapping[str, Camera]:
-        """The cameras by name."""
-        return self._driver.cameras
-
-    @property
-    def inner_rate_hz(self) -> float:
-        """How often `step` returns."""
-        return self._driver.inner_rate_hz
-
     def read(self) -> Sample:
         """Return what the driver has, or what the fault makes of it."""
-        sample = self._driver.read()
+        sample = self.driver.read()
         sample = replace(sample, frames=tuple(self._noisy(f, sample) for f in sample.frames))
         fault = self._active
         return sample if fault is None or fault.spoil is None else fault.spoil(sample, self)
@@ -77,12 +61,8 @@ class FaultyDriver:
             fault.refuse(self)
         if fault is not None and fault.move is not None:
             setpoints = fault.move(setpoints, self)
-        self._driver.step(setpoints)
+        self.driver.step(setpoints)
         self.time = len(self.handed) / self.inner_rate_hz
-
-    def close(self) -> None:
-        """Let go."""
-        self._driver.close()
 
     @property
     def _active(self) -> DriverFault | None:

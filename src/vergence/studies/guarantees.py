@@ -16,6 +16,7 @@ from vergence.signals import OutcomeKind
 from vergence.simulation import KinematicCell
 from vergence.studies import guarantees_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
+from vergence.studies.guarantees_collisions import collisions_check
 from vergence.studies.guarantees_faults import blind_check, faults_check
 from vergence.studies.guarantees_random import PAIRS_SEED, success_check, try_pair
 from vergence.studies.guarantees_runs import (
@@ -34,6 +35,7 @@ from vergence.studies.processes import processes, try_all
 TITLE = "Limits are promises: the constrained servo and the guard"
 ATTEMPTS, ATTEMPTS_QUICK = 10_000, 400
 PAIRS, PAIRS_QUICK = 300, 12
+ENCOUNTERS, ENCOUNTERS_QUICK = 2_000, 64  # with obstacles
 BATCH = 50
 RANGE_M, SPEED_M_S, WINDOW_PX = 2.5, 0.1, 32.0
 LATENCY_FRAMES = 2
@@ -61,10 +63,15 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
             partial(try_pair, gantry, PAIRS_SEED + seed),
             count,
             pool,
-            lambda done: progress(f"{count} random pairs", 0.4 + 0.35 * done),
+            lambda done: progress(f"{count} random pairs", 0.4 + 0.3 * done),
         )
-        faults = faults_check(
-            known, seed, pool, lambda done: progress("faults", 0.75 + 0.05 * done)
+        faults = faults_check(known, seed, pool, lambda done: progress("faults", 0.7 + 0.05 * done))
+        encounters = ENCOUNTERS_QUICK if quick else ENCOUNTERS
+        collisions = collisions_check(
+            encounters,
+            seed,
+            pool,
+            lambda done: progress(f"{encounters} runs among obstacles", 0.75 + 0.05 * done),
         )
     progress("headings", 0.8)
     headings = _headings(puma)
@@ -77,6 +84,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     checks = (
         limits,
         faults,
+        collisions,
         blind_check(known, seed),
         headings,
         speed,

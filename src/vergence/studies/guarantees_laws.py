@@ -108,8 +108,8 @@ def servo(scene: Scene, name: str, how: str) -> Ending:
             situation=_situation(scene),
         )
     law = _UntilRest(built, scene.arm.rate_max)
-    wanted = FixedReference(Reference(0.0, scene.goal_px, desired_depth_m=depth))
-    return _run(scene, driver, law, wanted, SERVO_S)
+    desired = FixedReference(Reference(0.0, scene.goal_px, desired_depth_m=depth))
+    return _run(scene, driver, law, desired, SERVO_S)
 
 
 def _planned(scene: Scene) -> Ending:

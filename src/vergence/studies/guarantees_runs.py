@@ -27,10 +27,10 @@ from vergence.control import (
 )
 from vergence.geometry import se3, se3_inverse, so3_exp
 from vergence.planning import FixedReference
-from vergence.robot import Arm
-from vergence.runtime import Loop, RunInfo, RunRecorder
+from vergence.robot import Arm, Clearance
+from vergence.runtime import DriverWrapper, Loop, RunInfo, RunRecorder
 from vergence.runtime.stages import Planner
-from vergence.signals import FrameTruth, Outcome, Reference, Sample, Setpoint
+from vergence.signals import FrameTruth, Outcome, Reference, Setpoint
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.wrong_beliefs import MovingGoal, WrongDepthPose
@@ -59,7 +59,7 @@ class Excess(NamedTuple):
     rate: float  # rad/s or m/s
 
 
-class Watched:
+class Watched(DriverWrapper):
     """A driver that looks at every set-point on its way.
 
     Args:
@@ -68,27 +68,9 @@ class Watched:
     """
 
     def __init__(self, driver: KinematicDriver, arm: Arm) -> None:
-        self._driver, self._arm = driver, arm
+        super().__init__(driver)
+        self._arm = arm
         self.excess = Excess(-np.inf, -np.inf)
-
-    @property
-    def arms(self) -> Mapping[str, Arm]:
-        """The arms by name."""
-        return self._driver.arms
-
-    @property
-    def cameras(self) -> Mapping[str, Camera]:
-        """The cameras by name."""
-        return self._driver.cameras
-
-    @property
-    def inner_rate_hz(self) -> float:
-        """How often `step` returns."""
-        return self._driver.inner_rate_hz
-
-    def read(self) -> Sample:
-        """Return what the driver has."""
-        return self._driver.read()
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
         """Note by how much a set-point passes a limit, then let it through."""
@@ -98,11 +80,7 @@ class Watched:
         nan = np.isnan(q).any() or np.isnan(rate).any()
         worst = (np.inf, np.inf) if nan else (float(beyond), float(too_fast))
         self.excess = Excess(max(self.excess[0], worst[0]), max(self.excess[1], worst[1]))
-        self._driver.step(setpoints)
-
-    def close(self) -> None:
-        """Let go."""
-        self._driver.close()
+        super().step(setpoints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +116,7 @@ def run_ideal(
         watched,
         ARM,
         WrongDepthPose(CAMERA, depth_factor) if "position" in law else ExactPoints(CAMERA),
-        _goal(law, truth, offset, depth),
+        goal(law, truth, offset, depth),
         build(law, cell, depth),
         outer_rate_hz=cell.rate_hz,
         listeners=[] if recorder is None else [recorder],
@@ -151,7 +129,7 @@ def run_ideal(
     return watched.excess, outcome
 
 
-def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray) -> Planner:
+def goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray) -> Planner:
     """Return what a law aims at: points beside the first, those on the way on, or a pose."""
     desired = truth.points_px + offset_px
     T_camera_target = se3_inverse(truth.T_world_camera) @ truth.T_world_target
@@ -161,10 +139,12 @@ def _goal(law: str, truth: FrameTruth, offset_px: FloatArray, depth: FloatArray)
     return FixedReference(Reference(0.0, desired, T_camera_target=T_camera_target))
 
 
-def build(law: str, cell: KinematicCell, depth: FloatArray) -> Law:
-    """Make one of `LAWS`."""
+def build(
+    law: str, cell: KinematicCell, depth: FloatArray, clearance: Clearance | None = None
+) -> Law:
+    """Make one of `LAWS`; the constrained ones keep a clearance, if one is given."""
     if "position-based" in law:
-        return _pose_servo(law, cell)
+        return _pose_servo(law, cell, clearance)
     arm, camera, period = cell.arm, cell.camera, 1.0 / cell.rate_hz
     as_it_is = MotionSettings(feed_forward=False, prediction=False)
     match law:
@@ -198,11 +178,11 @@ def build(law: str, cell: KinematicCell, depth: FloatArray) -> Law:
     }
     return Servo(
         arm, camera, objectives[law], limits=LIMITS, solver=QuadraticProgram(S=1e-3), depth_m=depth,
-        situation=Situation(period, MotionSettings(feed_forward=True)),
+        situation=Situation(period, MotionSettings(feed_forward=True), clearance=clearance),
     )  # fmt: skip
 
 
-def _pose_servo(law: str, cell: KinematicCell) -> PoseServo:
+def _pose_servo(law: str, cell: KinematicCell, clearance: Clearance | None) -> PoseServo:
     constrained = law.startswith("constrained")
     return PoseServo(
         cell.arm,
@@ -211,7 +191,7 @@ def _pose_servo(law: str, cell: KinematicCell) -> PoseServo:
         limits=LIMITS if constrained else None,
         solver=QuadraticProgram() if constrained else DampedPseudoInverse(),
         corners=cell.features if constrained else None,
-        situation=Situation(1.0 / cell.inner_rate_hz, depth_range=(0.9, 1.1)),
+        situation=Situation(1.0 / cell.inner_rate_hz, depth_range=(0.9, 1.1), clearance=clearance),
     )
 
 

@@ -11,8 +11,9 @@ from vergence.assembly import run_driver, with_goal
 from vergence.camera.photograph import write_photograph
 from vergence.cell import Cell, load_cell
 from vergence.geometry import se3_inverse, so3_log, transform_points
-from vergence.signals import OutcomeKind
+from vergence.signals import Outcome, OutcomeKind
 from vergence.simulation import SimulatedDriver
+from vergence.studies.photograph_methods import Method, without_plan
 
 SCENES = {"clutter": "table.xml", "plane": "../puma560/board.xml", "parcel": "box.xml"}
 ARM, CAMERA = "ur5", "wrist"
@@ -65,8 +66,9 @@ class TrialResult(NamedTuple):
     time_s: float
 
 
-def run_trial(seed: int, planner: str, number: int) -> TrialResult:
+def run_trial(seed: int, method: Method, number: int) -> TrialResult:
     """Take a photograph, run the loop from a start, and compare where the camera ends."""
+    planner = "potential_field" if method is Method.POTENTIAL_FIELD else "optimised"
     trial = Trial.drawn(seed, number)
     start = {"start_deg": trial.start_deg.tolist()}
     cell = load_cell("photograph", seed=number).replace(
@@ -80,22 +82,28 @@ def run_trial(seed: int, planner: str, number: int) -> TrialResult:
         _take_photograph(cell, trial, path)
         driver = SimulatedDriver(with_goal(cell, path))
         try:
-            return _run(driver, trial)
+            return _run(driver, trial, method)
         finally:
             driver.close()
 
 
-def _run(driver: SimulatedDriver, trial: Trial) -> TrialResult:
+def _run(driver: SimulatedDriver, trial: Trial, method: Method) -> TrialResult:
     goal = driver.frame_at(CAMERA, ARM, np.deg2rad(trial.goal_deg)).truth
     assert goal is not None
     T_goal, T_start = goal.T_world_camera, driver.world.camera_pose(CAMERA)
     feasible = _feasible(driver, trial, T_goal, T_start)
-    run = run_driver(driver.cell, driver, (), images=True)
+    outcome = _outcome(driver, method)
     T_end = driver.world.camera_pose(CAMERA)
     begun, ended = _apart(T_start, T_goal), _apart(T_end, T_goal)
-    moved = run.outcome.time > 0.0
-    kind, reason, time = run.outcome.kind, run.outcome.reason, run.outcome.time
-    return TrialResult(trial, kind, reason, feasible, moved, *begun, *ended, time)
+    kind, reason, time = outcome.kind, outcome.reason, outcome.time
+    return TrialResult(trial, kind, reason, feasible, time > 0.0, *begun, *ended, time)
+
+
+def _outcome(driver: SimulatedDriver, method: Method) -> Outcome:
+    cell = without_plan(driver.cell, driver) if method is Method.WITHOUT_PLAN else driver.cell
+    if isinstance(cell, Outcome):
+        return cell
+    return run_driver(cell, driver, (), images=True).outcome
 
 
 def _take_photograph(cell: Cell, trial: Trial, path: Path) -> None:

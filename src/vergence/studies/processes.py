@@ -4,7 +4,9 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -21,7 +23,7 @@ def processes(
     workers = workers or len(os.sched_getaffinity(0))
     if workers == 1:
         return nullcontext()
-    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_one_thread)
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin_worker)
 
 
 def try_all(
@@ -46,8 +48,16 @@ def try_all(
     return results
 
 
-def _one_thread() -> None:
-    """Keep a process to one core: the others have their own."""
+def _begin_worker() -> None:
+    """Keep a worker to one core, as the others have their own, and to the life of its parent."""
     import numba
 
     numba.set_num_threads(1)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent is gone: the workers of a pool would not notice."""
+    if (parent := parent_process()) is not None:
+        wait([parent.sentinel])
+        os._exit(1)

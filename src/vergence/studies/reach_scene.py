@@ -90,8 +90,9 @@ class Scene:
     ) -> Self:
         """Draw a displacement of the camera, marks in view at both ends.
 
-        The object faces the camera within an angle at 0.45 to 1.2 m; start and goal are inside the
-        joint limits. Nothing is known of what lies between.
+        The object faces the camera within an angle at 0.45 to 1.2 m and is seen from its front, the
+        side of +z; start and goal are inside the joint limits. Nothing is known of what lies
+        between.
 
         Args:
             arm: up to the camera.
@@ -122,8 +123,9 @@ class Scene:
 
 
 def _in_view(camera: Camera, marks: FloatArray, T_camera_target: FloatArray) -> bool:
+    """Tell whether a camera sees the marks, from the front of their plane."""
     points = transform_points(T_camera_target, marks.copy())
-    if points[:, 2].min() < 0.2:
+    if points[:, 2].min() < 0.2 or T_camera_target[:3, 2] @ points.mean(axis=0) >= 0.0:
         return False
     return bool(camera.contains(camera.project(points), END_MARGIN_PX).all())
 

@@ -7,7 +7,15 @@ from tempfile import mkdtemp
 from vergence.errors import InputError, nearest
 from vergence.studies.check import Progress, StudyResult
 
-PAPERS = ("nelson1995", "lippiello2005", "mezouar2001", "guarantees", "photograph", "defaults")
+PAPERS = (
+    "nelson1995",
+    "lippiello2005",
+    "mezouar2001",
+    "guarantees",
+    "photograph",
+    "defaults",
+    "honesty",
+)
 
 
 def reproduce(

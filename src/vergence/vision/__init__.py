@@ -6,7 +6,7 @@ from vergence.vision.image import grey_image
 from vergence.vision.picking import Picked, pick_features
 from vergence.vision.ssd_tracker import SsdTracker
 from vergence.vision.ssd_tracking import SsdTracking
-from vergence.vision.tracks import PointTracker, PointTracking, Tracks
+from vergence.vision.tracks import CurveTracking, PointTracker, PointTracking, Tracks
 from vergence.vision.two_view import (
     TwoView,
     TwoViewFailure,
@@ -16,6 +16,7 @@ from vergence.vision.two_view import (
 
 __all__ = [
     "Board",
+    "CurveTracking",
     "Picked",
     "PointTracker",
     "PointTracking",

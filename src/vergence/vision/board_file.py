@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from vergence.errors import InputError
+from vergence.errors import NOTHING, Absent, InputError
 from vergence.tables import numbers, read_table, require_known
 from vergence.vision.board import DICTIONARY, PATTERNS, Board
 
@@ -20,13 +20,13 @@ def read_board(path: str | Path) -> Board:
     path, source = Path(path), str(path)
     if not path.is_file():
         allowed = "--board 11x8 --square-mm 20, or this file with columns, rows and square_mm"
-        raise InputError(source, "", "no such file", allowed)
+        raise InputError(source, "", Absent("no such file"), allowed)
     table = read_table(path, "a board")
     require_known(table, _KEYS, source)
     sizes = {key: float(numbers(table, key, (), source)) for key in _KEYS[:4] if key in table}
     for key in _KEYS[:3]:
         if key not in sizes:
-            raise InputError(source, key, "nothing", "a number; this key is required")
+            raise InputError(source, key, NOTHING, "a number")
     dictionary, pattern = (
         str(table.get(key, usual)) for key, usual in (("dictionary", DICTIONARY), ("pattern", ""))
     )

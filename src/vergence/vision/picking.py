@@ -14,6 +14,7 @@ WINDOW = 8  # entries along a side of the window, at every level
 LEVELS = (4, 2, 1)  # pixels averaged along each axis
 BORDER_PX = 16  # half of the widest window
 WEAKEST_GREY = 2.0  # grey levels a pixel: gradients below are taken for noise
+STRAIGHT = 0.02  # ratio of the eigenvalues below which a window shows an edge, not a corner
 QUALITY = 0.02  # of the best point's worth
 
 
@@ -33,6 +34,8 @@ class Picked(NamedTuple):
 def weakest_gradient(image: Patch, window: int, out: FloatArray) -> None:
     """Square root of the smaller eigenvalue of the mean gradient matrix of a window.
 
+    It is 0 on a straight edge, along which noise alone has a gradient.
+
     Each entry of out belongs to the window from its own row and column on; [Tomasi1991].
     """
     height, width = image.shape
@@ -46,7 +49,9 @@ def weakest_gradient(image: Patch, window: int, out: FloatArray) -> None:
     for i in range(height - window + 1):
         for j in range(width - window + 1):
             spread = np.sqrt((0.5 * (a[i, j] - c[i, j])) ** 2 + b[i, j] ** 2)
-            out[i, j] = np.sqrt(max(0.5 * (a[i, j] + c[i, j]) - spread, 0.0))
+            middle = 0.5 * (a[i, j] + c[i, j])
+            straight = middle - spread < STRAIGHT * (middle + spread)
+            out[i, j] = 0.0 if straight else np.sqrt(max(middle - spread, 0.0))
 
 
 @njit(cache=True)

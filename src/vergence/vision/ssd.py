@@ -217,18 +217,18 @@ def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
 @njit(cache=True)
 def search(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
-) -> tuple[float, float]:
+) -> tuple[int, int]:
     """Find a template within ±32 px of an anchor.
 
     Of several candidates the best is the one with the lowest SSD over all levels at its very
     place: on the grid of the coarse level marks of few pixels cannot be compared.
 
     Returns:
-        The displacement x and y of the best window from the anchor, px, with the vertex of a
-        parabola as fraction.
+        How many candidates there are, and which is the best. In work.candidates are their
+        displacements x and y from the anchor, px, with the vertex of a parabola as fraction.
     """
     count = follow_minima(image, anchor_x, anchor_y, template, work)
-    best, best_x, best_y = np.inf, 0.0, 0.0
+    lowest_score, best = np.inf, 0
     for k in range(count):
         found = work.candidates[k]
         x, y = anchor_x + int(found[0]), anchor_y + int(found[1])
@@ -239,9 +239,9 @@ def search(
             x, y = anchor_x + int(np.rint(found[0])), anchor_y + int(np.rint(found[1]))
             score += surroundings(image, x, y, template, work)
             score += distance_cost(template) * (found[0] ** 2 + found[1] ** 2)
-        if score < best:
-            best, best_x, best_y = score, found[0], found[1]
-    return best_x, best_y
+        if score < lowest_score:
+            lowest_score, best = score, k
+    return count, best
 
 
 @njit(cache=True)

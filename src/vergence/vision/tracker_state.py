@@ -13,19 +13,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vergence.arrays import FloatArray, ImageArray, IntArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.vision.alignment import (
     AREA_PX,
     FREE,
     PATCH_PX,
     RESAMPLING_SIZE,
     RIGID,
+    ROOT_WEIGHTS,
     UNKNOWNS,
     Alignment,
     AlignmentTemplate,
+    agreement,
     align,
     fill_template,
     make_resampling,
+    resample,
 )
 from vergence.vision.pyramid import Patch, anchor_of, load_window
 from vergence.vision.ssd import (
@@ -43,12 +46,26 @@ REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or 
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
 LOST_CORRELATION = 0.75
 LOST_SHIFT_PX = 4.0  # search and alignment must agree within this
+SAME_PX = 2.0  # nearer than this places are one: the alignment leads to the same
+PROMISING = 0.3  # least correlation before an alignment that is worth one
+MOST_PLACES = 10  # where a point may be: by the search, as expected, as neighbours move, by twins
+TWINS = 2  # nearest look-alikes of a point that are remembered
+TWIN_RANGE_PX = 16.0  # within which they are looked for in the first image
+TWIN_STEP_PX = 3.0  # and how densely: an alignment that starts so near finds its place
+ALIKE = 0.05  # places whose correlation is within this of the search's look like the point, too
+NEIGHBOURS = 5  # points whose motion tells between places that look alike
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
 AT_BORDER_PX = 20.0  # a point lost when expected so near the border has probably left
 FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
 CONSENSUS = 3  # points found that say where the others may have gone
 LOOK_AGAIN_PX = 6.0  # if they moved this far at least
+_WEIGHTS = ROOT_WEIGHTS.astype(np.float64) ** 2
+# Information of noise alone, px⁻², over its variance. A central difference has half the variance
+# of a pixel; half of the residual's is the template's; taken twice.
+NOISE_GRADIENT = float(0.5 * _WEIGHTS.sum() ** 2 / (_WEIGHTS**2).sum())
+EDGE = 0.15  # of the information across: what is less along it may be of steps in the pixels' grid
+TURNED = 0.06  # rad, standard deviation of a patch's direction along an edge
 FLOOR_PX = 0.01  # standard deviation that no alignment beats: interpolation, quantised grey levels
 
 FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(8)
@@ -60,8 +77,8 @@ class TrackerState(NamedTuple):
     Few arrays, since each costs a call from Python 0.2 µs; the functions below say what is where.
     """
 
-    places: FloatArray  # (M, 8) px where last found; affine 2 × 2 from first image to last; search
-    # offset: point less centre of the search template, px
+    places: FloatArray  # (M, 12) px where last found; affine 2 × 2 from first image to last; search
+    # offset: point less centre of the search template, px; offsets of its twins, first image, px
     search: Patch  # (M, 448) search template
     jacobian: Patch  # (M, K, 8, n) of the key templates
     inverse: FloatArray  # (M, K, 2, 8, 8) of the key templates
@@ -81,7 +98,7 @@ COLUMNS = 10
 def empty_state(count: int) -> TrackerState:
     """Allocate the memory for a number of points."""
     n, f4 = PATCH_PX * PATCH_PX, np.float32
-    places = np.zeros((count, 8))
+    places = np.zeros((count, 8 + 2 * TWINS))
     places[:, 2:6] = np.eye(2).ravel()
     return TrackerState(
         places,
@@ -149,6 +166,14 @@ def product2(A: FloatArray, B: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
+def apply2(A: FloatArray, x: FloatArray) -> FloatArray:
+    """A x for a 2 × 2 matrix."""
+    out = np.empty(2)
+    out[0], out[1] = A[0, 0] * x[0] + A[0, 1] * x[1], A[1, 0] * x[0] + A[1, 1] * x[1]
+    return out
+
+
+@njit(cache=True)
 def stretch(A: FloatArray) -> float:
     """The larger of σ₁ and 1/σ₂ of a 2 × 2 matrix: 1 for a rotation."""
     total = 0.5 * (A[0, 0] ** 2 + A[0, 1] ** 2 + A[1, 0] ** 2 + A[1, 1] ** 2)
@@ -187,6 +212,34 @@ def start_points(image: ImageArray, state: TrackerState) -> None:
         if fits(state.places[k, 0], state.places[k, 1], width, height):
             add_key(image, state, k, np.zeros((2, 2)))
             renew_search(image, state, k)
+            remember_twins(image, k, state)
+
+
+@njit(cache=True)
+def twins_of(state: TrackerState, k: int) -> FloatArray:
+    """Offsets of the places in the first image that look like point k, (TWINS, 2), 0 if none."""
+    return state.places[k, 8:].reshape(TWINS, 2)
+
+
+@njit(cache=True)
+def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
+    """Find the nearest places in the first image that would be taken for point k."""
+    twins, place = twins_of(state, k), np.empty(COLUMNS + 4)
+    x, y = state.places[k, 0], state.places[k, 1]
+    distances = np.full(TWINS, np.inf)
+    steps = int(TWIN_RANGE_PX / TWIN_STEP_PX)
+    for i in range(-steps, steps + 1):
+        for j in range(-steps, steps + 1):
+            start_x, start_y = x + TWIN_STEP_PX * i, y + TWIN_STEP_PX * j
+            if correlation_at(image, start_x, start_y, k, state) < PROMISING:
+                continue
+            settle(image, start_x, start_y, k, state, place)
+            off_x, off_y = place[0] - x, place[1] - y
+            distance, last = np.hypot(off_x, off_y), np.argmax(distances)
+            if place[VERDICT] != FOUND or not SAME_PX < distance < distances[last]:
+                continue
+            if nearest(twins, off_x, off_y) >= SAME_PX:
+                twins[last, 0], twins[last, 1], distances[last] = off_x, off_y, distance
 
 
 @njit(cache=True)
@@ -225,47 +278,125 @@ def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
 
 @njit(cache=True)
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
-    """Find point k, expected at out[PLACE], in an image; returns the verdict.
+    """Find point k alone, expected at out[PLACE], in an image; returns the verdict."""
+    places = np.empty((MOST_PLACES, COLUMNS + 4))
+    settle_all(image, k, state, out, places)
+    if out[VERDICT] == FOUND:
+        take_over(image, k, state, places[0])
+    return int(out[VERDICT])
 
-    Where the best window of the search turns out not to be the point, the place where it was
-    expected is tried too.
+
+@njit(cache=True)
+def settle_all(
+    image: ImageArray, k: int, state: TrackerState, out: FloatArray, places: FloatArray
+) -> int:
+    """Align point k, expected at out[PLACE], wherever it may be; returns at how many places it is.
+
+    Marks may look alike, so besides the place that the search finds its other candidates and the
+    place that was expected are aligned, if they promise anything; and if there were marks beside
+    the point in the first image that look like it, where these would be now.
+
+    Args:
+        image: grey, (height, width).
+        k: which point.
+        state: of the tracker; nothing is taken over.
+        out: is filled for the place of the search; if the point is not there, for that expected.
+        places: is filled with that place and then the others, (MOST_PLACES, COLUMNS + 4): columns
+            as in out, and the affine matrix from the first image to this one.
     """
     height, width = image.shape
     x, y = out[0], out[1]
+    out[VERDICT] = LEFT
     if not (-RANGE_PX <= x < width + RANGE_PX and -RANGE_PX <= y < height + RANGE_PX):
-        return LEFT
+        return 0
+    starts = starting_places(image, k, state, x, y)
+    places[0, :COLUMNS] = out
+    settle(image, starts[0, 0], starts[0, 1], k, state, places[0])
+    if places[0, VERDICT] != FOUND:
+        out[:] = places[0, :COLUMNS]
+        settle(image, x, y, k, state, places[0])
+        if places[0, VERDICT] == FOUND:
+            out[:] = places[0, :COLUMNS]
+            return 1
+        border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
+        if border < AT_BORDER_PX:
+            out[VERDICT], out[DETAIL] = AT_BORDER, max(border, 0.0)
+        return 0
+    out[:] = places[0, :COLUMNS]
+    count = 1
+    for n in range(1, len(starts)):
+        start_x, start_y = starts[n, 0], starts[n, 1]
+        if nearest(starts[:n], start_x, start_y) < SAME_PX:
+            continue
+        if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
+            settle(image, start_x, start_y, k, state, places[count])
+            count += places[count, VERDICT] == FOUND
+    for twin in twins_of(state, k):
+        away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
+        start_x, start_y = places[0, 0] + away[0], places[0, 1] + away[1]
+        if nearest(places[:count, :2], start_x, start_y) >= SAME_PX:
+            settle(image, start_x, start_y, k, state, places[count])
+            count += places[count, VERDICT] == FOUND
+    return count
+
+
+@njit(cache=True)
+def starting_places(
+    image: ImageArray, k: int, state: TrackerState, x: float, y: float
+) -> FloatArray:
+    """Return where to align point k, (N, 2): the search's best first, the expected (x, y) last."""
     offset_x, offset_y = state.places[k, 6], state.places[k, 7]
     anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
     work = make_workspace(state.memory[:WORKSPACE_SIZE])
-    dx, dy = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
-    start_x, start_y = anchor_x - 0.5 + offset_x, anchor_y - 0.5 + offset_y
-    verdict = settle(image, start_x + dx, start_y + dy, k, state, out)
-    if verdict == FOUND:
-        return FOUND
-    answer = out.copy()
-    if settle(image, x, y, k, state, out) == FOUND:
-        return FOUND
-    out[:] = answer
-    border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
-    if border < AT_BORDER_PX:
-        out[DETAIL] = max(border, 0.0)
-        return AT_BORDER
-    return verdict
+    count, best = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    places = np.empty((count + 1, 2))
+    places[:count] = work.candidates[:count]
+    places[0], places[best] = work.candidates[best], work.candidates[0]
+    places[:count, 0] += anchor_x - 0.5 + offset_x
+    places[:count, 1] += anchor_y - 0.5 + offset_y
+    places[count, 0], places[count, 1] = x, y
+    return places
+
+
+@njit(cache=True)
+def nearest(places: FloatArray, x: float, y: float) -> float:
+    """Distance from (x, y) to the nearest of some places (N, 2)."""
+    least = np.inf
+    for n in range(len(places)):
+        least = min(least, np.hypot(places[n, 0] - x, places[n, 1] - y))
+    return least
+
+
+@njit(cache=True)
+def correlation_at(image: ImageArray, x: float, y: float, k: int, state: TrackerState) -> float:
+    """Correlation of the key template of point k with a place as it is, without alignment."""
+    work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
+    corner_x, corner_y = anchor_of(x) - AREA_PX // 2, anchor_of(y) - AREA_PX // 2
+    load_window(image, anchor_of(x), anchor_of(y), work.area)
+    key = state.keys[k, 1]
+    before = product2(affine_of(state, k), inverse2(key_affine_of(state, k, key)))
+    template = key_template_of(state, k, key)
+    resample(x - corner_x, y - corner_y, before, template, work)
+    correlation, _ = agreement(template, work)
+    return correlation
 
 
 @njit(cache=True)
 def settle(
     image: ImageArray, x: float, y: float, k: int, state: TrackerState, out: FloatArray
-) -> int:
-    """Align point k from a start; if that is the point, take it over into out and the state."""
+) -> None:
+    """Align point k from a start and judge whether that is the point; fills out, (COLUMNS + 4,).
+
+    Place, covariance and affine matrix are filled in only if it is. Nothing is taken over.
+    """
     height, width = image.shape
     work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
     corner_x, corner_y = anchor_of(x) - AREA_PX // 2, anchor_of(y) - AREA_PX // 2
     load_window(image, anchor_of(x), anchor_of(y), work.area)
     key = state.keys[k, 1]
-    key_affine, affine = key_affine_of(state, k, key), affine_of(state, k)
-    before = product2(affine, inverse2(key_affine))
-    template, verdict = key_template_of(state, k, key), NO_MATCH
+    key_affine = key_affine_of(state, k, key)
+    before = product2(affine_of(state, k), inverse2(key_affine))
+    template = key_template_of(state, k, key)
     for form in (FREE, RIGID):
         A = before.copy()
         found = align(x - corner_x, y - corner_y, A, template, form, work)
@@ -276,18 +407,22 @@ def settle(
         if verdict == FOUND:
             break
     if not fits(point_x, point_y, width, height):
-        return LEFT
-    if verdict != FOUND:
-        return verdict
-    out[0], out[1] = point_x, point_y
-    state.places[k, 0], state.places[k, 1] = point_x, point_y
-    affine[:] = product2(A, key_affine)
-    covariance = place_covariance(state, k, key, A, found)
-    out[COVARIANCE] = covariance.reshape(4)
+        verdict = LEFT
+    out[VERDICT] = verdict
+    if verdict == FOUND:
+        out[0], out[1] = point_x, point_y
+        out[COVARIANCE] = place_covariance(state, k, key, A, found).reshape(4)
+        out[COLUMNS:] = product2(A, key_affine).reshape(4)
+
+
+@njit(cache=True)
+def take_over(image: ImageArray, k: int, state: TrackerState, place: FloatArray) -> None:
+    """Take a place that `settle` has filled over as the state of point k."""
+    state.places[k, :2] = place[PLACE]
+    affine_of(state, k)[:] = place[COLUMNS:].reshape(2, 2)
     renew_search(image, state, k)
-    if found.correlation >= REFRESH_CORRELATION:
-        choose_key(image, state, k, covariance)
-    return FOUND
+    if place[CORRELATION] >= REFRESH_CORRELATION:
+        choose_key(image, state, k, place[COVARIANCE].reshape(2, 2))
 
 
 @njit(cache=True)
@@ -296,11 +431,10 @@ def place_covariance(
 ) -> FloatArray:
     """Covariance of a found place: of this alignment, and of the key template's own place.
 
-    σ² A S Aᵀ / g² + A C_key Aᵀ, with σ from the residual and S the template's spread.
+    A S Aᵀ + A C_key Aᵀ, with S the template's spread for the noise that the residual shows.
     """
     inner = key_covariance_of(state, k, key).copy()
-    spread = key_template_of(state, k, key).spread
-    inner += (found.residual / found.gain) ** 2 * spread
+    inner += honest_spread(key_template_of(state, k, key).spread, found.residual / found.gain)
     out = product2(product2(A, inner), A.T)
     out[0, 0] += FLOOR_PX**2
     out[1, 1] += FLOOR_PX**2
@@ -308,16 +442,66 @@ def place_covariance(
 
 
 @njit(cache=True)
+def honest_spread(spread: FloatArray, noise: float) -> FloatArray:
+    """Covariance of a place, (2, 2) px², from a template's spread and the noise in it.
+
+    Along a straight edge the template has no gradient but that of its own noise, which holds
+    nothing: what noise alone would have of information is taken off, twice to be sure of it. And
+    an edge that runs at an angle to the pixels has steps, which stay with them: what is far less
+    than the information across counts for nothing.
+
+    Args:
+        spread: for noise of one grey level, (2, 2) px².
+        noise: standard deviation of what is left of template and image, grey levels.
+    """
+    information = inverse2(spread)
+    half = 0.5 * (information[0, 0] - information[1, 1])
+    middle = 0.5 * (information[0, 0] + information[1, 1])
+    apart = np.hypot(half, information[0, 1])
+    variance = max(noise * noise, 1e-6)
+    by_noise = variance * NOISE_GRADIENT
+    least = variance / (RANGE_PX * RANGE_PX / 3.0)
+    across, along = middle + apart, max(middle - apart, 1e-12)
+    strong = variance / max(across - by_noise, least)
+    weak = variance / max(along - (EDGE * across) ** 2 / along - by_noise, least)
+    strong += TURNED * TURNED * weak  # the long axis is known no better than the patch's turn
+    c, s = (half / apart, information[0, 1] / apart) if apart > 0.0 else (1.0, 0.0)
+    out = np.empty((2, 2))
+    mean, off = 0.5 * (strong + weak), 0.5 * (strong - weak)
+    out[0, 0], out[1, 1] = mean + off * c, mean - off * c
+    out[0, 1], out[1, 0] = off * s, off * s
+    return out
+
+
+@njit(cache=True)
 def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) -> bool:
     """Find all points, each expected at answers[k, PLACE]; whether all were found."""
-    expected, lost = answers[:, :2].copy(), 0
-    for k in range(len(answers)):
+    expected, count = answers[:, :2].copy(), len(answers)
+    places = np.empty((count, MOST_PLACES, COLUMNS + 4))
+    alike = np.zeros(count, dtype=np.int64)
+    for k in range(count):
         out = answers[k]
         out[RESIDUAL], out[CORRELATION], out[DETAIL] = np.nan, np.nan, np.nan
-        verdict = track_point(image, k, state, out) if state.keys[k, 0] > 0 else NO_TEMPLATE
-        out[VERDICT] = verdict
-        lost += verdict != FOUND
-    if 0 < lost <= len(answers) - CONSENSUS:
+        out[VERDICT] = NO_TEMPLATE
+        if state.keys[k, 0] > 0:
+            alike[k] = that_look_alike(places[k], settle_all(image, k, state, out, places[k]))
+    found = answers[:, VERDICT] == FOUND
+    sure = found & (alike < 2)
+    for k in range(count):
+        if not found[k]:
+            continue
+        chosen = 0
+        if alike[k] > 1:
+            x, y = where_neighbours_go(k, expected, answers, sure)
+            settle(image, x, y, k, state, places[k, alike[k]])  # the search may not have found it
+            alike[k] = that_look_alike(places[k], alike[k] + 1)
+            off = np.hypot(places[k, : alike[k], 0] - x, places[k, : alike[k], 1] - y)
+            chosen = int(np.argmin(off))
+        if alike[k] > 1 and np.sum(sure) < CONSENSUS:
+            widen_for_others(places[k, : alike[k]], chosen)
+        answers[k] = places[k, chosen, :COLUMNS]
+        take_over(image, k, state, places[k, chosen])
+    if CONSENSUS <= np.sum(found) < count:
         look_again(image, state, expected, answers)
     complete = True
     for out in answers:
@@ -326,6 +510,49 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
             out[2], out[5] = RANGE_PX * RANGE_PX / 3.0, RANGE_PX * RANGE_PX / 3.0
             out[3], out[4] = 0.0, 0.0
     return complete
+
+
+@njit(cache=True)
+def widen_for_others(places: FloatArray, chosen: int) -> None:
+    """Widen the covariance of the chosen place, so that the others lie within a deviation.
+
+    To all sides alike: of many marks in rows the search follows some only.
+    """
+    farthest = 0.0
+    for n in range(len(places)):
+        x, y = places[n, 0] - places[chosen, 0], places[n, 1] - places[chosen, 1]
+        farthest = max(farthest, x * x + y * y)
+    places[chosen, 2] += farthest
+    places[chosen, 5] += farthest
+
+
+@njit(cache=True)
+def that_look_alike(places: FloatArray, count: int) -> int:
+    """Bring those of the first places that match about as well as the best to the front; how many.
+
+    If the first one is the best by a margin, it is the only one.
+    """
+    alike = min(count, 1)
+    for n in range(1, count):
+        found = places[n, VERDICT] == FOUND
+        if found and places[n, CORRELATION] > places[0, CORRELATION] - ALIKE:
+            places[alike] = places[n].copy()
+            alike += 1
+    return alike
+
+
+@njit(cache=True)
+def where_neighbours_go(
+    k: int, expected: FloatArray, answers: FloatArray, sure: BoolArray
+) -> tuple[float, float]:
+    """Where point k is if it moved as the nearest points that are sure; else where expected."""
+    others = np.flatnonzero(sure)
+    if len(others) < CONSENSUS:
+        return expected[k, 0], expected[k, 1]
+    off = np.hypot(expected[others, 0] - expected[k, 0], expected[others, 1] - expected[k, 1])
+    near = others[np.argsort(off)[:NEIGHBOURS]]
+    moved = answers[near, :2] - expected[near]
+    return expected[k, 0] + np.median(moved[:, 0]), expected[k, 1] + np.median(moved[:, 1])
 
 
 @njit(cache=True)

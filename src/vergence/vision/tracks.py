@@ -19,19 +19,26 @@ class Tracks(NamedTuple):
     residuals: FloatArray | None = None
     correlations: FloatArray | None = None  # (M,) with the template, -1 … 1; likewise
     windows: SearchWindows | None = None  # where the points were looked for
+    joined: BoolArray | None = None  # (M,) see `ImagePoints`; None if every point is a mark alone
 
     def __bool__(self) -> bool:
         """Whether every point was found."""
         return bool(self.found.all())
 
 
-def nothing_found(points_px: FloatArray, reason: str, deviation_px: float = 100.0) -> Tracks:
+def nothing_found(
+    points_px: FloatArray,
+    reason: str,
+    deviation_px: float = 100.0,
+    joined: BoolArray | None = None,
+) -> Tracks:
     """Answer that no point was found, all for one reason.
 
     Args:
         points_px: where they were expected, (M, 2).
         reason: why not.
         deviation_px: standard deviation to state for each.
+        joined: of a curve, (M,).
     """
     count = len(points_px)
     return Tracks(
@@ -41,6 +48,7 @@ def nothing_found(points_px: FloatArray, reason: str, deviation_px: float = 100.
         (reason,) * count,
         np.full(count, np.nan),
         np.full(count, np.nan),
+        joined=joined,
     )
 
 
@@ -67,5 +75,24 @@ class PointTracking(Protocol):
         Args:
             image: grey, (height, width).
             points_px: the points in it, (M, 2).
+        """
+        ...
+
+
+@runtime_checkable
+class CurveTracking(PointTracking, Protocol):
+    """A part that follows a curve by points that stand for it, and are no marks on the object."""
+
+    def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
+        """Return the points that stand for the curve through others, (M, 2).
+
+        They follow from the curve alone and change smoothly with it.
+
+        Args:
+            points_px: of the curve, anywhere on it, (K, 2).
+            size: width and height of the image, px.
+
+        Raises:
+            InputError: if they make no such curve.
         """
         ...

@@ -11,7 +11,7 @@ from vergence.arrays import FloatArray
 from vergence.camera.calibration import BadImage, Sighting, find_board
 from vergence.camera.calibration.arm_poses import find_poses, read_poses
 from vergence.camera.image_file import image_files
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 from vergence.vision.board import DICTIONARY, Board
 from vergence.vision.board_file import BOARD, make_board, read_board
 
@@ -38,11 +38,11 @@ def read_dataset(folder: Path, board: Board | None, poses: Path | None) -> Datas
     Raises:
         InputError: if a file cannot be used, or no board is described.
     """
+    if not folder.is_dir():
+        raise InputError(str(folder), "", Absent("no such folder"), "a folder of images")
     board = board or read_board(folder / BOARD)
     poses = poses or find_poses(folder)
     arm = None if poses is None else read_poses(poses)
-    if not folder.is_dir():
-        raise InputError(str(folder), "", "no such folder", "a folder of images")
     names = [file.name for file in image_files(folder)]
     _require_images(arm, names, poses)
     progress = bar("{task.completed} / {task.total}")
@@ -82,7 +82,7 @@ def board_of_options(
         allowed = "inner corners in a row x rows, such as 11x8"
         raise InputError("vergence calibrate", "--board", size, allowed)
     if square_mm is None:
-        raise InputError("vergence calibrate", "--square-mm", "nothing", "a square's side in mm")
+        raise InputError("vergence calibrate", "--square-mm", NOTHING, "a square's side in mm")
     sizes = {"columns": float(columns), "rows": float(rows), "square_mm": square_mm}
     if marker_mm is not None:
         sizes["marker_mm"] = marker_mm
@@ -95,4 +95,4 @@ def _require_images(
     """Raise InputError if a pose is that of an image that is not there."""
     for name in arm or ():
         if name not in names:
-            raise InputError(str(poses), name, "no such image", nearest(name, names))
+            raise InputError(str(poses), name, Absent("no such image"), nearest(name, names))

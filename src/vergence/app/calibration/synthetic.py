@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vergence.app.calibration.board_views import board_view, is_shown
 from vergence.app.calibration.dataset import Dataset
 from vergence.app.progress import bar
 from vergence.arrays import FloatArray, ImageArray
@@ -14,7 +15,7 @@ from vergence.camera.calibration import Sighting
 from vergence.camera.calibration.arm_poses import write_poses
 from vergence.cell import Cell, load_cell
 from vergence.errors import InputError, nearest
-from vergence.geometry import rpy_to_matrix, se3, se3_inverse, transform_points
+from vergence.geometry import se3, se3_inverse, transform_points
 from vergence.vision.board import Board
 from vergence.vision.board_file import BOARD, write_board
 
@@ -22,9 +23,6 @@ _COLUMNS, _ROWS = 9, 6  # inner corners of the board that is made
 _MARKER, _DICTIONARY = 0.7, "aruco_4x4_50"  # its markers: their side in squares, and their kind
 _SHARE = 0.6  # of the image's width that the board takes up
 _FINER = 3  # times as many pixels are rendered, then averaged, as a sensor does
-_TILT_DEG, _ROLL_DEG = 42.0, 70.0  # largest, of the board towards the camera
-_NEARER = (0.75, 1.25)  # how far the board is, times its usual distance
-_SEEN = 0.7  # share of the corners that must lie in the image
 _TRIES = 60  # for each image
 _TEXTURE_PX = 96  # a square
 _MODEL = """<mujoco model="board">
@@ -114,7 +112,7 @@ class Studio:
 
         low, high = finite_range(self._tip, self._start)
         for _ in range(_TRIES):
-            desired = self._view()
+            desired = board_view(self.camera, self.board, self._depth, self._rng)
             goal = (
                 self.world.camera_pose(self.name) @ desired
                 if self.fixed
@@ -192,30 +190,10 @@ class Studio:
         task = {"kind": "track", "arm": self.arm, "camera": self.name}
         return cell.replace(target=target, task=task)
 
-    def _view(self) -> FloatArray:
-        """Return a pose T_camera_board (4, 4) that a person would hold the board at."""
-        rng, c = self._rng, self.camera
-        tilt = np.deg2rad(_TILT_DEG) * np.sqrt(rng.random())
-        about = rng.uniform(0.0, 2.0 * np.pi)
-        roll = np.deg2rad(rng.uniform(-_ROLL_DEG, _ROLL_DEG))
-        R = rpy_to_matrix(np.array([roll, tilt * np.sin(about), tilt * np.cos(about)]))
-        depth = self._depth * rng.uniform(*_NEARER)
-        x, y = c.normalize(rng.uniform((0.15, 0.2), (0.85, 0.8), (1, 2)) * (c.width, c.height))[0]
-        middle = depth * np.array([x, y, 1.0])
-        T: FloatArray = se3(R, middle - R @ self.board.center)
-        return T
-
     def _sees(self) -> bool:
         """Whether enough of the board's corners are in the image, from its front, unhidden."""
         T = self._T_camera_board()
-        points = transform_points(T, self.board.points)
-        middle = transform_points(T, self.board.center[None])[0]
-        if not T[:3, 2] @ middle > np.cos(np.deg2rad(60.0)) * np.linalg.norm(middle):
-            return False
-        inside = self.camera.in_view(points)
-        inside[inside] = self.camera.contains(self.camera.project(points[inside]), 6.0)
-        least = _SEEN if self.board.marker_m is not None else 1.0
-        if inside.mean() < least:
+        if not is_shown(self.camera, self.board, T):
             return False
         in_front = self.board.points - (0.0, 0.0, 1e-4)  # of the face, which has no thickness
         in_world = transform_points(self.world.target_pose(), in_front)

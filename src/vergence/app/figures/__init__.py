@@ -1,29 +1,35 @@
-"""The figures of a report, each made from the arrays of a recording."""
+"""The charts of a report, each made from the arrays of a recording."""
 
-from vergence.app.figures.arm import joints_figure, measures_figure, twist_figure
-from vergence.app.figures.constraints import constraints_figure
-from vergence.app.figures.image import error_figure, paths_figure
-from vergence.app.figures.layout import Panels, mark_events, panels, svg
+from vergence.app.figures.arm import clearance_chart, joints_chart, measures_chart, twist_chart
+from vergence.app.figures.chart import Chart, Curve, Marks, Panel, Stretches
+from vergence.app.figures.chart_svg import chart_svg
+from vergence.app.figures.constraints import constraints_chart
+from vergence.app.figures.events import event_lines
+from vergence.app.figures.image import error_chart, paths_chart
 from vergence.app.figures.motion import (
-    camera_figure,
-    estimate_figure,
-    pose_error_figure,
-    target_figure,
+    camera_chart,
+    estimate_chart,
+    pose_error_chart,
+    target_chart,
 )
 
 __all__ = [
-    "Panels",
-    "camera_figure",
-    "constraints_figure",
-    "error_figure",
-    "estimate_figure",
-    "joints_figure",
-    "mark_events",
-    "measures_figure",
-    "panels",
-    "paths_figure",
-    "pose_error_figure",
-    "svg",
-    "target_figure",
-    "twist_figure",
+    "Chart",
+    "Curve",
+    "Marks",
+    "Panel",
+    "Stretches",
+    "camera_chart",
+    "chart_svg",
+    "clearance_chart",
+    "constraints_chart",
+    "error_chart",
+    "estimate_chart",
+    "event_lines",
+    "joints_chart",
+    "measures_chart",
+    "paths_chart",
+    "pose_error_chart",
+    "target_chart",
+    "twist_chart",
 ]

@@ -1,69 +1,91 @@
-"""Figures of how an arm moved."""
+"""Charts of how an arm moved."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vergence.app.figures.layout import Panels, panels
+from vergence.app.figures.chart import Chart, Curve, Panel
 from vergence.arrays import BoolArray, FloatArray
-from vergence.drawing import LIMIT, curve, legend
 from vergence.runtime import ArmInfo
 from vergence.runtime.results import ArmTrace
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from vergence.robot import Arm
 
+CLEAR_OF = {  # what the keys of `ArmTrace.clearance` mean
+    "self": "itself", "arms": "other arms", "fixtures": "fixtures", "target": "the target",
+}  # fmt: skip
+_BEYOND = 1.25  # how far the axis of a limited share reaches
 
-def joints_figure(arm: ArmInfo, trace: ArmTrace) -> Panels | None:
+
+def joints_chart(arm: ArmInfo, trace: ArmTrace) -> Chart | None:
     """Draw joints and their rates as shares of their limits; a limit is at -1 or 1.
 
-    A joint without limits is drawn in half turns.
+    A joint without limits is drawn in degrees, as it turns on past half a turn.
     """
     if not len(trace.time):
         return None
-    out = panels(2)
-    position, rate = out.axes
-    _curves(position, trace.time, drawn_positions(arm, trace.position), drawn_names(arm))
-    _curves(rate, trace.time, trace.velocity / arm.rate_max, arm.names)
-    position.set_ylabel("joint position\n(share of its range)")
-    rate.set_ylabel("joint rate\n(share of its limit)")
-    for axes in out.axes:
-        _limits(axes)
-    legend(position)
-    return out
+    limited = _limited(arm)
+    shares = normalized(arm, trace.position)
+    turned = np.degrees(_unwrapped(trace.position))
+    rates = trace.velocity / arm.rate_max
+    panels = [
+        _shares("joint position (share of its range, limits at ±1)", arm, trace, shares, limited),
+        Panel("position of a joint without limits (°)", _curves(arm, trace, turned, ~limited)),
+        _shares("joint rate (share of its limit)", arm, trace, rates, np.isfinite(arm.rate_max)),
+    ]
+    return _over_time(trace, [panel for panel in panels if panel.curves])
 
 
-def twist_figure(trace: ArmTrace) -> Panels | None:
+def twist_chart(trace: ArmTrace) -> Chart | None:
     """Draw the camera twist that the law asked for, in the camera's own frame."""
     if not np.isfinite(trace.v_camera).any():
         return None
-    out = panels(2)
-    translation, rotation = out.axes
-    _curves(translation, trace.time, trace.v_camera[:, :3], ("x", "y", "z"))
-    _curves(rotation, trace.time, trace.v_camera[:, 3:], ("x", "y", "z"))
-    translation.set_ylabel("camera velocity\n(m/s)")
-    rotation.set_ylabel("camera rate of turn\n(rad/s)")
-    legend(translation)
-    return out
+    rows = (("camera velocity (m/s)", 0), ("camera angular velocity (rad/s)", 3))
+    panels = [
+        Panel(
+            title,
+            tuple(
+                Curve.numbered(index, axis, trace.time, trace.v_camera[:, first + index])
+                for index, axis in enumerate("xyz")
+            ),
+        )
+        for title, first in rows
+    ]
+    return _over_time(trace, panels)
 
 
-def measures_figure(trace: ArmTrace) -> Panels | None:
+def measures_chart(trace: ArmTrace) -> Chart | None:
     """Draw how far the arm is from singularities and joint limits."""
+    measure = trace.manipulability
+    first = measure[np.isfinite(measure) & (measure > 0.0)][:1]
     known = {
-        "manipulability w′\n(SI units)": trace.manipulability,
-        "penalty P\n(1 = far from limits)": trace.penalty,
+        "manipulability w′ (share of its value at the start)": measure / first
+        if len(first)
+        else np.full_like(measure, np.nan),
+        "joint limit clearance P (1 = far from every limit, 0 = at one)": trace.penalty,
     }
-    shown = {label: values for label, values in known.items() if np.isfinite(values).any()}
-    if not shown:
-        return None
-    out = panels(len(shown))
-    for index, (axes, (label, values)) in enumerate(zip(out.axes, shown.items(), strict=True)):
-        axes.plot(trace.time, values, **curve(index))
-        axes.set_ylabel(label)
-        axes.set_ylim(bottom=0.0, top=1.05 * float(np.nanmax(values)))
-    return out
+    panels = [
+        Panel(title, (Curve("", trace.time, values),), low=0.0)
+        for title, values in known.items()
+        if np.isfinite(values).any()
+    ]
+    return _over_time(trace, panels) if panels else None
+
+
+def clearance_chart(trace: ArmTrace) -> Chart | None:
+    """Draw how far the arm is from what it must not touch, where that is near."""
+    kinds = [kind for kind in CLEAR_OF if any(kind in tick for tick in trace.clearance)]
+    curves = tuple(
+        Curve.numbered(index, f"to {CLEAR_OF[kind]}", trace.time, 1e3 * clearance(trace, kind))
+        for index, kind in enumerate(kinds)
+    )
+    return _over_time(trace, [Panel("least distance (mm)", curves, low=0.0)]) if curves else None
+
+
+def clearance(trace: ArmTrace, kind: str) -> FloatArray:
+    """Return the least distance to a kind of thing, (K,), m; NaN where none is near."""
+    return np.array([tick.get(kind, np.nan) for tick in trace.clearance])
 
 
 def normalized(arm: "ArmInfo | Arm", position: FloatArray) -> FloatArray:
@@ -91,15 +113,27 @@ def _limited(arm: "ArmInfo | Arm") -> BoolArray:
     return limited
 
 
-def _curves(axes: "Axes", time: FloatArray, values: FloatArray, names: tuple[str, ...]) -> None:
-    for index, name in enumerate(names):
-        axes.plot(time, values[:, index], label=name, **curve(index))
+def _unwrapped(position: FloatArray) -> FloatArray:
+    """Return positions (K, n) without the jumps of joints that are measured within one turn."""
+    return np.asarray(np.unwrap(position, axis=0))
 
 
-def _limits(axes: "Axes") -> None:
-    axes.axhspan(-1.25, -1.0, color=LIMIT, alpha=0.10, linewidth=0)
-    axes.axhspan(1.0, 1.25, color=LIMIT, alpha=0.10, linewidth=0)
-    for limit in (-1.0, 1.0):
-        axes.axhline(limit, color=LIMIT, linewidth=1.0)
-    axes.set_ylim(-1.25, 1.25)
-    axes.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+def _curves(
+    arm: ArmInfo, trace: ArmTrace, values: FloatArray, drawn: BoolArray
+) -> tuple[Curve, ...]:
+    return tuple(
+        Curve.numbered(index, name, trace.time, values[:, index])
+        for index, name in enumerate(arm.names)
+        if drawn[index]
+    )
+
+
+def _shares(
+    title: str, arm: ArmInfo, trace: ArmTrace, values: FloatArray, drawn: BoolArray
+) -> Panel:
+    curves = _curves(arm, trace, values, drawn)
+    return Panel(title, curves, low=-_BEYOND, high=_BEYOND, limits=(-1.0, 1.0))
+
+
+def _over_time(trace: ArmTrace, panels: list[Panel]) -> Chart:
+    return Chart(tuple(panels), x_high=float(trace.time[-1]) or 1.0)

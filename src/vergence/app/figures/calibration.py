@@ -1,16 +1,19 @@
 """Figures of a calibration: residuals over the image, and image by image."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vergence.app.figures.image import image_frame
 from vergence.app.figures.layout import Panels, panels
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.camera.calibration import Sighting
 from vergence.camera.calibration.reprojection import rms
 from vergence.drawing import COLORS, legend
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _ARROW_SHARE = 0.06  # of the image's width: the longest arrow
 _MOST_NAMES = 40  # images whose names are written
@@ -22,7 +25,7 @@ def residual_field_figure(
     """Draw every corner where it was found, with its residual as an arrow made longer."""
     out = panels(1, "u (px)", height=5.6)
     axes = out.axes[0]
-    image_frame(axes, camera)
+    _image_frame(axes, camera)
     places = np.concatenate([seen.points_px for seen in sightings])
     arrows = np.concatenate([residual.reshape(-1, 2) for residual in residuals])
     longest = float(np.quantile(np.hypot(*arrows.T), 0.99))
@@ -66,6 +69,19 @@ def residual_bars_figure(
     axes.grid(False, axis="x")
     legend(axes)
     return out
+
+
+def _image_frame(axes: "Axes", camera: Camera) -> None:
+    """Show the image as the camera has it: v downwards, pixel centres at integers."""
+    from matplotlib.patches import Rectangle
+
+    width, height = camera.width, camera.height
+    frame = Rectangle((-0.5, -0.5), width, height, fill=False, edgecolor="#555", linewidth=1.2)
+    axes.add_patch(frame)
+    margin = 0.02 * width
+    axes.set_xlim(-0.5 - margin, width - 0.5 + margin)
+    axes.set_ylim(height - 0.5 + margin, -0.5 - margin)
+    axes.set_aspect("equal")
 
 
 def _round(value: float) -> float:

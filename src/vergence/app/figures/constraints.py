@@ -1,38 +1,33 @@
-"""A figure of what kept an arm from doing what was desired."""
+"""A chart of what kept an arm from doing what was desired."""
+
+from collections.abc import Callable
 
 import numpy as np
 
-from vergence.app.figures.layout import Panels, panels
+from vergence.app.figures.chart import Chart, Panel, Stretches
 from vergence.arrays import BoolArray, FloatArray
-from vergence.drawing import COLORS, legend
 from vergence.runtime.results import ArmTrace
 
-_PUSHED, _BENT = COLORS[4], COLORS[1]
+_ACTIVE_COLOR, _RELAXED_COLOR = 4, 1
 
 
-def constraints_figure(trace: ArmTrace) -> Panels | None:
+def constraints_chart(trace: ArmTrace) -> Chart | None:
     """Draw when each limit was active, and when it was relaxed."""
     names = constraint_names(trace)
     if not names:
         return None
-    out = panels(1, height=0.5 + 0.3 * len(names))
-    axes = out.axes[0]
-    for row, name in enumerate(names):
-        pushed = np.array([name in active for active in trace.active])
-        bent = np.array([name in slack for slack in trace.slack])
-        for label, when, color in (("pushed", pushed, _PUSHED), ("relaxed", bent, _BENT)):
-            axes.broken_barh(
-                spans(trace.time, when),
-                (row - 0.35, 0.7),
-                color=color,
-                linewidth=0,
-                label=None if row else label,
-            )
-    axes.set_yticks(range(len(names)), names)
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.grid(axis="y", visible=False)
-    legend(axes)
-    return out
+
+    def rows(label: str, color: int, holds: Callable[[str], list[bool]]) -> list[Stretches]:
+        return [
+            Stretches(label, row, tuple(spans(trace.time, np.array(holds(name)))), color)
+            for row, name in enumerate(names)
+        ]
+
+    active = rows("active", _ACTIVE_COLOR, lambda name: [name in one for one in trace.active])
+    relaxed = rows("relaxed", _RELAXED_COLOR, lambda name: [name in one for one in trace.slack])
+    shown = tuple(one for one in (*active, *relaxed) if one.spans)
+    panel = Panel("limits that shaped the command", stretches=shown, rows=tuple(names))
+    return Chart((panel,), x_high=float(trace.time[-1]) or 1.0)
 
 
 def constraint_names(trace: ArmTrace) -> list[str]:

@@ -18,6 +18,7 @@ _LOOKS: Mapping[Ending, tuple[str, str]] = {
     Ending.CONVERGED: ("#009e73", "o"),
     Ending.OFF_GOAL: ("#56b4e9", "D"),
     Ending.JOINT_LIMIT: ("#d55e00", "s"),
+    Ending.COLLISION: ("#7a4b2a", "D"),
     Ending.OUT_OF_VIEW: ("#0072b2", "^"),
     Ending.SINGULAR: ("#cc79a7", "X"),
     Ending.LOST: ("#e69f00", "v"),
@@ -40,6 +41,7 @@ def scores_figure(scores: Sequence[Score]) -> Panels:
     bars.set_axisbelow(True)
     bars.grid(visible=False, axis="y")
     bars.set_xlabel("runs")
+    bars.locator_params(axis="x", integer=True)
     _legend(drawn, bars)
     return Panels(drawn, tuple(axes))
 
@@ -68,13 +70,13 @@ def starts_figure(
         row[0].set_xlim(middle[0] - half, middle[0] + half)
         row[0].set_ylim(middle[1] - half, middle[1] + half)
         row[0].set_title(law, loc="left", fontsize=10)
-        row[0].set_xlabel("camera's place: x (m)")
+        row[0].set_xlabel("camera position: x (m)")
         row[0].set_ylabel("y (m)")
         row[1].plot(*desired_px, marker="+", color=INK, markersize=12, zorder=5)
         row[1].set_xlim(0, size_px[0])
         row[1].set_ylim(size_px[1], 0)
         row[1].set_aspect("equal")
-        row[1].set_xlabel("features' middle: u (px)")
+        row[1].set_xlabel("centre of the features: u (px)")
         row[1].set_ylabel("v (px)")
     _legend(drawn, grid[0, 1], dict.fromkeys(r.ending for r in results))
     return Panels(drawn, tuple(grid.ravel()))
@@ -101,9 +103,9 @@ def places_figure(
             plane.add_patch(_square(x, y, side * share, color=color))
         _mark_bases(plane, bases, reach=xs[-1] + side)
         plane.set_title(law, loc="left", fontsize=10)
-        plane.set_xlabel("target's way: x (m)")
+        plane.set_xlabel("target's path: x (m)")
     grid[0, 0].set_ylabel("y (m)")
-    _legend(drawn, grid[0, 0], dict.fromkeys(result.ending for result in results))
+    _legend(drawn, grid[0, 0], dict.fromkeys(result.ending for result in results), "s")
     return Panels(drawn, tuple(grid[0]))
 
 
@@ -131,8 +133,8 @@ def headings_figure(results: Sequence[TrialResult]) -> Panels:
     layout.set(h_pad=0.2)
     for row, law in zip(grid, laws, strict=True):
         for axes, speed in zip(row, speeds, strict=True):
-            wanted = {"law": law, "speed_m_s": speed}
-            own = [result for result in results if wanted.items() <= result.labels.items()]
+            sought = {"law": law, "speed_m_s": speed}
+            own = [result for result in results if sought.items() <= result.labels.items()]
             for result in own:
                 angle = np.deg2rad(float(result.labels["heading_deg"]))
                 color, _ = _LOOKS[result.ending]
@@ -140,7 +142,7 @@ def headings_figure(results: Sequence[TrialResult]) -> Panels:
             axes.set_xlabel(f"{law}, {speed:g} m/s", fontsize=10)
             axes.set_rmax(1.05 * longest)
             axes.tick_params(labelsize=7.5)
-    _legend(drawn, grid[0, -1], dict.fromkeys(result.ending for result in results))
+    _legend(drawn, grid[0, -1], dict.fromkeys(result.ending for result in results), "s")
     return Panels(drawn, tuple(grid.ravel()))
 
 
@@ -184,14 +186,19 @@ def _grid(
     return drawn, grid
 
 
-def _legend(drawn: "Figure", axes: "Axes", endings: "Mapping[Ending, None] | None" = None) -> None:
-    """Put the colours' meaning under the figure."""
+def _legend(
+    drawn: "Figure",
+    axes: "Axes",
+    endings: "Mapping[Ending, None] | None" = None,
+    shape: str | None = None,
+) -> None:
+    """Put the colours' meaning under the figure; of endings, with their marks or all in a shape."""
     from matplotlib.lines import Line2D
 
     handles: Sequence[Any] = axes.get_legend_handles_labels()[0]
     if endings is not None:
         handles = [
-            Line2D([], [], color=color, marker=mark, linestyle="none", label=ending.value)
+            Line2D([], [], color=color, marker=shape or mark, linestyle="none", label=ending.value)
             for ending, (color, mark) in _LOOKS.items()
             if ending in endings
         ]

@@ -1,14 +1,13 @@
-"""Figures of how target and camera moved through the world, and what a filter believed."""
+"""Charts of how target and camera moved through the world, and what a filter believed."""
 
 import numpy as np
 
-from vergence.app.figures.layout import Panels, panels
+from vergence.app.figures.chart import Chart, Curve, Panel
 from vergence.arrays import FloatArray, IntArray
-from vergence.drawing import curve, legend
 from vergence.runtime.results import CameraTrace, TargetTrace
 
 
-def target_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
+def target_chart(trace: CameraTrace, estimate: TargetTrace | None) -> Chart | None:
     """Draw how the target moved from where it was first, and what a filter believed, if it did."""
     known = np.isfinite(trace.T_world_target[:, 0, 0])
     if not known.any():
@@ -16,36 +15,28 @@ def target_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | 
     place = trace.T_world_target[known, :3, 3]
     if estimate is None and (place == place[:1]).all():
         return None
-    out = panels(1)
-    axes = out.axes[0]
-    for index, axis in enumerate("xyz"):
-        axes.plot(trace.time[known], place[:, index] - place[0, index], label=axis, **curve(index))
+    curves = _axes(trace.time[known], place - place[0])
     if estimate is not None:
         believed = estimate.T_world_target[:, :3, 3] - place[0]
-        for index, axis in enumerate("xyz"):
-            style = {**curve(index), "linestyle": ":", "linewidth": 2.0}
-            axes.plot(estimate.time, believed[:, index], label=f"{axis} estimated", **style)
-    axes.set_ylabel("target moved by\n(m, world axes)")
-    legend(axes)
-    return out
+        curves += tuple(
+            Curve(f"{axis} estimated", estimate.time, believed[:, index], index, "dotted")
+            for index, axis in enumerate("xyz")
+        )
+    return _chart(Panel("target moved by (m, world axes)", curves))
 
 
-def camera_figure(trace: CameraTrace) -> Panels | None:
+def camera_chart(trace: CameraTrace) -> Chart | None:
     """Draw how a camera moved from where it was first; nothing if it did not."""
     known = np.isfinite(trace.T_world_camera[:, 0, 0])
     place = trace.T_world_camera[known, :3, 3]
     if (place == place[:1]).all():
         return None
-    out = panels(1)
-    axes = out.axes[0]
-    for index, axis in enumerate("xyz"):
-        axes.plot(trace.time[known], place[:, index] - place[0, index], label=axis, **curve(index))
-    axes.set_ylabel("camera moved by\n(m, world axes)")
-    legend(axes)
-    return out
+    return _chart(
+        Panel("camera moved by (m, world axes)", _axes(trace.time[known], place - place[0]))
+    )
 
 
-def estimate_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels | None:
+def estimate_chart(trace: CameraTrace, estimate: TargetTrace | None) -> Chart | None:
     """Draw how far a filter's target is from the true one, and how far it thinks it might be."""
     known = np.isfinite(trace.T_world_target[:, 0, 0])
     if estimate is None or not known.any():
@@ -56,21 +47,24 @@ def estimate_figure(trace: CameraTrace, estimate: TargetTrace | None) -> Panels 
     angle = _angles(np.swapaxes(true[:, :3, :3], 1, 2) @ believed[:, :3, :3])
     rows = (
         ("position (mm)", 1e3 * distance, 1e3 * _spread(estimate, slice(0, 3))),
-        ("rotation (deg)", np.degrees(angle), np.degrees(_spread(estimate, slice(3, 6)))),
+        ("rotation (°)", np.degrees(angle), np.degrees(_spread(estimate, slice(3, 6)))),
     )
-    out = panels(2)
-    for axes, (label, error, spread) in zip(out.axes, rows, strict=True):
-        axes.plot(estimate.time, error, label="error", **curve(0))
-        axes.plot(
-            estimate.time, spread, label="1 σ, as believed", **{**curve(1), "linestyle": "--"}
+    return _chart(
+        *(
+            Panel(
+                f"estimated target from the true one: {title}",
+                (
+                    Curve("error", estimate.time, error),
+                    Curve("1 σ, as the filter believes", estimate.time, spread, 1, "dashed"),
+                ),
+                low=0.0,
+            )
+            for title, error, spread in rows
         )
-        axes.set_ylabel("estimated target\n" + label)
-        axes.set_ylim(bottom=0.0)
-    legend(out.axes[0])
-    return out
+    )
 
 
-def pose_error_figure(trace: CameraTrace) -> Panels | None:
+def pose_error_chart(trace: CameraTrace) -> Chart | None:
     """Draw how far the target truly is from its desired pose in a camera."""
     known = np.isfinite(trace.T_camera_target_desired[:, 0, 0])
     known &= np.isfinite(trace.T_world_target[:, 0, 0])
@@ -80,13 +74,25 @@ def pose_error_figure(trace: CameraTrace) -> Panels | None:
     seen = np.linalg.inv(trace.T_world_camera[known]) @ trace.T_world_target[known]
     distance = np.linalg.norm(seen[:, :3, 3] - desired[:, :3, 3], axis=1)
     angle = _angles(np.swapaxes(desired[:, :3, :3], 1, 2) @ seen[:, :3, :3])
-    out = panels(2)
-    rows = (("position (mm)", 1e3 * distance), ("rotation (deg)", np.degrees(angle)))
-    for axes, (label, values) in zip(out.axes, rows, strict=True):
-        axes.plot(trace.time[known], values, **curve(0))
-        axes.set_ylabel("off the desired pose\n" + label)
-        axes.set_ylim(bottom=0.0)
-    return out
+    rows = (("position (mm)", 1e3 * distance), ("rotation (°)", np.degrees(angle)))
+    return _chart(
+        *(
+            Panel(
+                f"off the desired pose: {title}", (Curve("", trace.time[known], values),), low=0.0
+            )
+            for title, values in rows
+        )
+    )
+
+
+def _chart(*panels: Panel) -> Chart:
+    return Chart(panels, x_high=float(panels[0].curves[0].x[-1]) or 1.0)
+
+
+def _axes(time: FloatArray, places: FloatArray) -> tuple[Curve, ...]:
+    return tuple(
+        Curve.numbered(index, axis, time, places[:, index]) for index, axis in enumerate("xyz")
+    )
 
 
 def _nearest(times: FloatArray, desired: FloatArray) -> IntArray:

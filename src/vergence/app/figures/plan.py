@@ -16,7 +16,7 @@ _WIDTH = 8.6  # inches
 
 
 def plan_image_figure(path: "Path") -> Any:
-    """Draw the way of each point through the image."""
+    """Draw the path of each point through the image."""
     drawn, axes = grid(_WIDTH, 5.2, 1, 1)
     image_paths(axes[0, 0], path.problem.camera, path.points_px)
     return drawn
@@ -37,7 +37,7 @@ def plan_joints_figure(trajectory: "Trajectory") -> Any:
 
 
 def plan_space_figure(path: "Path") -> Any:
-    """Draw the camera's way past the points, the same scale along all axes."""
+    """Draw the camera's path past the points, the same scale along all axes."""
     drawn, axes = space(_WIDTH, 5.4)
     camera_paths(axes, [("camera", path.T_world_camera)], path.problem.points_world)
     axes.view_init(elev=22, azim=-60)

@@ -10,7 +10,7 @@ from vergence.camera import Camera
 from vergence.estimation import Belief, PoseFilter, Verdict, view_of
 from vergence.geometry import so3_log
 from vergence.signals import ImagePoints
-from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
+from vergence.vision.known_object import EdgeMeasurement, EdgeMemory, EdgeTracker
 
 CAMERA = "camera"
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight

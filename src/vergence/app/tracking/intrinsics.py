@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vergence.camera import Camera, camera_of
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 
 
 def camera_of_options(
@@ -23,7 +23,7 @@ def camera_of_options(
     """
     source = "vergence track"
     if values["fx"] is None:
-        raise InputError(source, "--fx", "nothing", "a focal length in pixels, or --camera FILE")
+        raise InputError(source, "--fx", NOTHING, "a focal length in pixels, or --camera FILE")
     fx = values["fx"]
     table: dict[str, Any] = {
         "fx": fx,

@@ -25,15 +25,18 @@ def track_points(
     points_px: ArrayLike | None = None,
     tracker: str | Mapping[str, Any] = "ssd",
     rate_hz: float | None = None,
+    topic: str | None = None,
 ) -> Iterator[tuple[FootageFrame, ImagePoints]]:
-    """Follow points through the images of a folder, or of a video.
+    """Follow points through the images of a folder, of a video, or of a ROS 2 bag.
 
     Args:
         source: the folder or file.
         count: how many points to pick in the first image, at most.
         points_px: the points in the first image, (M, 2); picked if None.
         tracker: a kind of tracker or its table, as `task.tracker` in a cell file.
-        rate_hz: images per second; by default a video's own time stamps, or 25 for a folder.
+        rate_hz: images per second; by default the time stamps of a video or bag, or 25 for a
+            folder.
+        topic: of the images in a bag, where it has several.
 
     Yields:
         Each image and the points in it, where they were found, with covariance, and why not.
@@ -41,7 +44,7 @@ def track_points(
     Raises:
         InputError: if the images cannot be read, or the first one shows nothing to follow.
     """
-    frames = open_footage(source, rate_hz).frames()
+    frames = open_footage(source, rate_hz, topic).frames()
     first = next(frames)
     if points_px is None:
         picked = pick_features(first.image, count)

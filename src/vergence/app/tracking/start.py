@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.errors import InputError
+from vergence.errors import NOTHING, InputError
 from vergence.geometry import quaternion_to_matrix, rpy_to_matrix, se3, so3_exp
 from vergence.tables import KINDS, numbers, read_table, require_known
 
@@ -54,7 +54,7 @@ def _from_file(path: Path, camera: Camera) -> FloatArray:
         return se3(U @ Vt, T[:3, 3].copy())
     named = [key for key in _ROTATIONS if key in table]
     if "position_m" not in table or len(named) != 1:
-        raise InputError(source, "", ", ".join(table) or "nothing", _HOW)
+        raise InputError(source, "", ", ".join(table) or NOTHING, _HOW)
     position = numbers(table, "position_m", (3,), source)
     if named[0] == "quaternion_wxyz":
         q = numbers(table, named[0], (4,), source)

@@ -1,5 +1,5 @@
 """`vergence watch`: a page in the browser that shows a cell while it runs, or a recording."""
 
-from vergence.app.watch.command import Request, watch
+from vergence.app.watch.command import watch
 
-__all__ = ["Request", "watch"]
+__all__ = ["watch"]

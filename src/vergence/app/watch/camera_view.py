@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.runtime.json_numbers import numbers
-from vergence.signals import ImagePoints
+from vergence.signals import ImagePoints, curves_of
 
 _JPEG_QUALITY = 80
 _DECIMALS = 3  # of a pixel: nobody sees more
@@ -59,6 +59,11 @@ def _measured(points: ImagePoints) -> dict[str, Any]:
         "asked": points.asked.tolist(),
         "reasons": list(points.reasons),
     }
+    if points.joined is not None:
+        measured["curves"] = [
+            {"points": curve.points.tolist(), "closed": curve.closed}
+            for curve in curves_of(points.joined)
+        ]
     if points.windows is not None:
         measured["predicted"] = _places(points.windows.center_px)
         measured["half"] = _places(points.windows.half_px)

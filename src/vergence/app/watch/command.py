@@ -2,37 +2,27 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from vergence.app.output import SUCCESS, emit, new_folder, say, warn
-from vergence.errors import InputError
+from vergence.app.output import SUCCESS, emit, run_folder, say, warn
+from vergence.errors import Absent, InputError
 from vergence.optional_package import optional_package
 from vergence.places import RECORDING, find_recording
 
 if TYPE_CHECKING:
+    from socket import socket
+
+    from vergence.app.options import WatchOptions
     from vergence.app.watch.live import Live
+    from vergence.app.watch.live_robot import LiveRobot
     from vergence.app.watch.server import Server
+    from vergence.runtime import Recording
 
 
-class Request(NamedTuple):
-    """What the command line asks for."""
-
-    source: str  # a cell, or a run folder
-    out: Path | None
-    seed: int | None
-    images: bool
-    image_every: int
-    settings: Sequence[str]
-    host: str
-    port: int | None
-    browser: bool
-    as_json: bool
-
-
-def watch(request: Request) -> int:
+def watch(options: "WatchOptions") -> int:
     """Serve the page until Ctrl-C; return the exit code.
 
     Raises:
@@ -40,9 +30,14 @@ def watch(request: Request) -> int:
     """
     for module in ("websockets", "psutil"):
         optional_package("the live page", module, "watch", "vergence watch")
-    recording = _recording_in(Path(request.source))
-    answer = _watch_cell(request) if recording is None else _watch_recording(request, recording)
-    if request.as_json:
+    from vergence.runtime.bags import is_bag
+
+    bag = is_bag(options.source)
+    if options.topic is not None and not bag:
+        raise InputError("watch", "--topic", options.topic, "it with a ROS 2 bag")
+    recording = Path(options.source) if bag else _recording_in(Path(options.source))
+    answer = _watch_cell(options) if recording is None else _watch_recording(options, recording)
+    if options.as_json:
         emit({"command": "watch", **answer})
     return SUCCESS
 
@@ -54,77 +49,126 @@ def _recording_in(path: Path) -> Path | None:
     return path / RECORDING if (path / RECORDING).is_file() else None
 
 
-def _watch_recording(request: Request, path: Path) -> Mapping[str, object]:
+def _watch_recording(options: "WatchOptions", path: Path) -> Mapping[str, object]:
     for option, given in (
-        ("--set", request.settings),
-        ("--out", request.out),
-        ("--seed", request.seed),
+        ("--set", options.settings),
+        ("--out", options.out),
+        ("--seed", options.seed),
+        ("--driver", options.driver),
     ):
-        if given not in (None, ()):
+        if given is not None:
             raise InputError("watch", option, given, "nothing: a recording is only shown")
     from vergence.app.progress import working
     from vergence.app.watch.replay import Replay
     from vergence.app.watch.server import Server, listen
-    from vergence.runtime import Recording
 
-    with listen(request.host, request.port) as listener:
+    with listen(options.host, options.port) as listener:
         with working("reading the recording"):
-            replay = Replay(Recording.open(path))
+            replay = Replay(_opened(path, options.topic))
         with closing(replay):
             scene = replay.scene.path if replay.scene is not None else None
-            server = Server(listener, replay.view_state, replay.ask, scene, request.host)
+            server = Server(listener, replay.view_state, replay.ask, scene, options.host)
             with closing(server), suppress(KeyboardInterrupt):
-                _invite(server, request)
+                _invite(server, options)
                 replay.run()
-    return {"run": path.parent, "address": server.address}
+    return {"run": path if path.is_dir() else path.parent, "address": server.address}
 
 
-def _watch_cell(request: Request) -> Mapping[str, object]:
+def _opened(path: Path, topic: str | None) -> "Recording":
+    """Return a recording of ours, or what a bag has of one."""
+    from vergence.runtime.bags import is_bag, read_bag
+    from vergence.runtime.recording import Recording
+
+    return read_bag(path, topic) if is_bag(path) else Recording.open(path)
+
+
+def _watch_cell(options: "WatchOptions") -> Mapping[str, object]:
     from vergence.app.run import overrides
     from vergence.cell import load_cell
 
-    settings = overrides(request.settings)
-    load_cell(request.source, settings, request.seed)  # a mistake is told before all is loaded
+    settings = overrides(options.settings)
+    load_cell(options.source, settings, options.seed)  # a mistake is told before all is loaded
+    if options.driver is not None:
+        return _watch_robot(options, settings)
     from vergence.app.progress import working
     from vergence.app.watch.law_editor import LawEditor
     from vergence.app.watch.live import Live
-    from vergence.app.watch.server import Server, listen
+    from vergence.app.watch.server import listen
 
-    editor = LawEditor(request.source, settings, request.seed)
-    out = request.out or new_folder(editor.cell.name)
-    with listen(request.host, request.port) as listener:
+    editor = LawEditor(options.source, settings, options.seed)
+    out = run_folder(options.out, options.overwrite, editor.cell.name)
+    with listen(options.host, options.port) as listener:
         with working("setting up the cell"):
-            live = Live(editor, request.images, out, request.image_every)
-        with closing(live):
-            scene = live.scene.path
-            server = Server(listener, live.view_state, live.ask, scene, request.host)
-            with closing(server):
-                end = _end(live, server, request)
-    _say(f"recorded: `vergence watch {live.folder}` shows it again", request)
-    return {"cell": editor.cell.name, "address": server.address, "run": live.folder, "outcome": end}
+            live = Live(editor, options.images, out, options.image_every)
+        address, end = _serve(live, listener, options)
+    _say(f"recorded: `vergence watch {live.folder}` shows it again", options)
+    return {"cell": editor.cell.name, "address": address, "run": live.folder, "outcome": end}
 
 
-def _end(live: "Live", server: "Server", request: Request) -> Mapping[str, object]:
+def _watch_robot(options: "WatchOptions", settings: Mapping[str, str]) -> Mapping[str, object]:
+    """Run a cell on a robot."""
+    if not options.images:
+        raise InputError("watch", "--no-images", Absent("images"), "images with --driver")
+    from vergence.app.progress import working
+    from vergence.app.watch.live_robot import LiveRobot
+    from vergence.app.watch.server import listen
+    from vergence.assembly import open_driver, rehearse, servo_lag_s
+    from vergence.cell import load_cell
+
+    named = str(options.driver)
+    cell = load_cell(options.source, settings, options.seed)
+    out = run_folder(options.out, options.overwrite, cell.name)
+    with listen(options.host, options.port) as listener:
+        with working("rehearsing in simulation"):
+            rehearse(cell)
+        driver = open_driver(cell, named)
+        try:
+            lag_s = servo_lag_s(cell, named)
+            live = LiveRobot(cell, driver, lag_s, out, options.image_every)
+        except BaseException:
+            driver.close()
+            raise
+        address, end = _serve(live, listener, options)
+    _say(f"recorded: `vergence report {live.folder}` writes the report", options)
+    return {"cell": cell.name, "address": address, "run": live.folder, "outcome": end}
+
+
+def _serve(
+    live: "Live | LiveRobot", listener: "socket", options: "WatchOptions"
+) -> tuple[str, Mapping[str, object]]:
+    """Serve the page while the cell runs; return its address and how the run ended."""
+    from vergence.app.watch.server import Server
+
+    with closing(live):
+        scene = live.scene.path
+        server = Server(listener, live.view_state, live.ask, scene, options.host)
+        with closing(server):
+            return server.address, _end(live, server, options)
+
+
+def _end(
+    live: "Live | LiveRobot", server: "Server", options: "WatchOptions"
+) -> Mapping[str, object]:
     """Run until Ctrl-C; return how it ended."""
     try:
-        _invite(server, request)
+        _invite(server, options)
         outcome = live.run().outcome
     except KeyboardInterrupt:  # outside of the loop, which ends a run by itself
         return {"kind": "stopped", "reason": "stopped by the user", "time": 0.0}
     return {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
 
 
-def _invite(server: "Server", request: Request) -> None:
+def _invite(server: "Server", options: "WatchOptions") -> None:
     """Say where the page is and who can reach it; open it where there is a screen."""
-    _say(f"watch at  {server.address}   (Ctrl-C stops)", request)
+    _say(f"watch at  {server.address}   (Ctrl-C stops)", options)
     if server.only_here:
-        _say("Only this machine can reach it; --host opens it to others.", request)
+        _say("Only this machine can reach it; --host opens it to others.", options)
     else:
         warn(
             f"It listens on {server.host}: whoever reaches that can watch and steer, unasked and "
             f"unencrypted. Safer: `ssh -L {server.port}:localhost:{server.port} THIS-MACHINE`."
         )
-    if request.browser and _has_screen():
+    if options.browser and _has_screen():
         import webbrowser
 
         webbrowser.open(server.address)
@@ -135,7 +179,7 @@ def _has_screen() -> bool:
     return sys.platform != "linux" or any(os.environ.get(screen) for screen in screens)
 
 
-def _say(text: str, request: Request) -> None:
+def _say(text: str, options: "WatchOptions") -> None:
     """Write a line for a person: on stderr if stdout is for one JSON object."""
-    (warn if request.as_json else say)(text)
+    (warn if options.as_json else say)(text)
     sys.stdout.flush()

@@ -19,6 +19,7 @@ from vergence.errors import InputError, echo
 
 _Name = Annotated[str, StringConstraints(strict=True, max_length=100)]
 _Place = Annotated[float, Field(ge=-1e5, le=1e5)]  # px, or normalized image coordinates
+_MOST_PICKED = 64  # points
 _Int = Annotated[StrictInt, Field(ge=-(10**9), le=10**9)]
 
 
@@ -50,6 +51,12 @@ class Step(_Command):
     do: Literal["step"]
 
 
+class Stop(_Command):
+    """Brake the arm and end the run."""
+
+    do: Literal["stop"]
+
+
 class Reset(_Command):
     """Begin again."""
 
@@ -70,6 +77,15 @@ class Seek(_Command):
     value: Annotated[float, Field(ge=0, le=1e9)]
 
 
+class Look(_Command):
+    """Turn the view in three dimensions, and go nearer."""
+
+    do: Literal["look"]
+    azimuth_deg: Annotated[float, Field(ge=-180, le=180)]
+    elevation_deg: Annotated[float, Field(ge=-180, le=180)]
+    zoom: Annotated[float, Field(ge=0.1, le=10)]
+
+
 class ChooseLaw(_Command):
     """Use another law."""
 
@@ -83,6 +99,20 @@ class TurnKnob(_Command):
     do: Literal["knob"]
     key: _Name
     value: StrictBool | _Int | StrictFloat | _Name
+
+
+class TrackPoints(_Command):
+    """Keep points of an image where they are in it, whatever the task was."""
+
+    do: Literal["track"]
+    time: Annotated[float, Field(ge=-1e9, le=1e9)]  # of the exposure they were picked in, s
+    points: Annotated[list[tuple[_Place, _Place]], Field(min_length=1, max_length=_MOST_PICKED)]
+
+
+class TakeGoal(_Command):
+    """Keep an image as a goal to go back to, with what belongs to it."""
+
+    do: Literal["goal"]
 
 
 class Grab(_Command):
@@ -101,7 +131,8 @@ class Move(_Command):
     view: _Name
     u: _Place
     v: _Place
-    along: StrictBool  # the optical axis
+    along: StrictBool  # the optical axis; or, turning, about it
+    turn: StrictBool = False  # turn it instead
 
 
 class Release(_Command):
@@ -121,11 +152,15 @@ Command: TypeAlias = (
     | Pause
     | Resume
     | Step
+    | Stop
     | Reset
     | SetSpeed
     | Seek
+    | Look
     | ChooseLaw
     | TurnKnob
+    | TrackPoints
+    | TakeGoal
     | Grab
     | Move
     | Release

@@ -13,6 +13,7 @@ from vergence.registry import kinds
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
 # others, which act on features in the image.
 _ALWAYS = ("feed_forward", "prediction")
+_UNITS = ("_m_s", "_rad_s", "_deg_s", "_hz", "_deg", "_px", "_m", "_s")  # endings of keys
 _ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m")
 
 
@@ -75,7 +76,7 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
         value = getattr(part, name)
         knob: dict[str, Any] = {
             "key": begin + name,
-            "label": (begin + name).replace("_", " ").replace(".", ": "),
+            "label": _label(begin + name, extra.get("unit", "")),
             "unit": extra.get("unit", ""),
             "value": value,
         }
@@ -88,6 +89,12 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
         else:
             continue
         yield knob
+
+
+def _label(key: str, unit: str) -> str:
+    """Return a key in words; its unit stands beside it."""
+    ending = next((each for each in _UNITS if key.endswith(each)), "") if unit else ""
+    return key.removesuffix(ending).replace("_", " ").replace(".", ": ")
 
 
 def _range(about: Any) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """A cell that runs while somebody watches, pauses it, turns its knobs and moves its target."""
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 
 from vergence.app.watch.commands import (
@@ -8,6 +9,7 @@ from vergence.app.watch.commands import (
     Command,
     Grab,
     LetGo,
+    Look,
     Move,
     Pause,
     Release,
@@ -15,23 +17,28 @@ from vergence.app.watch.commands import (
     Resume,
     SetSpeed,
     Step,
+    Stop,
+    TakeGoal,
+    TrackPoints,
     TurnKnob,
 )
 from vergence.app.watch.drag import TargetDrag
 from vergence.app.watch.inbox import Inbox
 from vergence.app.watch.law_editor import LawEditor
+from vergence.app.watch.newest_frames import NewestFrames
 from vergence.app.watch.outline import outline_from, target_corners
 from vergence.app.watch.pace import Pace
 from vergence.app.watch.protocol import Request
 from vergence.app.watch.publisher import Publisher
-from vergence.app.watch.scene import Scene, world_state
+from vergence.app.watch.scene import Scene
 from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.assembly import LawContext, Parts, run_driver
 from vergence.assembly.started_driver import StartedDriver
 from vergence.control import Law
+from vergence.errors import Absent, InputError
 from vergence.runtime import Loop, Recorder, Run
-from vergence.signals import Outcome, OutcomeKind
+from vergence.signals import Frame, Outcome, OutcomeKind
 
 _KEPT_TICKS = 20_000  # in memory, some ten minutes; the recording has them all
 _LOOK_UP_S = 0.1  # the longest wait without a look at whether Ctrl-C was pressed
@@ -65,6 +72,10 @@ class Live:
         self._context: LawContext | None = None  # of the last run
         self._recorder = Recorder(out, image_every)
         self._runs, self._again = 0, True
+        self._newest = NewestFrames()
+        self._picked_in: dict[str, Frame] = {}  # images to begin the next run with
+        self._begun = 0.0  # s, the driver's time at which the run began
+        self._goals = 0  # photographs taken
         self.view_state = ViewState()
         self._drag = TargetDrag(self._driver, self.view_state)
         self.scene = Scene(self._driver.world, self.view_state)
@@ -82,11 +93,17 @@ class Live:
         """Run the cell until Ctrl-C; return what came of the last run."""
         while self._again:
             self._again = False
-            result = self._run_once()
-            if not self._again and result.outcome.kind is not OutcomeKind.STOPPED:
-                self._rest()
+            try:
+                result = self._run_once()
+            except InputError as error:  # what a page asks for must not end the command
+                if not self._picked_in:
+                    raise
+                self._refuse_points(error)
+            else:
+                if not self._again and result.outcome.kind is not OutcomeKind.STOPPED:
+                    self._rest()
             if self._again:
-                self._stand_up()
+                self._begin_again()
         return result
 
     def close(self) -> None:
@@ -103,33 +120,46 @@ class Live:
             "scene": True,
             "draggable": self._driver.world.target_is_free,
             "carried_by": cell.target.carried_by,
+            "images": self._images,
         }
         publisher = Publisher(self.view_state, cell, self._driver, about)
+        self.view_state.status(preparing=True)  # until kernels are loaded and the loop begins
         self._tell()
         try:
             return run_driver(
                 cell,
                 self._driver,
-                (self._recorder, publisher),
+                (self._recorder, publisher, self._newest),
                 self._images,
                 duration_s=float("inf"),
                 attend=self._attend,
                 most_ticks=_KEPT_TICKS,
+                frames=self._picked_in,
             )
         finally:
+            self.view_state.status(preparing=False)
             self._loop = None
             self._driver.between = None
 
     def _attend(self, loop: Loop, parts: Parts) -> None:
-        self._loop, self._context = loop, parts.context
+        self._context = parts.context
+        if self._loop is loop:  # another task of the same run
+            return
+        self._loop = loop
+        self.view_state.status(preparing=False)
         self._driver.between = self._between
+        self._begun = self._driver.time
+        if self._picked_in:
+            self._say("points picked", "the arm keeps them where they are in the image")
 
-    def _stand_up(self) -> None:
-        """Begin again from the start, in a new folder."""
-        self._driver.close()
+    def _begin_again(self) -> None:
+        """Begin again in a new folder: from the start, or where the arm is with picked points."""
         self._runs += 1
         folder = self._out.with_name(f"{self._out.name}-{self._runs + 1}")
         self._recorder = Recorder(folder, self._image_every)
+        if self._picked_in:
+            return
+        self._driver.close()
         self._driver = WatchedDriver(self._editor.cell, self._images)
         self._drag = TargetDrag(self._driver, self.view_state)
 
@@ -142,7 +172,7 @@ class Live:
 
     def _between(self, time: float) -> None:
         """Show the world; wait for the clock; do what was asked."""
-        self._show(time)
+        self._show()
         while not self._stopping and (delay := self._pace.delay(time)) != 0.0:
             self._tell()
             self._inbox.obey(self._do, timeout_s=min(delay or _LOOK_UP_S, _LOOK_UP_S))
@@ -154,11 +184,18 @@ class Live:
     def _stopping(self) -> bool:
         return self._loop is not None and self._loop.stopping
 
-    def _show(self, time: float) -> None:
+    @property
+    def _time(self) -> float:
+        """Since the run began, s."""
+        return self._driver.time - self._begun
+
+    def _show(self) -> None:
         world = self._driver.world
-        self.view_state.state = world_state(world.model, world.data)
+        self.view_state.state = world.state()
         around = outline_from(self.scene.viewer_camera, self._corners, world.target_pose())
-        self.view_state.status(time=time, outline=around, fovy=self.scene.viewer_camera.fovy_deg)
+        self.view_state.status(
+            time=self._time, outline=around, fovy=self.scene.viewer_camera.fovy_deg
+        )
 
     def _tell(self) -> None:
         pace = self._pace
@@ -182,15 +219,72 @@ class Live:
             case SetSpeed(value=speed):
                 self._pace.set_speed(speed)
             case Reset():
-                self._again = True
-                if self._loop is not None:
-                    self._loop.stop()
+                self._forget_points()
+                self._stop()
+            case Stop():
+                raise InputError("message", "do", command.do, "it with --driver; pause instead")
+            case TrackPoints():
+                self._track(command)
+            case TakeGoal():
+                self._take_goal()
+            case Look():
+                self.scene.look(command)
             case ChooseLaw(name=name):
                 self._replace_law(self._editor.choose(name, self._law_context))
             case TurnKnob(key=key, value=value):
                 self._replace_law(self._editor.turn(key, value, self._law_context))
             case _ if self._driver.world.target_is_free:
                 self._move_target(command)
+
+    def _stop(self) -> None:
+        """End this run, so that another begins."""
+        self._again = True
+        if self._loop is not None:
+            self._loop.stop()
+
+    def _track(self, command: TrackPoints) -> None:
+        """Keep points where they are in the newest image, from where the arm is."""
+        frame = self._newest_frame()
+        if frame.time != command.time:
+            given = f"{command.time:g} s, which is not the newest image"
+            raise InputError("message", "time", given, "points picked while time stands still")
+        self._editor.track(command.points)
+        self._picked_in = {frame.camera: replace(frame, time=frame.time + self._begun)}
+        self._pace.resume()
+        self._stop()
+
+    def _forget_points(self) -> None:
+        self._picked_in = {}
+        self._editor.forget_points()
+
+    def _refuse_points(self, error: InputError) -> None:
+        """Say why points cannot be tracked; the arm rests until a page asks for something else."""
+        self._forget_points()
+        self._say("points refused", str(error))
+        self.view_state.status(
+            outcome={
+                "kind": "points refused",
+                "reason": str(error),
+                "time": self._time,
+                "succeeded": False,
+            }
+        )
+        self._rest()
+
+    def _take_goal(self) -> None:
+        """Keep the newest image as a goal, in the folder of the run."""
+        from vergence.app.goal import keep_photograph
+
+        self._goals += 1
+        path = self.folder / f"goal-{self._goals}.png"
+        keep_photograph(path, self._newest_frame(), self._driver)
+        self._say("goal taken", f"{path}; another run goes there with --goal {path}")
+
+    def _newest_frame(self) -> Frame:
+        frame = self._newest.frames.get(self._editor.cell.task.camera)
+        if frame is None or frame.image is None:
+            raise InputError("message", "", Absent("no image yet"), "a run that looks at images")
+        return frame
 
     @property
     def _law_context(self) -> LawContext:
@@ -207,15 +301,16 @@ class Live:
         match command:
             case Grab(view=view, u=u, v=v):
                 self._drag.grab(view, u, v, self.scene.viewer_camera)
-            case Move(view=view, u=u, v=v, along=along):
-                self._drag.move(view, u, v, along)
+            case Move(view=view, u=u, v=v, along=along, turn=turn):
+                self._drag.move(view, u, v, along, turn)
             case Release():
-                self._drag.release()
+                if done := self._drag.release():
+                    self._say("target moved", done)
             case LetGo():
                 self._driver.target.held = False
 
     def _say(self, name: str, text: str) -> None:
-        time = self._driver.time
+        time = self._time
         self.view_state.event(time, name, text)
         if self._recorder.running:
             self._recorder.event(time, name, text)

@@ -5,7 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from vergence.app.figures.arm import drawn_positions
+from vergence.app.recorded_poses import RecordedPoses, newest
+from vergence.app.recorded_world import RecordedWorld
 from vergence.app.watch.camera_view import CameraView
+from vergence.app.watch.limits_now import LimitsNow
 from vergence.app.watch.plots import (
     MANIPULABILITY,
     MEASURE,
@@ -18,7 +21,6 @@ from vergence.app.watch.plots import (
     joints_plot,
     row,
 )
-from vergence.app.watch.recorded_world import RecordedWorld
 from vergence.app.watch.view_state import Row
 from vergence.arrays import FloatArray
 from vergence.geometry import se3_inverse
@@ -28,7 +30,6 @@ from vergence.runtime.results import CameraTrace, angle_between
 from vergence.signals import ImagePoints, SearchWindows
 
 _MM = 1e3
-_AT_ONCE_S = 1e-9
 
 
 class Playback:
@@ -50,7 +51,7 @@ class Playback:
         self.cameras = tuple(name for name in traces if len(traces[name].time))
         self._jpegs = {name: tuple(recording.jpegs(name)) for name in self.cameras}
         self._views: dict[str, CameraView] = {}
-        self._truth = _true_poses(recording)
+        self._poses = RecordedPoses(recording)
         self.plots = tuple(self._choose_plots())
 
     def rows(self) -> list[Row]:
@@ -81,14 +82,14 @@ class Playback:
         """Return MuJoCo's state of the world at a time; None where the world is not known."""
         if self._world is None:
             return None
-        joints = {
-            name: trace.position[_newest(trace.time, time)]
-            for name, trace in self._recording.arms.items()
-            if len(trace.time)
-        }
-        times, poses = self._truth
-        T = poses[_newest(times, time)] if len(times) else np.eye(4)
-        return self._world.place(joints, T)
+        return self._world.place(self._poses.joints(time), self._poses.target(time))
+
+    def limits(self, time: float) -> list[dict[str, object]]:
+        """Return the limits that shaped the motion at a time, as `LimitsNow` does."""
+        if not self._arm or not len((trace := self._recording.arms[self._arm]).time):
+            return []
+        row = newest(trace.time, time)
+        return LimitsNow().at(time, trace.active[row], trace.slack[row])
 
     def _choose_plots(self) -> Iterator[Plot]:
         for name, trace in self._recording.cameras.items():
@@ -96,8 +97,10 @@ class Playback:
                 yield error_plot(trace.error_px.shape[1], self._further(name))
             if np.isfinite(trace.T_camera_target_desired).any():
                 yield from (POSE_MM, POSE_DEG)
-        if self._recording.target is not None and len(self._truth[0]):
+        if self._recording.target is not None and len(self._poses.true_times):
             yield TARGET_MM
+        if not self._arm:
+            return
         yield joints_plot(self._recording.info.arms[self._arm])
         if self._world is not None:
             yield MANIPULABILITY
@@ -105,6 +108,8 @@ class Playback:
             yield MEASURE
 
     def _arm_rows(self) -> Iterator[Row]:
+        if not self._arm:
+            return
         info, trace = self._recording.info.arms[self._arm], self._recording.arms[self._arm]
         measures = trace.manipulability
         if self._world is not None:
@@ -137,18 +142,18 @@ class Playback:
         return "" if camera == self._recording.info.task_camera else camera
 
     def _target_rows(self) -> Iterator[Row]:
-        target, (times, poses) = self._recording.target, self._truth
+        target, times = self._recording.target, self._poses.true_times
         if target is None or not len(times):
             return
         for time, T in zip(target.time.tolist(), target.T_world_target, strict=True):
-            away = T[:3, 3] - poses[_newest(times, time)][:3, 3]
+            away = T[:3, 3] - self._poses.true_poses[newest(times, time)][:3, 3]
             yield row(time, self.plots, {"target_mm": np.array([_MM * np.linalg.norm(away)])})
 
     def _camera_view(self, name: str, time: float) -> CameraView:
         trace, jpegs = self._recording.cameras[name], self._jpegs[name]
-        index, kept = _newest(trace.received, time), b""
+        index, kept = newest(trace.received, time), b""
         if jpegs:
-            number = _newest(np.array([taken for taken, _ in jpegs]), float(trace.time[index]))
+            number = newest(np.array([taken for taken, _ in jpegs]), float(trace.time[index]))
             taken, kept = jpegs[number]
             index = int(np.argmin(np.abs(trace.time - taken)))
         return CameraView(
@@ -162,26 +167,10 @@ class Playback:
         )
 
 
-def _newest(times: FloatArray, time: float) -> int:
-    """Return the place of the last of increasing times that is not later; the first at least."""
-    return max(int(np.searchsorted(times, time + _AT_ONCE_S, side="right")) - 1, 0)
-
-
 def _moved_arm(recording: Recording) -> str:
-    """Return the arm that was commanded; the first if none was."""
+    """Return the arm that was commanded; the first if none was, empty without an arm."""
     commanded = (n for n, trace in recording.arms.items() if np.isfinite(trace.command).any())
-    return next(commanded, next(iter(recording.arms)))
-
-
-def _true_poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Return when the target's pose is known, (K,) s, and T_world_target (K, 4, 4)."""
-    trace = recording.cameras.get(recording.info.task_camera)  # another may look at a tool
-    if trace is None:
-        return np.empty(0), np.empty((0, 4, 4))
-    times, poses = trace.time, trace.T_world_target
-    known = np.isfinite(poses).all(axis=(1, 2))
-    order = np.argsort(times[known], kind="stable")
-    return times[known][order], poses[known][order]
+    return next(commanded, next(iter(recording.arms), ""))
 
 
 def _points(name: str, trace: CameraTrace, index: int) -> ImagePoints | None:
@@ -198,4 +187,5 @@ def _points(name: str, trace: CameraTrace, index: int) -> ImagePoints | None:
         trace.found[index],
         (*reasons, *[""] * (count - len(reasons))),
         None if without else windows,
+        trace.joined[index] if trace.joined[index].any() else None,
     )

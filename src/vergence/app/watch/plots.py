@@ -1,13 +1,14 @@
 """The curves of the page: which there are, and their values at an instant."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from vergence.app.figures.arm import drawn_names
 from vergence.arrays import FloatArray
+from vergence.assembly.photograph import is_by_photograph
 from vergence.cell import Cell
 from vergence.runtime import ArmInfo
 from vergence.runtime.json_numbers import numbers
@@ -32,17 +33,28 @@ class Plot:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-POSE_MM = Plot("pose_mm", "end effector from where it should be", "mm", ("distance",))
-POSE_DEG = Plot("pose_deg", "end effector from how it should be turned", "°", ("angle",))
-TARGET_MM = Plot("target_mm", "estimated from true target", "mm", ("distance",))
-MANIPULABILITY = Plot("manipulability", "manipulability √det(J Jᵀ)", "SI units", ("of the arm",))
-MEASURE = Plot("manipulability", "manipulability w′", "SI units", ("of the arm",))
+POSE_MM = Plot("pose_mm", "position error of the end effector", "mm", ("distance",))
+POSE_DEG = Plot("pose_deg", "rotation error of the end effector", "°", ("angle",))
+TARGET_MM = Plot("target_mm", "position error of the estimated target", "mm", ("distance",))
+MANIPULABILITY = Plot(
+    "manipulability", "manipulability √det(J Jᵀ)", "0 = singular", ("of the arm",)
+)
+MEASURE = Plot("manipulability", "manipulability w′", "0 = singular or at a limit", ("of the arm",))
 
 
-def error_plot(points: int, camera: str = "") -> Plot:
-    """Return the panel of the errors of so many image points; of a further camera by its name."""
-    names = tuple(f"point {number}" for number in range(points))
-    title = "image points from where they should be"
+ALL_POINTS = ("farthest", "mean")
+
+
+def error_plot(points: int | None, camera: str = "") -> Plot:
+    """Return the panel of the errors of image points; of a further camera by its name.
+
+    Args:
+        points: how many there are, with a curve each; None if others come on the way, so that the
+            farthest one and the mean are drawn.
+        camera: name of a further one.
+    """
+    names = ALL_POINTS if points is None else tuple(f"point {k}" for k in range(points))
+    title = "error of the image points"
     return Plot(error_key(camera), f"{title} in {camera}" if camera else title, "px", names)
 
 
@@ -53,24 +65,38 @@ def error_key(camera: str = "") -> str:
 
 def joints_plot(arm: ArmInfo) -> Plot:
     """Return the panel of an arm's joints."""
-    title = "joints between their limits"
-    return Plot("joints", title, "±1 = limit", drawn_names(arm), -1.1, 1.1, (-1.0, 1.0))
+    title = "joint positions"
+    return Plot("joints", title, "±1 = limits", drawn_names(arm), -1.1, 1.1, (-1.0, 1.0))
 
 
 def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
-    """Return the panels of a running cell.
+    """Return the panels of a running cell: of everything that one of its tasks is about.
 
     Args:
         cell: that runs.
         points: how many image points of the target its task speaks of.
         arm: the one that is moved.
     """
-    common = (joints_plot(arm), MANIPULABILITY)
-    if cell.task.kind == "follow":
-        return (POSE_MM, POSE_DEG, TARGET_MM, *common)
-    tool = cell.tool
-    held = () if tool is None else (error_plot(len(tool.features), tool.camera),)
-    return (error_plot(points), *held, *common)
+    kinds = {stage.task.kind for stage in cell.stages}
+    panels: list[Plot] = []
+    if kinds & {"track", "reach"}:
+        change = len(cell.stages) > 1 or is_by_photograph(cell)
+        panels.append(error_plot(None if change else points))
+    if (tool := cell.tool) is not None:
+        title = f"{panels[0].title} in {cell.task.camera}"
+        panels[0] = replace(panels[0], title=title)
+        panels.append(error_plot(len(tool.features), tool.camera))
+    if "follow" in kinds:
+        panels += (POSE_MM, POSE_DEG, TARGET_MM)
+    return (*panels, joints_plot(arm), MANIPULABILITY)
+
+
+def drawn_errors(distances_px: FloatArray, plot: Plot) -> FloatArray:
+    """Return what a panel draws of the errors of points, (M,) px, NaN where one was not found."""
+    if plot.series != ALL_POINTS:
+        return distances_px
+    known = distances_px[np.isfinite(distances_px)]
+    return np.array([known.max(), known.mean()]) if len(known) else np.full(2, np.nan)
 
 
 def row(time: float, plots: Sequence[Plot], values: dict[str, FloatArray]) -> list[Any]:

@@ -6,8 +6,9 @@ import numpy as np
 
 from vergence.app.figures.arm import drawn_positions
 from vergence.app.watch.camera_view import CameraView
+from vergence.app.watch.limits_now import LimitsNow
 from vergence.app.watch.outline import outline, target_corners
-from vergence.app.watch.plots import Plot, error_key, live_plots, row
+from vergence.app.watch.plots import Plot, drawn_errors, error_key, live_plots, row
 from vergence.app.watch.view_state import ViewState
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
@@ -43,6 +44,7 @@ class Publisher:
         self._corners = target_corners(driver.world)
         self._plots: tuple[Plot, ...] = ()
         self._info: RunInfo | None = None
+        self._limits = LimitsNow()
 
     def begin(self, info: RunInfo) -> None:
         """Tell the page what is about to run."""
@@ -63,12 +65,15 @@ class Publisher:
                 **self._about,
             }
         )
-        self._view_state.status(outcome=None)
+        self._view_state.status(outcome=None, limits=[])
 
     def tick(self, record: TickRecord) -> None:
         """Hand on what came in, what was seen and what was asked."""
         views = [self._camera_view(frame, record) for frame in record.sample.frames]
         self._view_state.tick(row(record.time, self._plots, self._values(record)), views)
+        if (command := record.commands.get(self._cell.task.arm)) is not None:
+            shaped = self._limits.at(record.time, command.active, command.slack)
+            self._view_state.status(limits=shaped)
 
     def event(self, time: float, name: str, text: str) -> None:
         """Hand on an event."""
@@ -128,29 +133,33 @@ class Publisher:
         }
 
     def _errors(self, record: TickRecord) -> dict[str, FloatArray]:
-        if self._cell.task.kind == "follow":
-            assert self._info is not None, "a run begins before it ticks"
-            errors = tick_pose_errors(record, self._info)
-            if not len(errors.time):
-                return {}
-            return {
-                "pose_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
-                "pose_deg": np.rad2deg(errors.camera_rad),
-                "target_mm": _MM * np.linalg.norm(errors.target_m, axis=1),
-            }
         if record.observation is None or record.reference is None:
             return {}
+        if record.reference.T_camera_target is not None:
+            return self._pose_errors(record)
         task = self._cell.task.camera
-        distances: dict[str, FloatArray] = {}
+        plots = {plot.key: plot for plot in self._plots}
+        drawn: dict[str, FloatArray] = {}
         for view in record.observation.views:
             mine = view.camera == task
             elsewhere = record.reference.elsewhere_px.get(view.camera)
-            wanted = record.reference.points_px if mine else elsewhere
-            if wanted is not None:
-                distance = np.linalg.norm(view.points_px - wanted, axis=1)
-                key = error_key("" if mine else view.camera)
-                distances[key] = np.where(view.found, distance, np.nan)
-        return distances
+            desired = record.reference.points_px if mine else elsewhere
+            plot = plots.get(error_key("" if mine else view.camera))
+            if plot is not None and desired is not None and desired.shape == view.points_px.shape:
+                distance = np.linalg.norm(view.points_px - desired, axis=1)
+                drawn[plot.key] = drawn_errors(np.where(view.found, distance, np.nan), plot)
+        return drawn
+
+    def _pose_errors(self, record: TickRecord) -> dict[str, FloatArray]:
+        assert self._info is not None, "a run begins before it ticks"
+        errors = tick_pose_errors(record, self._info)
+        if not len(errors.time):
+            return {}
+        return {
+            "pose_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
+            "pose_deg": np.rad2deg(errors.camera_rad),
+            "target_mm": _MM * np.linalg.norm(errors.target_m, axis=1),
+        }
 
     def _looks_at_tool(self, camera: str) -> bool:
         return self._cell.tool is not None and self._cell.tool.camera == camera

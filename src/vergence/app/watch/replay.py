@@ -5,11 +5,11 @@ from time import perf_counter
 
 import numpy as np
 
-from vergence.app.watch.commands import Command, Pause, Reset, Resume, Seek, SetSpeed, Step
+from vergence.app.recorded_world import RecordedWorld
+from vergence.app.watch.commands import Command, Look, Pause, Reset, Resume, Seek, SetSpeed, Step
 from vergence.app.watch.inbox import Inbox
 from vergence.app.watch.playback import Playback
 from vergence.app.watch.protocol import Request
-from vergence.app.watch.recorded_world import RecordedWorld
 from vergence.app.watch.scene import Scene
 from vergence.app.watch.view_state import ViewState
 from vergence.runtime.recording import Recording
@@ -92,7 +92,12 @@ class Replay:
         if state is not None:
             self.view_state.state = state
         self.view_state.show(self._playback.views(self._time))
-        self.view_state.status(time=self._time, paused=self._paused, speed=self._speed)
+        self.view_state.status(
+            time=self._time,
+            paused=self._paused,
+            speed=self._speed,
+            limits=self._playback.limits(self._time),
+        )
 
     def _go_to(self, time: float) -> None:
         self._time = min(max(time, 0.0), self._recording.duration)
@@ -118,3 +123,5 @@ class Replay:
                 self._go_to(time)
             case Reset():
                 self._go_to(0.0)
+            case Look() if self.scene is not None:
+                self.scene.look(command)

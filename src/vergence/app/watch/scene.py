@@ -8,18 +8,20 @@ import logging
 import threading
 import time
 import zlib
+from collections import deque
 from typing import Any
 
-import numpy as np
-
+from vergence.app.first_view import first_view, points_in_view
+from vergence.app.watch.commands import Look
 from vergence.app.watch.own_process_socket import OwnProcessSocket
 from vergence.app.watch.private_listener import PrivateListener
 from vergence.app.watch.view_state import ViewState
 from vergence.app.watch.viewer_camera import ViewerCamera
-from vergence.arrays import FloatArray
+from vergence.simulation.build import under_a_sky
 from vergence.simulation.world import World
 
 _PERIOD_S = 1 / 30  # between two states, while no browser sets the pace
+_STEEPEST_DEG = 89.0  # from above or below: straight down has no up
 _FLAGS = [1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1]  # of MuJoCo's renderer: as its viewers begin
 
 
@@ -41,7 +43,7 @@ class Scene:
 
         logging.getLogger("WebServer").setLevel(logging.WARNING)  # it writes to stdout
         logging.getLogger("asyncio").addFilter(_is_no_hang_up)
-        model = world.model
+        model = under_a_sky(world.cell)
         self._model, self._view_state = model, view_state
         self._payload, self._mode = state_payload, ux.TUMBLE_CAMERA_IDX
         bundle = state_payload.serialize_model_bundle(model)
@@ -51,14 +53,14 @@ class Scene:
         self._server = web_server.WebServer(self._listener.socket, behind, mjb_data=bundle)
         # Without a user interface behind it, the viewer takes the browser for a mere spectator.
         self._interface = headless_ui.HeadlessUi("vergence", behind.getsockname()[1], "")
-        self._camera = mujoco.MjvCamera()
+        self._camera = first_view(world, points_in_view(world))
         self._sync = client_camera.ClientCameraSync()
-        self._look_at(_in_view(world))
+        self._looks = deque[Look]()  # asked for, to be done in the thread of the view
         self._rest: tuple[Any, ...] = (mujoco.MjvPerturb(), mujoco.MjvOption(), model, _FLAGS, [])
         self._signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         self._ending = threading.Event()
         # A browser that is shown nothing looks from where it likes, and soon gives the viewer up.
-        view_state.state = world_state(model, world.data)
+        view_state.state = world.state()
         self._thread = threading.Thread(target=self._show, name="scene", daemon=True)
         self._server.start()
         self._thread.start()
@@ -75,6 +77,10 @@ class Scene:
             float(self._model.vis.global_.fovy),
         )
 
+    def look(self, command: Look) -> None:
+        """Look from elsewhere, soon."""
+        self._looks.append(command)
+
     def close(self) -> None:
         """Stop serving."""
         self._ending.set()
@@ -82,26 +88,26 @@ class Scene:
         self._thread.join(timeout=2.0)
         self._listener.close()
 
-    def _look_at(self, points: FloatArray) -> None:
-        """Choose a first view across the way from the first of some points to the last."""
-        low, high = points.min(axis=0), points.max(axis=0)
-        way = points[-1] - points[0]
-        self._camera.lookat[:] = (low + high) / 2
-        self._camera.distance = 1.5 * float(np.linalg.norm(high - low)) + 0.15
-        self._camera.azimuth = float(np.rad2deg(np.arctan2(way[1], way[0]))) + 70.0
-        self._camera.elevation = -22.0
-
     def _show(self) -> None:
         while not self._ending.is_set():
             framed = self._interface.new_frame()
             moved = self._server.take_client_camera()
             if moved is not None:
                 self._sync.apply(self._camera, moved)
+            while self._looks:
+                self._turn(self._looks.popleft())
             self._publish()
             if framed:
                 self._interface.end_frame()
             else:
                 time.sleep(_PERIOD_S)
+
+    def _turn(self, by: Look) -> None:
+        camera = self._camera
+        camera.azimuth += by.azimuth_deg
+        elevation = camera.elevation + by.elevation_deg
+        camera.elevation = min(max(elevation, -_STEEPEST_DEG), _STEEPEST_DEG)
+        camera.distance /= by.zoom
 
     def _publish(self) -> None:
         state = self._view_state.state
@@ -124,22 +130,3 @@ def _is_no_hang_up(record: logging.LogRecord) -> bool:
     from websockets.exceptions import ConnectionClosed
 
     return record.exc_info is None or not isinstance(record.exc_info[1], ConnectionClosed)
-
-
-def world_state(model: Any, data: Any) -> FloatArray:
-    """Return the state of a world as the view wants it."""
-    import mujoco
-
-    kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-    state = np.empty(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, data, state, kind)
-    return state
-
-
-def _in_view(world: World) -> FloatArray:
-    """Return what the first view should show, (K, 3): from the foot of the arm to the target."""
-    model, data, cell = world.model, world.data, world.cell
-    foot = np.array(cell.arms[cell.task.arm].position_m)
-    bodies = [data.xpos[body] for body in range(1, model.nbody)]
-    cameras = [data.cam_xpos[camera] for camera in range(model.ncam)]
-    return np.array([foot, *bodies, *cameras, world.target_pose()[:3, 3]])

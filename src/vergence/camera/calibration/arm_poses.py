@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.errors import InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 from vergence.geometry import matrix_to_quaternion, quaternion_to_matrix, se3
 from vergence.tables import numbers, read_table, read_text, require_known
 
@@ -61,7 +61,7 @@ def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         header = table.fieldnames or ()
         for name in COLUMNS:
             if name not in header:
-                given = ", ".join(header) or "nothing"
+                given = ", ".join(header) or NOTHING
                 raise InputError(str(path), "row 1", given, ", ".join(COLUMNS))
         for row in table:
             yield f"row {table.line_num}", _pose_row(row, path, table.line_num)
@@ -86,7 +86,7 @@ def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     rows = table.get("poses")
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
         raise InputError(
-            str(path), "poses", "no list of tables", "[[poses]] with " + ", ".join(_KEYS)
+            str(path), "poses", Absent("no list of tables"), "[[poses]] with " + ", ".join(_KEYS)
         )
     for number, row in enumerate(rows, start=1):
         place = f"poses, number {number}"
@@ -94,7 +94,7 @@ def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
             if key not in _KEYS:
                 raise InputError(str(path), f"{place}: {key}", "not known", nearest(key, _KEYS))
         if "image" not in row:
-            raise InputError(str(path), f"{place}: image", "nothing", "the image's file name")
+            raise InputError(str(path), f"{place}: image", NOTHING, "the image's file name")
         yield place, row
 
 

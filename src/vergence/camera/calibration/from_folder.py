@@ -18,7 +18,7 @@ from vergence.camera.calibration.sighting import BadImage, Sighting
 from vergence.camera.image_file import image_files
 from vergence.camera.image_folder import grey_images
 from vergence.camera.pinhole import Camera
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 
 _THREADS = 4
 _IN_MEMORY = 8  # images at a time
@@ -65,7 +65,7 @@ def find_board(
         InputError: if the folder or an image cannot be read.
     """
     if not folder.is_dir():
-        raise InputError(str(folder), "", "no such folder", "a folder of images")
+        raise InputError(str(folder), "", Absent("no such folder"), "a folder of images")
     files = image_files(folder)
     images = grey_images(files)
     found: list[Sighting] = []

@@ -53,3 +53,16 @@ class Placement(Table):
 
     position_m: Vector3 = (0.0, 0.0, 0.0)  # x, y, z of its origin
     rotation_rpy_deg: Angles3 = (0.0, 0.0, 0.0)  # roll, pitch, yaw
+
+
+class TaskTable(Table):
+    """What every task has."""
+
+    name: Name | None = None  # what messages and reports call it; its kind if absent
+    law: Name | None = None  # one of [laws], in [[tasks]]; the cell's own if absent
+    until: Part = None  # when it is over; a task with a goal ends there if absent
+
+    @property
+    def called(self) -> str:
+        """What messages and reports call it."""
+        return self.name or str(getattr(self, "kind", "task"))

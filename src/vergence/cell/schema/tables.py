@@ -10,6 +10,7 @@ from vergence.cell.schema.base import (
     MOST_JOINTS,
     MOST_POINTS,
     Angle,
+    Coordinate,
     Distance,
     Duration,
     JointRate,
@@ -22,6 +23,7 @@ from vergence.cell.schema.base import (
     Rate,
     Speed,
     Table,
+    TaskTable,
     Text,
     Time,
     Vector3,
@@ -49,6 +51,17 @@ class SceneTable(Table):
     light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of every lamp
 
 
+class CollisionTable(Table):
+    """What the task's arm must not touch: the law keeps a distance, the guard brakes before."""
+
+    avoid: Annotated[
+        tuple[Literal["self", "arms", "fixtures", "target"], ...], Field(max_length=4)
+    ] = ("self", "arms", "fixtures")  # its own links, other arms, the scene; a stationary target
+    margin_m: Annotated[float, Field(ge=1e-3, le=1)] = (
+        0.01  # kept by the law's limit "collision"; the guard brakes at half of it
+    )
+
+
 class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
@@ -65,11 +78,29 @@ class ArmTable(Placement):
     motion: Part = None  # what it does by itself; without one the loop holds it
 
 
+class DepthTable(Table):
+    """What a camera measures of depth, at each pixel of its image."""
+
+    noise_m: Distance = 0.002  # standard deviation at 1 m, in simulation; grows with the square
+    range_m: tuple[Length, Length] = (0.15, 6.0)  # nearest and farthest that is measured
+    holes: Annotated[float, Field(ge=0, le=1)] = 0.0  # share of the image without, in simulation
+
+    @field_validator("range_m")
+    @classmethod
+    def _nearest_first(cls, interval: tuple[float, float]) -> tuple[float, float]:
+        if interval[1] <= interval[0]:
+            raise ValueError("[nearest, farthest]")
+        return interval
+
+
 class CameraTable(Placement):
     """A camera; its placement is in the body that carries it, or in the world."""
 
     arm: Text | None = None  # the arm that carries it; fixed in the world if absent
     body: Text | None = None  # which body of that arm; its last if absent
+    radius_m: Length | None = (
+        None  # of a ball around it that must touch nothing; if absent only its arm must not
+    )
     resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the image
     focal_mm: _Lens | None = None  # of the lens, with pixel_um
     pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
@@ -83,6 +114,7 @@ class CameraTable(Placement):
     latency_frames: Annotated[int, Field(ge=0, le=1000)] = (
         0  # from exposure until the image arrives
     )
+    depth: DepthTable | None = None  # of a depth camera; see `law.depth`
     noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
     blind_s: Annotated[
         tuple[tuple[Time, Time], ...], Field(max_length=1000)
@@ -140,7 +172,7 @@ class ToolTable(Placement):
     desired: _Desired = "initial"  # in that camera, as for the task
 
 
-class TrackTable(Table):
+class TrackTable(TaskTable):
     """Keep features where they are desired in one camera's image."""
 
     kind: Literal["track"] = "track"
@@ -163,7 +195,7 @@ class TrackTable(Table):
     target_timeout_s: Duration = 0.2  # with images, but none of the features found
 
 
-class FollowTable(Table):
+class FollowTable(TaskTable):
     """Keep a camera on the arm, or what the arm holds before a fixed one, at a desired pose."""
 
     kind: Literal["follow"]
@@ -187,7 +219,7 @@ class LengthTable(Table):
         return self
 
 
-class ReachTable(Table):
+class ReachTable(TaskTable):
     """Bring the camera to where the target looks as in an image taken before, along a plan."""
 
     kind: Literal["reach"]
@@ -214,6 +246,51 @@ class ReachTable(Table):
     target_timeout_s: Duration = 0.5  # with images, but the target lost
 
 
+class AdvanceTable(TaskTable):
+    """Move the camera, or what the arm holds before a fixed one, along an axis, without images."""
+
+    kind: Literal["advance"]
+    arm: Text  # which moves
+    camera: Text  # carried by the arm, or fixed
+    distance_m: Coordinate  # from where it is; negative for backwards
+    axis: Literal["x", "y", "z"] = "z"  # which way
+    frame: Literal["camera", "flange", "world"] = (
+        "camera"  # whose axis, as it is at the start; flange is the arm's last body
+    )
+    speed_m_s: Speed = 0.1  # at most
+    tolerance_m: Length = 2e-3  # distance from the end at which it is reached
+    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+
+    @field_validator("distance_m")
+    @classmethod
+    def _some(cls, distance_m: float) -> float:
+        if abs(distance_m) < 1e-4:
+            raise ValueError("a distance of at least 0.0001 m, either way")
+        return distance_m
+
+
+class SwitchTable(TaskTable):
+    """Switch an output of the driver, such as a gripper, while the arm stays where it is."""
+
+    kind: Literal["switch"]
+    arm: Text  # which stays
+    camera: Text  # of the other tasks
+    output: Text  # one of [outputs]
+    value: Annotated[float, Field(ge=0, le=1)]  # 0 is off or open, 1 is on or closed
+    wait_s: Duration = 0.5  # until it has done what it does
+    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+
+
+class OutputTable(Placement):
+    """An output of the driver, such as a gripper; its placement is in the arm's last body."""
+
+    arm: Text  # that carries it
+    model: Path | None = None  # MJCF of what it looks like; nothing is drawn if absent
+    reach_m: Length = (
+        0.02  # in simulation, closed it holds a target whose origin is so near, rigidly
+    )
+
+
 def _task_kind(value: Any) -> str | None:
     if isinstance(value, Table):
         return str(getattr(value, "kind", None))
@@ -223,7 +300,9 @@ def _task_kind(value: Any) -> str | None:
 Task = Annotated[
     Annotated[TrackTable, Tag("track")]
     | Annotated[FollowTable, Tag("follow")]
-    | Annotated[ReachTable, Tag("reach")],
+    | Annotated[ReachTable, Tag("reach")]
+    | Annotated[AdvanceTable, Tag("advance")]
+    | Annotated[SwitchTable, Tag("switch")],
     Discriminator(_task_kind),
 ]
 
@@ -255,6 +334,12 @@ class DriverTable(Table):
     model_config = ConfigDict(extra="allow")
 
     kind: Text  # a driver, or module:Class of your own; used where `--driver` names it
+    stamp_latency_s: dict[Name, Annotated[float, Field(ge=-0.1, le=2)]] = Field(
+        default_factory=dict, max_length=32
+    )  # by camera name: how much later than exposed its images are stamped; see `calibrate`
+    servo_lag_s: Annotated[float, Field(ge=0, le=1)] = (
+        0.0  # by which the joints follow their set-points; see `vergence calibrate --latency`
+    )
     cameras: dict[Name, Part] = Field(
         default_factory=dict, max_length=32
     )  # by camera name: a source of its images on this computer

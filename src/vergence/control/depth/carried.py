@@ -30,6 +30,15 @@ class CarriedSource:
 
     def update(self, exposure: MeasuredPoints) -> Depths:
         """Return the depths of the last exposure, seen from where the camera is now."""
+        return Depths(self.carry(exposure, np.full(len(exposure.points), np.nan)))
+
+    def carry(self, exposure: MeasuredPoints, measured_m: FloatArray) -> FloatArray:
+        """Return depths (M,), m: those that were measured, the others as `update` has them.
+
+        Args:
+            exposure: the image.
+            measured_m: depths (M,), NaN where there is none.
+        """
         depth = exposure.believed_m
         carried = np.full((len(depth), 3), np.nan)
         if self._last is not None:
@@ -37,6 +46,7 @@ class CarriedSource:
             carried = transform_points(se3_compose(exposure.T_camera_scene, se3_inverse(T)), points)
             known = np.isfinite(carried[:, 2])
             depth = in_front(np.where(known, carried[:, 2], depth), exposure.believed_m)
+        depth = np.where(np.isfinite(measured_m), measured_m, depth)
         seen = np.column_stack((exposure.points * depth[:, None], depth))
         self._last = exposure.T_camera_scene, np.where(exposure.found[:, None], seen, carried)
-        return Depths(depth)
+        return depth

@@ -1,6 +1,7 @@
 """Limits: constraint rows that the quadratic program keeps, hard or by priority."""
 
 from vergence.control.limits._rows import (
+    COLLISION,
     KIND_NAMES,
     RELAXED,
     SINGULARITY,
@@ -8,6 +9,7 @@ from vergence.control.limits._rows import (
     ConstraintSettings,
     pack_features,
 )
+from vergence.control.limits.collision import braked, braking_rows, collision_rows
 from vergence.control.limits.facing import facing_row
 from vergence.control.limits.limits import Limit, Limits
 from vergence.control.limits.occlusion import AXES, COLUMNS, HALF, MIDDLE, NO_SOLIDS, RADIUS
@@ -15,6 +17,7 @@ from vergence.control.limits.target_view import TargetView
 
 __all__ = [
     "AXES",
+    "COLLISION",
     "COLUMNS",
     "ConstraintSettings",
     "HALF",
@@ -28,6 +31,9 @@ __all__ = [
     "SINGULARITY",
     "TargetView",
     "VIEW",
+    "braked",
+    "braking_rows",
+    "collision_rows",
     "facing_row",
     "pack_features",
 ]

@@ -12,9 +12,9 @@ from vergence.features import interaction_matrix_points
 # Kinds of rows. The first three are what the arm can do: they are hard.
 KIND_NAMES = (
     "joint positions", "joint rates", "joint accelerations",
-    "view", "occlusion", "singularity", "joint margin",
+    "collision", "view", "occlusion", "singularity", "joint margin",
 )  # fmt: skip
-POSITION, RATE, ACCELERATION, VIEW, OCCLUSION, SINGULARITY, JOINT_MARGIN = range(7)
+POSITION, RATE, ACCELERATION, COLLISION, VIEW, OCCLUSION, SINGULARITY, JOINT_MARGIN = range(8)
 RELAXED = KIND_NAMES[3:]  # in the priority order that holds unless the user gives another
 X, Y, X_FLOW, Y_FLOW, DEPTH, X_SPREAD, Y_SPREAD = range(7)  # columns of `pack_features`
 

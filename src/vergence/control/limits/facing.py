@@ -5,8 +5,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control.limits._rows import DEPTH
-
-_FLAT = 0.01  # of the smaller extent: points as close as this to a plane are flat
+from vergence.geometry import FLAT
 
 
 @njit(cache=True, error_model="numpy")
@@ -45,7 +44,7 @@ def facing_row(
     if not np.isfinite(S).all():
         return none
     extent, axes = np.linalg.eigh(S)
-    if extent[1] <= 1e-12 * extent[2] or extent[0] > _FLAT * _FLAT * extent[1]:
+    if extent[1] <= 1e-12 * extent[2] or extent[0] > FLAT * FLAT * extent[1]:
         return none
     o, distance, h = np.empty(3), np.sqrt(np.sum(c * c)), 0.0
     for a in range(3):

@@ -10,7 +10,7 @@ from vergence.errors import InputError
 from vergence.parts import knob, part, slot
 from vergence.robot import Arm
 
-Relaxed = Literal["view", "occlusion", "singularity", "joint margin"]
+Relaxed = Literal["collision", "view", "occlusion", "singularity", "joint margin"]
 _Share = Annotated[float, Field(gt=0, le=1)]
 _Factor = Annotated[float, Field(ge=1, le=1e3)]
 
@@ -50,10 +50,12 @@ class Limits:
         1.0, "degrees", least=0, below=90
     )  # least angle at which a flat target is seen; a part of "view"
     clearance_m: float = knob(0.02, "m", least=0, upto=10)  # between sight lines and obstacles
-    manipulability_share: float = knob(
-        0.2, least=0, below=1
-    )  # of √det(J Jᵀ) at the start; yields where it alone holds the arm at rest
-    approach_rate_hz: float = knob(2.0, "1/s", above=0, upto=1e3)  # of the room left to a border
+    manipulability_share: float | None = knob(
+        None, least=0, below=1
+    )  # of √det(J Jᵀ) at the start: 0.2, or 0 on a plan; yields where it alone stops the arm
+    approach_rate_hz: float | None = knob(
+        None, "1/s", above=0, upto=1e3
+    )  # of the room left to a border: 2, or 8 on a plan
     depth_range: tuple[_Share, _Factor] | None = knob(None)  # bounds on true over believed depth
     own: tuple[Limit, ...] = slot("limit", (), many=True)  # a user's own, relaxed before all others
 

@@ -10,6 +10,7 @@ from vergence.control.objectives._tracking import (
     unpack_chain,
     unpack_tick,
 )
+from vergence.control.objectives.camera_velocity import CameraVelocity
 from vergence.control.objectives.image_based import ImageBased, InteractionModel
 from vergence.control.objectives.objective import (
     CameraState,
@@ -32,6 +33,7 @@ from vergence.control.objectives.posture import Posture
 __all__ = [
     "AXES",
     "CameraState",
+    "CameraVelocity",
     "ImageBased",
     "InteractionModel",
     "JointQuadratic",

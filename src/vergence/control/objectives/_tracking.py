@@ -12,6 +12,7 @@ from vergence.features.interaction import point_rows
 from vergence.robot import Chain
 from vergence.robot.manipulability import (
     camera_gradient,
+    determinant_slope,
     joint_rates,
     limit_penalty,
     measure_gradient,
@@ -61,7 +62,7 @@ class TrackingTick(NamedTuple):
     sigma: float  # smallest singular value of J, bounded from below
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def tracking_displacement(
     BtB: FloatArray, Bt_error: FloatArray, gains: TrackingGains, w: float, gradient: FloatArray
 ) -> FloatArray:
@@ -141,7 +142,7 @@ def image_model(features: FloatArray, focal_px: FloatArray) -> tuple[FloatArray,
     return error_px, B
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def image_square(
     features: FloatArray, focal_px: FloatArray, period: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -184,21 +185,19 @@ def pack_setup(setup: TrackingSetup) -> PackedSetup:
     joints = np.zeros((len(chain.position), 5, 4))
     joints[:, :3, :3], joints[:, :3, 3] = chain.rotation, chain.position
     joints[:n, 3, :3] = np.column_stack((setup.q_min, setup.q_max, setup.rate_max))
-    if len(chain.coupling):
-        joints[:-1, 4, :3] = chain.coupling
-    else:
-        joints[:-1, 4, :2] = np.column_stack((np.arange(n), np.ones(n)))
-    joints[:-1, 4, 3] = chain.sliding
+    joints[: len(chain.coupling), 4, :3] = chain.coupling
+    joints[:-1, 4, 3], joints[-1, 4, 3] = chain.sliding, len(chain.coupling)
     return PackedSetup(np.concatenate(weights), joints)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def unpack_chain(joints: FloatArray) -> Chain:
     """Read the chain back."""
-    return Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 4, 3], joints[:-1, 4, :3])
+    coupled = int(joints[-1, 4, 3])
+    return Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 4, 3], joints[:coupled, 4, :3])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def unpack_gains(w: FloatArray) -> TrackingGains:
     """Read the gains back."""
     return TrackingGains(w[0], w[9:15], w[1], w[15:21], w[21:27], w[2], w[3])
@@ -232,7 +231,8 @@ def optimal_tracking_tick(
     P, gradient_P = limit_penalty(q, q_min, q_max, penalty_k, per_joint)
     gradient = gains.avoiding
     if gains.S > 0.0:
-        gradient = camera_gradient(arm, measure_gradient(chain, arm, P, gradient_P))
+        slope = determinant_slope(chain, q, arm)
+        gradient = camera_gradient(arm, measure_gradient(arm, slope, P, gradient_P))
     BtB, Bt_error, Bt_drift = image_square(features, focal_px, gains.period)
     w = P * arm.det_JJt
     v_camera = tracking_displacement(BtB, Bt_error, gains, w, gradient)

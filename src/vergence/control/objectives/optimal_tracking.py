@@ -19,6 +19,7 @@ from vergence.parts import knob, part
 from vergence.robot import Arm
 from vergence.robot.manipulability import (
     camera_gradient,
+    determinant_slope,
     limit_penalty,
     measure_gradient,
     posture,
@@ -108,8 +109,9 @@ class OptimalTracking:
         arm: Arm = state.arm
         now = posture(arm.chain, state.q, _DAMPED_BELOW)
         per_joint = self.penalty == "per_joint"
-        P, slope = limit_penalty(state.q, arm.q_min, arm.q_max, self.penalty_k, per_joint)
-        gradient: FloatArray = camera_gradient(now, measure_gradient(arm.chain, now, P, slope))
+        P, slope_P = limit_penalty(state.q, arm.q_min, arm.q_max, self.penalty_k, per_joint)
+        slope = determinant_slope(arm.chain, state.q, now)
+        gradient: FloatArray = camera_gradient(now, measure_gradient(now, slope, P, slope_P))
         if state.A is not None:
             gradient = np.linalg.solve(state.A.T, gradient).astype(np.float64)
         return Avoidance(P * now.det_JJt, gradient)

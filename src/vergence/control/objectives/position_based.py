@@ -10,7 +10,7 @@ from vergence.control.moving_pose import MovingPose, moved, pose_difference
 from vergence.control.objectives._interpolator import interpolate
 from vergence.control.objectives._pose_goal import tip_goal_beside, tip_goal_of_holder
 from vergence.control.objectives.objective import CameraState, Quadratic
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.geometry import se3_compose
 from vergence.parts import knob, part
 from vergence.robot import Arm, forward_kinematics, jacobian
@@ -36,7 +36,9 @@ class PositionBased:
     def quadratic(self, state: CameraState) -> Quadratic:
         """Return the quadratic of ½ ‖v_tip - twist‖², at the image rate."""
         if state.target is None or state.T_camera_target is None:
-            raise InputError("position_based", "", "no pose of the target", "a task with a filter")
+            raise InputError(
+                "position_based", "", Absent("no pose of the target"), "a task with a filter"
+            )
         assert state.arm is not None
         assert state.q is not None
         assert state.mounting is not None
@@ -108,6 +110,11 @@ class PoseTrajectory:
     def planned(self) -> bool:
         """Whether there is a goal."""
         return self._goal is not None
+
+    def take_over(self, previous: "PoseTrajectory") -> None:
+        """Go on where another trajectory is."""
+        self._goal, self._reference = previous._goal, previous._reference
+        self._ahead = previous._ahead
 
     def aim(self, goal: MovingPose, q: FloatArray) -> None:
         """Take a new goal; the trajectory begins where the arm is, q (n,), if there is none."""

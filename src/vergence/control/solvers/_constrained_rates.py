@@ -9,8 +9,13 @@ from vergence.arrays import FloatArray, IntArray
 from vergence.control.limits._rows import KIND_NAMES, ConstraintSettings, constraint_rows
 from vergence.control.limits.occlusion import sight_rows
 from vergence.control.solvers._active_set import solve_ordered_qp
-from vergence.robot import Chain, forward_kinematics, manipulability
-from vergence.robot.manipulability import determinant_gradient
+from vergence.robot import Chain, forward_kinematics
+from vergence.robot.manipulability import (
+    determinant_slope,
+    limit_penalty,
+    measure_gradient,
+    posture,
+)
 from vergence.robot.positive_definite import invert_spd_any
 
 HARD_AND_BUILT_IN = len(KIND_NAMES)
@@ -89,8 +94,9 @@ def constrained_rates(
         avoidance: how good configurations are preferred.
     """
     n = len(q)
-    m = manipulability(chain, q, limits[0], limits[1], avoidance.penalty_k, True, 1e-3)
-    J = m.J_camera
+    arm = posture(chain, q, 1e-3)
+    P, slope_P = limit_penalty(q, limits[0], limits[1], avoidance.penalty_k, True)
+    slope, w, J = determinant_slope(chain, q, arm), P * arm.det_JJt, arm.J
     H, g = joint_objective(task.H, task.g, J, avoidance.damping)
     for i in range(n):
         g[i] += avoidance.damping * task.null_space_rates[i]
@@ -98,13 +104,13 @@ def constrained_rates(
         H += task.H_joints
         g += task.g_joints
     H_inverse, _ = invert_spd_any(H)
-    if avoidance.S > 0.0 and m.value > 0.0:
-        pull = avoidance.S * period * period / (2.0 * m.value * m.value) * m.gradient_q
+    if avoidance.S > 0.0 and w > 0.0:
+        pull = measure_gradient(arm, slope, P, slope_P)
+        pull *= avoidance.S * period * period / (2.0 * w * w)
         rate = H_inverse @ pull
         size = np.sqrt(np.sum(rate * rate))
         g += pull * min(1.0, avoidance.rate_max / max(size, 1e-300))
-    yoshikawa = np.sqrt(m.det_JJt)
-    slope = determinant_gradient(chain, m.J_axes, m.J_inverse.T.copy(), m.det_JJt)
+    yoshikawa = np.sqrt(arm.det_JJt)
     slope /= 2.0 * max(yoshikawa, 1e-9)
     J_camera = J if len(scene.A) == 0 else scene.A @ J
     C_sight, d_sight = np.empty((0, n)), np.empty(0)
@@ -137,7 +143,7 @@ def constrained_rates(
     solved = solution.solved and bool(np.isfinite(rates).all())
     if not solved:
         rates = velocity - np.minimum(np.maximum(velocity, -limits[3] * period), limits[3] * period)
-    return ConstrainedRates(rates, J @ rates, m.value, m.penalty, active, slack, solved)
+    return ConstrainedRates(rates, J @ rates, w, P, active, slack, solved)
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,15 +1,21 @@
 """The prioritised quadratic program: any objectives, served as well as the limits allow."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.control.limits import (
+    COLLISION,
     KIND_NAMES,
     NO_SOLIDS,
     SINGULARITY,
     VIEW,
     ConstraintSettings,
     Limits,
+    braked,
+    braking_rows,
+    collision_rows,
     facing_row,
 )
 from vergence.control.solvers._constrained_rates import (
@@ -22,13 +28,15 @@ from vergence.control.solvers._constrained_rates import (
 from vergence.control.solvers.solver import BoundSolver, Problem, Setting, Solution
 from vergence.errors import InputError
 from vergence.parts import knob, part
-from vergence.robot import manipulability_measure
+from vergence.robot import NearPairs, manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
+_MANIPULABILITY_SHARE, _APPROACH_RATE_HZ = 0.2, 2.0
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
 _DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _STALL_S = 0.5  # at rest, before the limit on manipulability yields
+_STOPS_HERE = 0.25  # of a pair's margin that braking may use up and need not be looked at
 _YIELD_RATE = 2.0  # 1/s, at which it does
 
 
@@ -64,7 +72,9 @@ class BoundProgram:
 
     def __init__(self, program: QuadraticProgram, setting: Setting) -> None:
         self._setting = setting
-        self._limits = setting.limits or Limits()
+        self._limits = limits = setting.limits or Limits()
+        share = limits.manipulability_share
+        self._manipulability_share = _MANIPULABILITY_SHARE if share is None else share
         self.names = self._limits.names
         self.settings = constraint_settings(setting, self._limits)
         self.view = self.settings.view_low, self.settings.view_high
@@ -75,6 +85,7 @@ class BoundProgram:
         )
         sees = "occlusion" in self._limits.order and not setting.mounting.is_fixed
         self._obstacles = setting.obstacles if sees else None
+        self._clearance = setting.clearance if "collision" in self._limits.order else None
         T = setting.mounting.T_tip_camera
         self._T_tip_camera = np.eye(4) if T is None else np.array(T)
         self._least_sine = float(np.sin(np.radians(self._limits.facing_deg)))
@@ -86,9 +97,9 @@ class BoundProgram:
         if not self._started:
             self._started = self._starts_at(problem.q)
         obstacles = NO_SOLIDS if self._obstacles is None else self._obstacles()
-        scene = Scene(
-            problem.features, obstacles, problem.A, self._T_tip_camera, *self._further_rows(problem)
-        )
+        near = None if self._clearance is None else self._clearance.near(problem.q)
+        rows = self._further_rows(problem, near)
+        scene = Scene(problem.features, obstacles, problem.A, self._T_tip_camera, *rows)
         answer = constrained_rates(
             self._setting.arm.chain,
             self._joint_limits,
@@ -99,10 +110,14 @@ class BoundProgram:
             scene,
             self._setting.period_s,
             self._with_depths(problem.depth_share),
-            self._avoidance,
+            self._avoidance._replace(
+                damping=max(self._avoidance.damping, problem.null_space_weight)
+            ),
         )  # fmt: skip
         self._yield_at_rest(answer)
-        return Solution(*answer)
+        if self._clearance is None or near is None:
+            return Solution(*answer)
+        return Solution(*answer, clearance=self._clearance.least(near))
 
     def _with_depths(self, share: float) -> ConstraintSettings:
         """Return the settings with bounds on the depth from its deviation, where that is known."""
@@ -133,16 +148,22 @@ class BoundProgram:
         """Take the manipulability to keep from a configuration, if it is known."""
         if q is None or "singularity" not in self._limits.order:
             return q is not None
-        least = self._limits.manipulability_share * manipulability_measure(
-            self._setting.arm.jacobian(q)
-        )
+        measure = manipulability_measure(self._setting.arm.jacobian(q))
+        least = self._manipulability_share * measure
         self.settings = self.settings._replace(manipulability_min=least)
         return True
 
-    def _further_rows(self, problem: Problem) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the rows C (r, n), d (r,) and kinds (r,) of a flat target and a user's limits."""
+    def _further_rows(
+        self, problem: Problem, near: NearPairs | None
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the rows C (r, n), d (r,) and kinds (r,) of what is not in `constraint_rows`.
+
+        They are those of a flat target, of pairs that must not collide, and of a user's limits.
+        """
         arm, period, limits = self._setting.arm, self._setting.period_s, self._limits
         rows = [(*self._facing(problem), VIEW)]
+        if near is not None:
+            rows += [(*row, COLLISION) for row in self._collision(problem, near)]
         for k, limit in enumerate(limits.own, start=len(KIND_NAMES)):
             rows.append((*limit.rows(arm, problem.q, problem.velocity, period), k))
         C = np.ascontiguousarray(np.vstack([row[0] for row in rows]), dtype=np.float64)
@@ -150,11 +171,25 @@ class BoundProgram:
         kind = np.repeat([row[2] for row in rows], [len(row[1]) for row in rows])
         return C, d, kind
 
+    def _collision(
+        self, problem: Problem, near: NearPairs
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield the rows of pairs near now, and of those near where the arm would stop."""
+        rate, a = self.settings.approach_rate, self._setting.arm.acceleration_max
+        yield collision_rows(near, rate)
+        end = braked(problem.q, problem.velocity, a)
+        if self._clearance is None:
+            return
+        nearer = self._clearance.reach @ np.abs(end - problem.q)
+        if (nearer > _STOPS_HERE * self._clearance.margin).any():
+            stopped = self._clearance.near(end)
+            yield braking_rows(stopped, rate, problem.velocity, a, self._setting.period_s)
+
     def _facing(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
         features = problem.features if "view" in self._limits.order else problem.features[:0]
         J = self._setting.arm.jacobian(problem.q)
         J_camera = problem.A @ J if len(problem.A) else J
-        rate = self._limits.approach_rate_hz
+        rate = self.settings.approach_rate
         row: tuple[FloatArray, FloatArray] = facing_row(features, J_camera, self._least_sine, rate)
         return row
 
@@ -171,15 +206,16 @@ def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:
     if not view_px < half:
         allowed = f"from 0 to less than half the image, {half:g}"
         raise InputError("Limits", "view_margin_px", view_px, allowed)
-    if not limits.approach_rate_hz * setting.period_s <= 1:
+    rate = _APPROACH_RATE_HZ if limits.approach_rate_hz is None else limits.approach_rate_hz
+    if not rate * setting.period_s <= 1:
         # Faster, and one command would use up more room than there is.
         allowed = f"above 0, up to one command's share, {1 / setting.period_s:g}"
-        raise InputError("Limits", "approach_rate_hz", limits.approach_rate_hz, allowed)
+        raise InputError("Limits", "approach_rate_hz", rate, allowed)
     x_min, x_max, y_min, y_max = camera.rectangle(view_px + 0.5)
     low, high = np.array([x_min, y_min]), np.array([x_max, y_max])
     joint_margin = _JOINT_MARGIN if limits.joint_margin is None else limits.joint_margin
     return ConstraintSettings(
-        limits.approach_rate_hz,
+        rate,
         joint_margin if "joint margin" in order else 0.0,
         low if "view" in order else np.full(2, -np.inf),
         high if "view" in order else np.full(2, np.inf),

@@ -1,7 +1,8 @@
 """What a servo asks of a solver: joint rates for a quadratic in the twist of the arm's tip."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.control.limits import KIND_NAMES, Limits
 from vergence.control.mounting import CameraMounting
-from vergence.robot import Arm
+from vergence.robot import Arm, Clearance
 from vergence.signals import OutcomeKind
 
 Obstacles: TypeAlias = Callable[[], FloatArray]  # what may hide the features now, (K, 16)
@@ -27,6 +28,7 @@ class Problem(NamedTuple):
     H_joints: FloatArray  # (n, n) of a quadratic in the joint rates; (0, 0) for none
     g_joints: FloatArray  # (n,); (0,) for none
     A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
+    null_space_weight: float = 0.0  # μ of ‖q̇ - q̇_null‖² at least
     depth_share: float = float("nan")  # largest deviation of a depth, a share; NaN if unknown
 
 
@@ -41,6 +43,7 @@ class Solution(NamedTuple):
     slack: FloatArray  # (K,) by kind: the largest slack, in the row's own unit
     solved: bool
     fault: tuple[OutcomeKind, str] | None = None  # why the servo cannot go on
+    clearance: Mapping[str, float] = MappingProxyType({})  # m, least distance to each kind of thing
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,7 @@ class Setting:
         obstacles: gives what may come between camera and features; None for nothing.
         depth_range: bounds on true over believed depth, where the limits give none.
         start: joint positions at the start, (n,); those of the first tick if None.
+        clearance: gives the distances between what must not touch; None for nothing.
     """
 
     arm: Arm
@@ -64,6 +68,7 @@ class Setting:
     obstacles: Obstacles | None = None
     depth_range: tuple[float, float] = (0.5, 2.0)
     start: FloatArray | None = None
+    clearance: Clearance | None = None
 
 
 class BoundSolver(Protocol):

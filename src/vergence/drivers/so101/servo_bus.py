@@ -13,6 +13,8 @@ _TORQUE, _STATE, _STATE_LENGTH = 40, 56, 10
 _SPEED_SIGN = 1 << 15  # of the speed register
 _QUIET_S = 0.01  # after which no answer is on its way any more
 _FIND_S = 1.0  # for a servo to answer at first
+_GENTLE = 1500  # ticks/s at which other servos move: a gripper closes within a second
+_ATTEMPTS = 3
 _MODEL = 777  # of an STS3215
 
 
@@ -35,14 +37,17 @@ class ServoBus:
         sdk: Feetech's package.
         port: serial port.
         baud: its rate.
-        ids: of the servos.
+        ids: of the servos that are read and written together.
+        others: ids of servos that are sent somewhere now and then, such as a gripper's.
 
     Raises:
         DriverSilent: if the port cannot be opened, or a servo does not answer.
     """
 
-    def __init__(self, sdk: Any, port: str, baud: int, ids: tuple[int, ...]) -> None:
-        self._ids, self._success, self._name = ids, sdk.COMM_SUCCESS, port
+    def __init__(
+        self, sdk: Any, port: str, baud: int, ids: tuple[int, ...], others: tuple[int, ...] = ()
+    ) -> None:
+        self._ids, self._others, self._success, self._name = ids, others, sdk.COMM_SUCCESS, port
         self._late = False  # whether an answer may still be on its way
         self._port = sdk.PortHandler(port)
         self._port.baudrate = baud
@@ -88,6 +93,25 @@ class ServoBus:
         finally:
             self._servos.groupSyncWrite.clearParam()
 
+    def send_other(self, number: int, tick: int) -> None:
+        """Send one of the other servos to a position.
+
+        Raises:
+            DriverSilent: if it does not answer.
+        """
+        try:
+            for _ in range(_ATTEMPTS):  # an answer may get lost
+                self._drop_late_answers()
+                result, _ = self._servos.WritePosEx(number, tick, _GENTLE, 0)
+                if result == self._success:
+                    result, _ = self._servos.write1ByteTxRx(number, _TORQUE, 1)
+                if result == self._success:
+                    return
+                self._late = True
+        except _GONE as error:
+            raise DriverSilent(f"the port {self._name} is gone: check its cable") from error
+        raise DriverSilent(f"servo {number} does not answer on {self._name}: check its cable")
+
     def hold(self) -> None:
         """Let every servo hold its place."""
         for number in self._ids:
@@ -105,7 +129,7 @@ class ServoBus:
         self._port.ser.reset_input_buffer()
 
     def _find(self) -> None:
-        for number in self._ids:
+        for number in (*self._ids, *self._others):
             model, result, _ = self._ping(number)
             if result != self._success:
                 self._port.closePort()

@@ -1,5 +1,6 @@
 """The settings of an arm of Feetech servos."""
 
+from dataclasses import field
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -27,6 +28,9 @@ class So101:
     ids: tuple[_Id, ...] = ()  # of the servos, from the base outwards; 1, 2, 3 … if absent
     zero_ticks: tuple[_Tick, ...] = ()  # 0 to 4095 where each joint is at its zero; 2048 if absent
     signs: tuple[_Sign, ...] = ()  # -1 of a servo that turns against the model; 1 if absent
+    outputs: dict[str, tuple[_Id, _Tick, _Tick]] = field(
+        default_factory=dict
+    )  # by name: a servo such as the gripper's, and its ticks at 0 (open) and at 1 (closed)
     rate_hz: float = knob(100.0, "Hz", least=10.0, upto=200.0)  # of the bus, read and written
     hottest_deg_c: float = knob(70.0, "°C", least=30.0, upto=90.0)  # above it the arm is held
     timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)  # without an answer, it is silent
@@ -42,7 +46,13 @@ class So101:
                 allowed = f"{n}, one a joint of {name}"
                 raise InputError(equipment.source, f"driver.{key}", f"{len(given)} values", allowed)
         sdk = optional_package("so101", "scservo_sdk", "so101")
-        bus = ServoBus(sdk, self.address, self.baud, self.ids or tuple(range(1, n + 1)))
+        ids = self.ids or tuple(range(1, n + 1))
+        for output, (number, *_) in self.outputs.items():
+            if number in ids:
+                allowed = "a servo that is no joint of the arm"
+                raise InputError(equipment.source, f"driver.outputs.{output}", number, allowed)
+        others = tuple(number for number, *_ in self.outputs.values())
+        bus = ServoBus(sdk, self.address, self.baud, ids, others)
         try:
             link = So101Link(bus, self)
             return ArmDriver(equipment, name, link, 2.0 * self.timeout_s)  # the link tells more

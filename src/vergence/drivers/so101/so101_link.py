@@ -50,6 +50,16 @@ class So101Link:
         ticks = self._zero + self._sign * setpoint.position / _TICK
         self._bus.write(np.clip(np.rint(ticks), 0, 4095).astype(np.int64))
 
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the servos beside the arm's joints."""
+        return tuple(self._settings.outputs)
+
+    def set_output(self, name: str, value: float) -> None:
+        """Send a servo to a position between its ticks at 0 and those at 1."""
+        number, at_zero, at_one = self._settings.outputs[name]
+        self._bus.send_other(number, round(at_zero + value * (at_one - at_zero)))
+
     def close(self) -> None:
         """Let go of the bus; the servos hold their place, or the arm would fall."""
         self._bus.close()

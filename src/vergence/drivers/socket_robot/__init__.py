@@ -2,6 +2,7 @@
 
 from vergence.drivers.socket_robot.link import Link, LinkBrokenError, connect
 from vergence.drivers.socket_robot.messages import (
+    Answer,
     Said,
     decode,
     encode,
@@ -15,6 +16,7 @@ from vergence.drivers.socket_robot.socket_driver import SocketDriver
 from vergence.drivers.socket_robot.socket_robot import SocketRobot
 
 __all__ = [
+    "Answer",
     "Link",
     "LinkBrokenError",
     "Said",

@@ -10,10 +10,15 @@ from vergence.errors import DriverSilent
 
 _LENGTH = struct.Struct("!I")
 _CHUNK = 1 << 16
+# select waits to the microsecond, where poll rounds up to milliseconds, but it only takes
+# descriptors below this: a process with many files and sockets has others.
+_SELECT_BELOW = 1024
 
 
 class LinkBrokenError(Exception):
     """The other side hung up, or sent something that is not a message; the text says which."""
+
+    refused = False  # whether it is the other side that says so
 
 
 class Link:
@@ -26,7 +31,8 @@ class Link:
 
     def __init__(self, connection: socket.socket, longest: int) -> None:
         connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if connection.family != socket.AF_UNIX:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._longest = connection, longest
         self._received = bytearray()
 
@@ -50,10 +56,11 @@ class Link:
         deadline = monotonic() + timeout_s
         left = memoryview(b"".join(_LENGTH.pack(len(each)) + each for each in messages))
         while left:
-            if not self._ready(deadline, reading=False):
-                raise LinkBrokenError(f"has read nothing for {timeout_s:g} s")
             try:
                 left = left[self._connection.send(left) :]
+            except BlockingIOError:
+                if not self._ready(deadline, reading=False):
+                    raise LinkBrokenError(f"has read nothing for {timeout_s:g} s") from None
             except OSError as error:
                 raise LinkBrokenError(f"has hung up ({error.strerror})") from error
 
@@ -76,13 +83,19 @@ class Link:
         return message
 
     def _ready(self, deadline: float, reading: bool) -> bool:
-        this = [self._connection]
-        left = max(deadline - monotonic(), 0.0)
+        this = self._connection.fileno()
+        if this < 0:  # closed by another thread
+            raise LinkBrokenError("is closed")
+        left_s = max(deadline - monotonic(), 0.0)
         try:
-            readable, writable, _ = select.select(this * reading, this * (not reading), [], left)
-        except (OSError, ValueError) as error:  # closed by another thread
+            if this >= _SELECT_BELOW:
+                poll = select.poll()
+                poll.register(this, select.POLLIN if reading else select.POLLOUT)
+                return bool(poll.poll(1e3 * left_s))
+            ready = select.select([this] * reading, [this] * (not reading), [], left_s)
+        except OSError as error:
             raise LinkBrokenError("is closed") from error
-        return bool(readable or writable)
+        return any(ready)
 
 
 def connect(address: tuple[str, int], longest: int, within_s: float = 30.0) -> Link:

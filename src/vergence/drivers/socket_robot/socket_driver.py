@@ -26,21 +26,32 @@ class SocketDriver:
         link: to the robot.
         equipment: of the cell; cameras without a source are the robot's.
         timeout_s: how long the robot may say nothing.
+        peer: what is at the other end of the link, for messages.
+        rate_is_known: whether `equipment` has the robot's own rate, which then needs no check.
 
     Raises:
         DriverSilent: from every method, within `timeout_s`, if the robot says nothing, hangs up,
             refuses, or says what cannot be understood.
     """
 
-    def __init__(self, link: Link, equipment: Equipment, timeout_s: float = 2.0) -> None:
+    def __init__(
+        self,
+        link: Link,
+        equipment: Equipment,
+        timeout_s: float = 2.0,
+        peer: str = "the robot",
+        rate_is_known: bool = False,
+    ) -> None:
         self.arms, self.cameras = equipment.arms, equipment.cameras
         self.inner_rate_hz = equipment.inner_rate_hz
-        self._timeout_s = timeout_s
+        self._timeout_s, self._peer = timeout_s, peer
         self._history = {name: JointHistory() for name in self.arms}
         self._frames: list[Frame] = []
         self._robots: dict[str, RobotState] = {}  # of the arms that report it
+        self.outputs: tuple[str, ...] = ()  # names of those that the robot has
+        self._to_set: dict[str, float] = {}  # outputs, with the next answer
         self._first = 0, 0.0  # period and time of the first message
-        self._rate_is_known = False
+        self._rate_is_known = rate_is_known
         self._period, self._time = 0, 0.0
         self._clock: ControllerClock | None = None
         self._link = link
@@ -55,45 +66,87 @@ class SocketDriver:
     def read(self) -> Sample:
         """Return joints as the robot said last, and the images since the last call."""
         frames, self._frames = self._frames, []
-        frames.extend(self._local.frames(self._joints_at))
+        frames.extend(self._local.frames(self._joints_at, self._time))
         return Sample(self._time, self._joints, tuple(frames), self._robots)
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
         """Send set-points and wait for the robot's next period: its clock is the loop's."""
         told = {n: [s.position.tolist(), s.velocity.tolist()] for n, s in setpoints.items()}
-        self._send({"period": self._period, "setpoints": told})
+        self._send(self._answer(told))
         self._receive()
+
+    def set_output(self, name: str, value: float) -> None:
+        """Set an output of the robot with the next set-points."""
+        self._to_set[name] = value
 
     def close(self) -> None:
         """Let go; the robot's watchdog stops the arm if it still moves."""
         self._local.close()
         self._link.close()
 
+    def _answer(self, setpoints: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the answer to the last period: set-points, and the outputs to be set."""
+        outputs, self._to_set = self._to_set, {}
+        answer = {"period": self._period, "setpoints": setpoints}
+        return answer | {"outputs": outputs} if outputs else answer
+
     def _send(self, words: dict[str, Any]) -> None:
         try:
             self._link.send([encode(words)], self._timeout_s)
         except LinkBrokenError as error:
-            raise DriverSilent(f"the robot {error}") from error
+            raise self._silent(self._refusal() or error) from error
+
+    def _refusal(self) -> LinkBrokenError | None:
+        """Return why a robot that has hung up refuses, if it said so before."""
+        while True:
+            try:
+                message = self._link.receive(0.0)
+            except LinkBrokenError:
+                return None
+            if message is None:
+                return None
+            try:
+                read_said(message, self.arms)
+            except LinkBrokenError as error:
+                if error.refused:
+                    return error
 
     def _receive(self) -> None:
-        """Take joints, states and images of one period."""
+        """Wait for the joints, states and images of one period."""
         deadline = monotonic() + self._timeout_s
         try:
-            said = read_said(self._next(deadline), self.arms)
-            self._period, self._time = said.period, said.time
-            self._joints, self._robots = said.joints, said.robots
-            self._note()
-            for about in said.images:
-                block = self._next(deadline)
-                camera, exposed, image = read_image(about, block, self.cameras)
-                self._frames.append(Frame(camera, exposed, image, self._joints_at(exposed)))
+            self._take(self._next(deadline), deadline)
         except LinkBrokenError as error:
-            raise DriverSilent(f"the robot {error}") from error
+            raise self._silent(error) from error
+
+    def _receive_what_came(self) -> None:
+        """Take the periods that are here already, without waiting."""
+        deadline = monotonic() + self._timeout_s
+        try:
+            while (message := self._link.receive(0.0)) is not None:
+                self._take(message, deadline)
+        except LinkBrokenError as error:
+            raise self._silent(error) from error
+
+    def _take(self, message: bytes, deadline: float) -> None:
+        """Take a period; its images are still to come."""
+        said = read_said(message, self.arms)
+        self._period, self._time = said.period, said.time
+        self._joints, self._robots, self.outputs = said.joints, said.robots, said.outputs
+        self._note()
+        for about in said.images:
+            block = self._next(deadline)
+            camera, exposed, image = read_image(about, block, self.cameras)
+            self._frames.append(Frame(camera, exposed, image, self._joints_at(exposed)))
+
+    def _silent(self, error: LinkBrokenError) -> DriverSilent:
+        """Return what a broken link means."""
+        return DriverSilent(f"{self._peer} {error}")
 
     def _next(self, deadline: float) -> bytes:
         message = self._link.receive(max(deadline - monotonic(), 0.0))
         if message is None:
-            raise DriverSilent(f"the robot said nothing for {self._timeout_s:g} s")
+            raise DriverSilent(f"{self._peer} said nothing for {self._timeout_s:g} s")
         return message
 
     def _note(self) -> None:

@@ -1,16 +1,29 @@
 """The settings of a robot of Universal Robots."""
 
-from typing import Literal
+import sys
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from vergence.drivers.arm_driver import ArmDriver
+from pydantic import StringConstraints
+
+from vergence.drivers import bridges
+from vergence.drivers.bridge_driver import BridgeDriver
+from vergence.drivers.bridge_process import BridgeProcess, BridgeProgram
 from vergence.drivers.equipment import Equipment
 from vergence.drivers.ur.dashboard import check_ready
-from vergence.drivers.ur.ur_link import UrLink
 from vergence.optional_package import optional_package
 from vergence.parts import knob, part
+from vergence.robot import Arm
 from vergence.runtime.driver import Driver
 
+_DigitalOutput = Annotated[
+    str, StringConstraints(pattern=r"^((standard|configurable) [0-7]|tool [01])$")
+]
 _JOINTS = 6
+_INSTALL = "pip install 'vergence[ur]'"
+_PEER = "ur_rtde, which holds the connection to the robot,"
+_CONNECT_S = 30.0  # for its control program to start
 
 
 @part("driver", "ur")
@@ -29,6 +42,9 @@ class Ur:
         10.0, "Hz", least=2.0, upto=100.0
     )  # the robot stops if set-points come less often
     timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)  # the robot's clock may stand so long
+    outputs: dict[str, _DigitalOutput] = field(
+        default_factory=dict
+    )  # by name: standard 0 to 7, configurable 0 to 7, tool 0 or 1
 
     def open(self, equipment: Equipment) -> Driver:
         """Connect to the controller; nothing moves before the first set-point."""
@@ -36,9 +52,29 @@ class Ur:
         equipment.check_sources("ur")
         optional_package("ur", "rtde_control", "ur")
         check_ready(self.address)
-        link = UrLink(self, equipment.arms[name])
+        settings = self._settings(name, equipment.arms[name])
+        program = BridgeProgram(Path(bridges.__file__).parent, "ur", "ur_rtde", _INSTALL)
+        place = equipment.source, "driver"
+        bridge = BridgeProcess(program, sys.executable, place, settings, _CONNECT_S)
+        gain = self.position_gain if self.command == "speedj" else None
         try:
-            return ArmDriver(equipment, name, link, self.timeout_s)
+            return BridgeDriver(bridge, _PEER, equipment, name, self.timeout_s, gain)
         except BaseException:
-            link.close()
+            bridge.close()
             raise
+
+    def _settings(self, name: str, arm: Arm) -> dict[str, Any]:
+        """Return what the bridge has to know."""
+        return {
+            "arm": name,
+            "acceleration_max": arm.acceleration_max.tolist(),
+            "rate_max": arm.rate_max.tolist(),
+            "address": self.address,
+            "command": self.command,
+            "rate_hz": self.rate_hz,
+            "lookahead_s": self.lookahead_s,
+            "servo_gain": self.servo_gain,
+            "watchdog_hz": self.watchdog_hz,
+            "timeout_s": self.timeout_s,
+            "outputs": self.outputs,
+        }

@@ -7,6 +7,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.control import Law
 from vergence.planning import FixedReference
+from vergence.robot import Clearance
 from vergence.runtime import Loop, Run, RunInfo, RunRecorder, Timeouts
 from vergence.signals import Reference
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
@@ -23,6 +24,7 @@ class KinematicRun:
     duration_s: float
     noise_px: float = 0.0  # standard deviation on each coordinate
     timeouts: Timeouts = field(default_factory=Timeouts)
+    clearance: Clearance | None = None  # what the arm must keep clear of; nothing if None
 
     def noise(self) -> np.random.Generator:
         """Return what draws the noise."""
@@ -41,6 +43,7 @@ class KinematicRun:
             outer_rate_hz=self.cell.rate_hz,
             listeners=[recorder],
             timeouts=self.timeouts,
+            clearance=self.clearance,
         )
         recorder.close(loop.run(self.duration_s), {})
         return recorder.run()

@@ -1,7 +1,8 @@
 """The way to a photograph: recognise it, plan, follow the plan, look again, arrive."""
 
-from vergence.planning.approach.approach import Approach, Plan
+from vergence.planning.approach.approach import Approach
 from vergence.planning.approach.goal import ApproachSettings, GoalImage, KnownLength
+from vergence.planning.approach.search import Plan
 from vergence.planning.approach.worker import InlineWorker, ThreadWorker, Worker
 
 __all__ = [

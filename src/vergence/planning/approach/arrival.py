@@ -1,4 +1,4 @@
-"""The end of the way: the photograph itself is what the tracker compares the images with."""
+"""The end of the path: the photograph itself is what the tracker compares the images with."""
 
 import numpy as np
 
@@ -15,6 +15,7 @@ _POINTS = 48
 _FEWEST = 8  # of them that have to be found
 _APART_PX = 16.0
 _BORDER_PX = 40.0
+_VAGUE_PX = 0.5  # stated deviation from which a point tells nothing this close to the goal
 _FLOOR_PX = 0.03  # what a measured place may be off beside its stated deviation
 _REST_S, _REST = 0.4, 0.03  # in which the camera must not move more than this share of a tolerance
 
@@ -42,7 +43,7 @@ class GoalPoints:
 
     def shift_px(self, T_goal_camera: FloatArray) -> float:
         """Return how far the points are from their places, from a pose of the camera, median."""
-        seen = points_in(T_goal_camera, self._points_goal())
+        seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
         if (seen[:, 2] <= 0).any():
             return float("inf")
         shift = self.goal.camera.project(seen) - self.points_px
@@ -60,11 +61,14 @@ class GoalPoints:
         """
         predicted = None
         if T_goal_camera is not None:
-            seen = points_in(T_goal_camera, self._points_goal())
+            seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
             if (seen[:, 2] <= 0).any():
                 return None
             predicted = self.goal.camera.project(seen)
         tracks = self._tracker.track(image, predicted)
+        variance = np.trace(tracks.covariance_px, axis1=1, axis2=2) / 2.0
+        vague = np.flatnonzero(tracks.found & (variance > _VAGUE_PX**2))
+        tracks = _without(tracks, vague, "its place is not known well enough")
         if tracks.found.sum() < max(_FEWEST, len(tracks.found) // 3):
             return None
         found, camera = tracks.found, self.goal.camera
@@ -72,11 +76,14 @@ class GoalPoints:
         covariance = camera.normalize_covariance(
             tracks.covariance_px[found] + _FLOOR_PX**2 * np.eye(2), points
         )
-        displacement = fit_displacement(points, covariance, self._points_goal()[found])
+        # At one depth: errors of single depths would pass for relief, which tells a motion aside
+        # from a turn, and what is left would seem to be known better than it is.
+        flat = self._points_goal(np.full(len(found), np.median(self._depth_m)))
+        displacement = fit_displacement(points, covariance, flat[found])
         if displacement is None:
             return None
         at_odds = np.flatnonzero(found)[~displacement.agrees]
-        tracks = _without(tracks, at_odds)
+        tracks = _without(tracks, at_odds, "disagrees with the other points")
         self._seen = [(t, d) for t, d in self._seen if t >= time - _REST_S] + [(time, displacement)]
         return tracks
 
@@ -95,27 +102,32 @@ class GoalPoints:
         return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
 
     def reference(self, time: float) -> Reference:
-        """Return the points as the photograph shows them."""
+        """Return the points as the photograph shows them, at one depth, as they are judged.
+
+        With the errors of single depths for relief the law can drive the camera away, slowly, along
+        a motion aside with a turn against it that hardly changes the image.
+        """
+        depth_m = np.full(len(self.points_px), np.median(self._depth_m))
         return Reference(
             time,
             self.points_px,
             velocity_px=np.zeros_like(self.points_px),
-            depth_m=self._depth_m,
-            desired_depth_m=self._depth_m,
+            depth_m=depth_m,
+            desired_depth_m=depth_m,
         )
 
-    def _points_goal(self) -> FloatArray:
+    def _points_goal(self, depth_m: FloatArray) -> FloatArray:
         points = self.goal.camera.normalize(self.points_px)
         rays: FloatArray = np.column_stack((points, np.ones(len(points))))
-        return rays * self._depth_m[:, None]
+        return rays * depth_m[:, None]
 
 
-def _without(tracks: Tracks, chosen: IntArray) -> Tracks:
-    """Return tracks without points that disagree with the others, as those on something hidden."""
+def _without(tracks: Tracks, chosen: IntArray, why: str) -> Tracks:
+    """Return tracks without some points, such as those on something hidden."""
     found, reasons = tracks.found.copy(), list(tracks.reasons)
     found[chosen] = False
     for number in chosen:
-        reasons[number] = "disagrees with the other points"
+        reasons[number] = why
     return tracks._replace(found=found, reasons=tuple(reasons))
 
 

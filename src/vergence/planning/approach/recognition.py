@@ -73,11 +73,11 @@ class Recognition:
     def depth_deviation(self) -> float:
         """Deviation of the scale: of the goal's place along its way, relative to that."""
         T, first = self.fit.T_world_goal, self.images[0].T_world_camera
-        way = T[:3, 3] - first[:3, 3]
-        length = float(np.linalg.norm(way))
+        shift = T[:3, 3] - first[:3, 3]
+        length = float(np.linalg.norm(shift))
         if length < 1e-6:
             return self.prior.log_deviation
-        u = way / length
+        u = shift / length
         return float(np.sqrt(u @ self.fit.covariance[:3, :3] @ u)) / length
 
 

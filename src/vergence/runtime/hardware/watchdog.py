@@ -66,7 +66,7 @@ class Watchdog:
         self._wanted = Setpoint(ahead, self._wanted.velocity)
         return out
 
-    def _rates(self, wanted: Setpoint) -> FloatArray:
+    def _rates(self, desired: Setpoint) -> FloatArray:
         """Return rates that keep the arm on the set-point, or bring it there as it can brake."""
-        gap = wanted.position - self._dt * wanted.velocity - self._guard.position
-        return wanted.velocity + closing_rates(gap, self._limits, self._dt)
+        gap = desired.position - self._dt * desired.velocity - self._guard.position
+        return desired.velocity + closing_rates(gap, self._limits, self._dt)

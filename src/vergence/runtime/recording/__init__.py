@@ -17,7 +17,8 @@ Topics of a recording, X being an arm or a camera; times are seconds since the s
 Two metadata records frame them: `vergence` (version, cell file, limits, cameras, seed), `outcome`.
 """
 
+from vergence.runtime.recording.outcome_json import outcome_json
 from vergence.runtime.recording.recorder import Recorder
 from vergence.runtime.recording.recording import Recording
 
-__all__ = ["Recorder", "Recording"]
+__all__ = ["Recorder", "Recording", "outcome_json"]

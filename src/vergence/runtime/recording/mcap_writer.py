@@ -12,6 +12,7 @@ from vergence.places import CELL, RECORDING
 from vergence.runtime.json_numbers import finite
 from vergence.runtime.recording import messages, streams
 from vergence.runtime.recording.mcap_file import McapFile
+from vergence.runtime.recording.outcome_json import outcome_json
 from vergence.runtime.results import arm_row, camera_row, images_of, target_row
 from vergence.runtime.run_info import RunInfo
 from vergence.runtime.tick import TickRecord
@@ -66,13 +67,13 @@ class McapWriter:
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Record the end and close the file; the summary also says it where the file is cut."""
-        kind, reason, values = outcome.kind.value, outcome.reason, finite(summary)
-        end = {"kind": kind, "reason": reason, "time": outcome.time}
+        end, values = outcome_json(outcome), finite(summary)
         result = {"cell": self._info.cell, "outcome": end, "summary": values}
         text = json.dumps(result, indent=2) + "\n"
         try:
-            words = {"kind": kind, "reason": reason, "time": repr(outcome.time)}
-            self._file.metadata("outcome", {**words, "summary": json.dumps(values)})
+            words = {"kind": end["kind"], "reason": end["reason"], "time": repr(outcome.time)}
+            tasks = {"tasks": json.dumps(end["tasks"])} if outcome.tasks else {}
+            self._file.metadata("outcome", {**words, **tasks, "summary": json.dumps(values)})
             self._file.close()
         finally:
             (self._folder / SUMMARY).write_text(text, encoding="utf-8")

@@ -15,6 +15,7 @@ from vergence.places import find_recording
 from vergence.runtime.recording import streams, wire
 from vergence.runtime.recording.checked_messages import checked_messages
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
+from vergence.runtime.recording.outcome_json import read_outcome
 from vergence.runtime.recording.streams import row_of
 from vergence.runtime.results import ArmTrace, CameraTrace, Columns, Event, Run, TargetTrace
 from vergence.runtime.results.columns import Table
@@ -184,11 +185,11 @@ def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, Any]]
     try:
         if end is None:
             return None, {}
-        outcome = Outcome(OutcomeKind(end["kind"]), end["reason"], float(end["time"]))
+        outcome = read_outcome(end, end.get("tasks", "[]"))
         summary = _SUMMARY.validate_json(end["summary"])
     except (KeyError, ValueError):
         return None, {}
-    return (outcome, summary) if 0 <= outcome.time < 1e9 else (None, {})
+    return outcome, summary
 
 
 def _cut_off(time: float) -> Outcome:

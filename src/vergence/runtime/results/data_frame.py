@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vergence.arrays import pandas_or_error
+from vergence.arrays import BoolArray, IntArray, pandas_or_error
 from vergence.errors import InputError, nearest
 from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace
 
@@ -28,16 +28,32 @@ def data_frame(run: "Run", of: str | None) -> "pd.DataFrame":
             raise InputError("to_frame", "of", of, nearest(of, traces))
         trace = traces[of]
         return pd.DataFrame({"time": trace.time, **dict(_columns(trace, _joints(run, of)))})
-    table = pd.DataFrame({"time": run.times})
-    for name, trace in traces.items():
-        ticks = trace.time if isinstance(trace, ArmTrace) else trace.received
-        columns = {
-            f"{name}.{column}": values
-            for column, values in _columns(trace, _joints(run, name), matrices=False)
-        }
-        part = pd.DataFrame({"time": ticks, **columns})
-        table = table.merge(part.drop_duplicates("time", keep="last"), on="time", how="left")
+    return pd.DataFrame(tick_columns(run))
+
+
+def tick_columns(run: "Run") -> dict[str, Any]:
+    """Return all but matrices with a value a tick, by names such as ``puma.position.joint1``.
+
+    What came with an image has its value at the tick in which the loop had the image, and is not
+    known at the others.
+    """
+    table: dict[str, Any] = {"time": run.times}
+    for name, trace in _traces(run).items():
+        came = trace.time if isinstance(trace, ArmTrace) else trace.received
+        last = np.searchsorted(came, run.times, side="right") - 1
+        known = (last >= 0) & (np.append(came, np.nan)[last] == run.times)
+        for column, values in _columns(trace, _joints(run, name), matrices=False):
+            table[f"{name}.{column}"] = _at(values, last, known)
     return table
+
+
+def _at(values: Any, rows: IntArray, known: BoolArray) -> Any:
+    """Return the values at some rows, NaN where they are not known."""
+    if known.all():
+        return [values[row] for row in rows] if isinstance(values, list) else values[rows]
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return np.where(known, np.append(values, np.nan)[rows], np.nan)
+    return [values[row] if there else np.nan for row, there in zip(rows, known, strict=True)]
 
 
 def named_arrays(run: "Run") -> dict[str, Any]:

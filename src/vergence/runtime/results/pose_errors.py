@@ -92,7 +92,7 @@ def _angles(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
 
 def _camera_errors(trace: CameraTrace | None, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     metres, radians = np.full((len(time), 3), np.nan), np.full(len(time), np.nan)
-    if trace is None:
+    if trace is None or not len(trace.time):
         return metres, radians
     at, rows = _exposed_at(trace, time)
     at &= np.isfinite(trace.T_camera_target_desired[rows, 0, 0])

@@ -16,6 +16,8 @@ from vergence.signals import Outcome
 if TYPE_CHECKING:
     import pandas as pd
 
+UNDER_ACTUATED = "under-actuated"  # the event that tells which directions an arm cannot serve
+
 
 @dataclass(frozen=True, slots=True)
 class Event:

@@ -30,6 +30,7 @@ def arm_row(record: TickRecord, arm: str) -> Row:
         row |= {"command": command.velocity, "v_camera": command.v_camera}
         row |= {"manipulability": command.manipulability, "penalty": command.penalty}
         row |= {"active": tuple(command.active), "slack": dict(command.slack)}
+        row["clearance"] = dict(command.clearance)
     return row
 
 
@@ -130,6 +131,8 @@ def _measured(view: ImagePoints) -> Row:
     row |= {"found": view.found, "asked": view.asked}
     if view.windows is not None:
         row |= {"window_center_px": view.windows.center_px, "window_half_px": view.windows.half_px}
+    if view.joined is not None:
+        row["joined"] = view.joined
     row["reasons"] = tuple(view.reasons)
     return row
 

@@ -5,7 +5,8 @@ from vergence.vision.known_object.corner_extractor import (
     CornerMeasurements,
     require_image,
 )
-from vergence.vision.known_object.edge_tracker import EdgeMeasurement, EdgeMemory, EdgeTracker
+from vergence.vision.known_object.edge_measurement import EdgeMeasurement, EdgeMemory
+from vergence.vision.known_object.edge_tracker import EdgeTracker
 from vergence.vision.known_object.loading import load_object_model, object_model_of
 from vergence.vision.known_object.object_model import ObjectModel
 

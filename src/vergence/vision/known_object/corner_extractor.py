@@ -9,7 +9,7 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens, pixel_of
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.vision.known_object.corner_fit import FOUND, LONGEST_PX, TOO_FEW, fit_corner
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
@@ -224,7 +224,7 @@ class CornerExtractor:
     def __post_init__(self) -> None:
         if not len(self.model.edges):
             allowed = "a model with edges, from a mesh"
-            raise InputError(self.model.name, "edges", "none", allowed)
+            raise InputError(self.model.name, "edges", Absent("none"), allowed)
         if not self.contrast > 0.0:
             raise InputError("CornerExtractor", "contrast", self.contrast, "above zero")
 

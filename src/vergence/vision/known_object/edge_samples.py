@@ -7,11 +7,11 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH, pixel_of
-from vergence.vision.known_object.profiles import MARGIN, SHARP_WIDTH, find_steps, read_profile
+from vergence.vision.known_object.profiles import SHARP_WIDTH, find_steps, read_profile
 from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
 
 TEMPLATE = 4  # samples on each side of an edge that are remembered
-BLUR = 9  # samples by which a profile is longer than the search, to follow blurred edges
+LEAST_HALF = 17  # samples of a profile to each side, to follow blurred edges
 LEAST_COSINE = 0.08  # flatter faces make no edge to be told from its neighbour
 BORDER_PX = 3.0  # nearer to the border of the image nothing is expected
 _ALONG = 1e-3  # of an edge's length, for its direction in the image
@@ -100,33 +100,67 @@ def without_doubles(samples: EdgeSamples, apart_px: float) -> EdgeSamples:
     places, all of them stay.
 
     Args:
-        samples: on the edges.
+        samples: on the edges, those of one edge beside each other.
         apart_px: how far to the side another edge has to be.
     """
     count = len(samples.edge)
     alone = np.ones(count, dtype=np.bool_)
+    runs, boxes = _edge_runs(samples, 1.5 * apart_px)
     for n in range(count):
-        p, normal = samples.points_px[n], samples.normals[n]
-        for m in range(count):
-            if samples.edge[m] == samples.edge[n]:
+        u, v = samples.points_px[n, 0], samples.points_px[n, 1]
+        for r in range(len(runs)):
+            if runs[r, 0] <= n < runs[r, 1]:
                 continue
-            du, dv = samples.points_px[m, 0] - p[0], samples.points_px[m, 1] - p[1]
-            if abs(du) > 1.5 * apart_px or abs(dv) > 1.5 * apart_px:
+            if not (boxes[r, 0] <= u <= boxes[r, 1] and boxes[r, 2] <= v <= boxes[r, 3]):
                 continue
-            across = abs(du * normal[0] + dv * normal[1])
-            along = abs(dv * normal[0] - du * normal[1])
-            parallel = normal[0] * samples.normals[m, 0] + normal[1] * samples.normals[m, 1]
-            if 0.5 < across < apart_px and along < apart_px and abs(parallel) > 0.9:
+            if _runs_beside(samples, n, runs[r, 0], runs[r, 1], apart_px):
                 alone[n] = False
                 break
-    if 2 * np.count_nonzero(alone) < count:
-        return samples
+    return samples if 2 * np.count_nonzero(alone) < count else chosen_samples(samples, alone)
+
+
+@njit(cache=True)
+def _edge_runs(samples: EdgeSamples, margin_px: float) -> tuple[IntArray, FloatArray]:
+    """Return first and last + 1 sample of each edge, (R, 2), and the boxes around them, (R, 4)."""
+    count = len(samples.edge)
+    runs, boxes = np.empty((count, 2), dtype=np.int64), np.empty((count, 4))
+    filled, first = 0, 0
+    for n in range(1, count + 1):
+        if n < count and samples.edge[n] == samples.edge[first]:
+            continue
+        runs[filled, 0], runs[filled, 1] = first, n
+        for axis in range(2):
+            along = samples.points_px[first:n, axis]
+            boxes[filled, 2 * axis] = along.min() - margin_px
+            boxes[filled, 2 * axis + 1] = along.max() + margin_px
+        filled, first = filled + 1, n
+    return runs[:filled], boxes[:filled]
+
+
+@njit(cache=True)
+def _runs_beside(samples: EdgeSamples, n: int, first: int, last: int, apart_px: float) -> bool:
+    """Tell whether one of the samples first … last - 1 lies to the side of sample n, parallel."""
+    p, normal = samples.points_px[n], samples.normals[n]
+    for m in range(first, last):
+        du, dv = samples.points_px[m, 0] - p[0], samples.points_px[m, 1] - p[1]
+        across = abs(du * normal[0] + dv * normal[1])
+        along = abs(dv * normal[0] - du * normal[1])
+        if 0.5 < across < apart_px and along < apart_px:
+            other = samples.normals[m]
+            if abs(normal[0] * other[0] + normal[1] * other[1]) > 0.9:
+                return True
+    return False
+
+
+@njit(cache=True)
+def chosen_samples(samples: EdgeSamples, chosen: BoolArray) -> EdgeSamples:
+    """Return some of the samples, chosen (N,)."""
     return EdgeSamples(
-        samples.edge[alone],
-        samples.place[alone],
-        samples.points[alone],
-        samples.points_px[alone],
-        samples.normals[alone],
+        samples.edge[chosen],
+        samples.place[chosen],
+        samples.points[chosen],
+        samples.points_px[chosen],
+        samples.normals[chosen],
     )
 
 
@@ -156,7 +190,8 @@ def search_steps(
     likeness = np.full((count, candidates), np.nan)
     looks = np.zeros((count, candidates, 2 * TEMPLATE + 1))
     readable = np.zeros(count, dtype=np.bool_)
-    profile = np.empty(2 * (reach + MARGIN + BLUR) + 1)
+    # What an edge looks like is read around a step at the end of the reach, too.
+    profile = np.empty(2 * max(reach + TEMPLATE + 2, LEAST_HALF) + 1)
     places, heights = np.empty(candidates), np.empty(candidates)
     widths = np.zeros((count, candidates))
     for n in range(count):
@@ -182,44 +217,18 @@ def search_steps(
 @njit(cache=True)
 def look_at(profile: FloatArray, offset: float, look: FloatArray) -> None:
     """Fill look with the profile around an offset from its middle, mean 0 and norm 1."""
-    middle = len(profile) // 2
-    mean = 0.0
-    for i in range(len(look)):
-        s = middle + offset + i - TEMPLATE
-        k = int(s)
-        look[i] = (1.0 - s + k) * profile[k] + (s - k) * profile[k + 1]
-        mean += look[i] / len(look)
-    norm = 1e-12
-    for i in range(len(look)):
+    place = len(profile) // 2 + offset - TEMPLATE
+    first = int(place)
+    share = place - first
+    total, squares = 0.0, 1e-24
+    for i in range(2 * TEMPLATE + 1):
+        grey = profile[first + i] + share * (profile[first + i + 1] - profile[first + i])
+        look[i] = grey
+        total += grey
+    mean = total / (2 * TEMPLATE + 1)
+    for i in range(2 * TEMPLATE + 1):
         look[i] -= mean
-        norm += look[i] * look[i]
-    norm = np.sqrt(norm)
-    for i in range(len(look)):
-        look[i] /= norm
-
-
-@njit(cache=True)
-def vote_shift(samples: EdgeSamples, steps: Steps, reach: int) -> tuple[float, float]:
-    """Return the shift of the whole image of the object, px, that most steps support.
-
-    Every whole-pixel shift within the reach is tried: shifting by d moves an edge by n · d, and the
-    best step within two pixels of it supports it. Small shifts win where support is equal.
-    """
-    best, best_x, best_y = -1.0, 0, 0
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            if dx * dx + dy * dy > reach * reach:
-                continue
-            score = 0.0
-            for n in range(len(samples.edge)):
-                expected = samples.normals[n, 0] * dx + samples.normals[n, 1] * dy
-                most = 0.0
-                for j in range(steps.offsets.shape[1]):
-                    miss = 0.5 * (steps.offsets[n, j] - expected)
-                    if abs(miss) < 1.0:
-                        most = max(most, steps.weights[n, j] * (1.0 - miss * miss))
-                score += most
-            score *= 1.0 - 0.25 * np.sqrt(dx * dx + dy * dy) / reach
-            if score > best:
-                best, best_x, best_y = score, dx, dy
-    return float(best_x), float(best_y)
+        squares += look[i] * look[i]
+    scale = 1.0 / np.sqrt(squares)
+    for i in range(2 * TEMPLATE + 1):
+        look[i] *= scale

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.vision.known_object.object_model import SHARP_RAD, ObjectModel
 from vergence.vision.known_object.primitives import box, cylinder
 
@@ -35,7 +35,9 @@ def load_object_model(
         allowed = "an object model: " + ", ".join(MESHES + SCENES)
         raise InputError(str(path), "", f"a file of kind {kind or '(none)'}", allowed)
     if not file.is_file():
-        raise InputError(str(path), "", "no such file", "an OBJ, STL or MJCF file that exists")
+        raise InputError(
+            str(path), "", Absent("no such file"), "an OBJ, STL or MJCF file that exists"
+        )
     if not (np.isfinite(scale) and scale > 0.0):
         raise InputError(str(path), "scale", scale, "metres in a unit of the file, above zero")
     compiled = _compile_mesh(file) if kind in MESHES else _compile_scene(file)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vergence.arrays import FloatArray, IntArray, frozen
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.vision.known_object.mesh import (
     corner_table,
     merge_vertices,
@@ -55,7 +55,7 @@ class ObjectModel:
         places = frozen(vertices, (None, 3), "vertices")
         index = np.array(triangles, dtype=np.int64).reshape(-1, 3)
         if not index.size:
-            raise InputError(name, "faces", "none", "a mesh of at least one face")
+            raise InputError(name, "faces", Absent("none"), "a mesh of at least one face")
         if not np.isfinite(places).all():
             raise InputError(name, "vertices", "a coordinate that is not finite", "numbers, m")
         if index.min() < 0 or index.max() >= len(places):
@@ -91,7 +91,7 @@ class ObjectModel:
         """
         places = frozen(corners, (None, 3), "corners")
         if not len(places) or not np.isfinite(places).all():
-            given = "none" if not len(places) else "a coordinate that is not finite"
+            given = Absent("none") if not len(places) else "a coordinate that is not finite"
             raise InputError(name, "corners", given, "at least one point, m")
         return cls(
             name,

@@ -11,6 +11,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.geometry import se3, so3_exp, so3_log
+from vergence.robot.positive_definite import factor_spd, solve_factored
 from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 from vergence.vision.known_object.projection import pixel_rows
 
@@ -39,7 +40,7 @@ def fit_pose(
     narrowest_px: float,
     iterations: int,
 ) -> PoseFit:
-    """Fit the pose to the steps.
+    """Fit the pose to the steps, near enough to the start for slopes taken there.
 
     Args:
         T_start: where to begin, (4, 4).
@@ -52,69 +53,83 @@ def fit_pose(
         narrowest_px: tolerance of the last.
         iterations: how many.
     """
-    T = T_start.copy()
-    rows = np.empty((2, 6))
-    chosen = np.empty(len(samples.edge), dtype=np.int64)
-    residuals = np.empty(len(samples.edge))
+    slopes, start = _linearized(T_start, lens, samples)
+    moved = np.zeros(6)
+    ahead = _difference(T_prior, T_start)
     shrink = (narrowest_px / widest_px) ** (1.0 / max(iterations - 1, 1))
     tolerance = widest_px
     for _ in range(iterations):
         A = prior.copy()
-        b = prior @ _difference(T_prior, T)
-        for n in range(len(samples.edge)):
-            j, residual = _assign(T, lens, samples, steps, n, tolerance, rows)
-            chosen[n], residuals[n] = j, residual
+        b = prior @ (ahead - moved)
+        certainty = 1.0 / tolerance**2
+        for n in range(len(slopes)):
+            here = start[n] + _dot(slopes[n], moved)
+            j, residual, weight = _likeliest(here, steps.offsets[n], steps.weights[n], tolerance)
             if j < 0:
                 continue
-            outside = residual / (INLIER * tolerance)
-            weight = steps.weights[n, j] * (1.0 - outside * outside) ** 2 / tolerance**2
-            nu, nv = samples.normals[n, 0], samples.normals[n, 1]
             for i in range(6):
-                gi = nu * rows[0, i] + nv * rows[1, i]
-                b[i] += weight * gi * residual
-                for k in range(i + 1):
-                    A[i, k] += weight * gi * (nu * rows[0, k] + nv * rows[1, k])
-        for i in range(6):
-            for k in range(i):
-                A[k, i] = A[i, k]
-        step = np.linalg.solve(A, b)
-        T = _moved(T, step)  # type: ignore[arg-type]
+                share = certainty * weight * slopes[n, i]
+                b[i] += share * residual
+                for k in range(i + 1):  # the lower triangle is all that is read
+                    A[i, k] += share * slopes[n, k]
+        factor_spd(A)
+        solve_factored(A, b)
+        moved += b
         tolerance *= shrink
     tolerance /= shrink
-    for n in range(len(samples.edge)):
-        chosen[n], residuals[n] = _assign(T, lens, samples, steps, n, tolerance, rows)
+    chosen = np.empty(len(slopes), dtype=np.int64)
+    residuals = np.empty(len(slopes))
+    for n in range(len(slopes)):
+        here = start[n] + _dot(slopes[n], moved)
+        j, residuals[n], _ = _likeliest(here, steps.offsets[n], steps.weights[n], tolerance)
+        chosen[n] = j
     belonging = np.abs(residuals[chosen >= 0])
     spread = 1.4826 * np.median(belonging) if len(belonging) else np.inf
-    return PoseFit(T, chosen, residuals, max(spread, LEAST_SPREAD_PX))
+    return PoseFit(_moved(T_start, moved), chosen, residuals, max(spread, LEAST_SPREAD_PX))
 
 
 @njit(cache=True)
-def _assign(
-    T: FloatArray,
-    lens: FloatArray,
-    samples: EdgeSamples,
-    steps: Steps,
-    n: int,
-    tolerance: float,
-    rows: FloatArray,
-) -> tuple[int, float]:
-    """Return the step that a sample most likely belongs to, or -1, and its residual, px.
+def _linearized(
+    T: FloatArray, lens: FloatArray, samples: EdgeSamples
+) -> tuple[FloatArray, FloatArray]:
+    """Return how each sample moves across its edge with (δp, δθ), (N, 6), and where it is, (N,).
 
-    Fills rows with the Jacobian of the sample's pixel.
+    NaN for samples behind the camera, which no step belongs to.
     """
-    u, v, z = pixel_rows(T, lens, samples.points[n], rows)
-    if not z > 0.0:
-        return -1, np.nan
-    p, normal = samples.points_px[n], samples.normals[n]
-    here = normal[0] * (u - p[0]) + normal[1] * (v - p[1])
+    slopes, places = np.empty((len(samples.edge), 6)), np.empty(len(samples.edge))
+    rows = np.empty((2, 6))
+    for n in range(len(slopes)):
+        nu, nv = samples.normals[n, 0], samples.normals[n, 1]
+        u, v, _ = pixel_rows(T, lens, samples.points[n], rows)
+        places[n] = nu * (u - samples.points_px[n, 0]) + nv * (v - samples.points_px[n, 1])
+        for i in range(6):
+            slopes[n, i] = nu * rows[0, i] + nv * rows[1, i]
+    return slopes, places
+
+
+@njit(cache=True)
+def _dot(a: FloatArray, b: FloatArray) -> float:
+    total: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _likeliest(
+    here: float, offsets: FloatArray, weights: FloatArray, tolerance: float
+) -> tuple[int, float, float]:
+    """Return the step that most likely belongs to a sample, its residual, px, and its weight.
+
+    The weight is Tukey's times that of the step; the step is -1 if none is near enough.
+    """
+    farthest = (INLIER * tolerance) ** 2
     best, step, residual = 0.0, -1, np.nan
-    for j in range(steps.offsets.shape[1]):
-        miss = steps.offsets[n, j] - here
-        if abs(miss) < INLIER * tolerance:
-            likely = steps.weights[n, j] * np.exp(-0.5 * (miss / tolerance) ** 2)
-            if likely > best:
-                best, step, residual = likely, j, miss
-    return step, residual
+    for j in range(len(offsets)):
+        miss = offsets[j] - here
+        inside = farthest - miss * miss
+        weight = weights[j] * inside * inside
+        if inside > 0.0 and weight > best:
+            best, step, residual = weight, j, miss
+    return step, residual, best / farthest**2
 
 
 @njit(cache=True)

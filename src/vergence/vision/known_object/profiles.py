@@ -9,6 +9,10 @@ MARGIN = 3  # samples of a profile beyond the range that is searched
 SHARP_WIDTH = 3.0  # px, of the slope of a sharp edge as the mask sees it
 BLURRED_WIDTH = 5.0  # px, from which on the middle of the slope is the better place
 SAME_PX = 0.75  # steps nearer than this are one
+_ASIDE_PX = np.sqrt(0.5)  # of the two places whose mean is a sample: as wide as 1 2 1 in pixels
+_NEAR, _FAR = 2.0 / 3.0, 1.0 / 3.0  # of the mask that tells slopes
+_SHARES = 256  # in which the four pixels around a place are mixed: integers are faster
+_PARTS = _SHARES**2  # of a pixel, in which places are counted
 
 
 @njit(cache=True)
@@ -31,20 +35,36 @@ def read_profile(
 ) -> bool:
     """Read grey values along the normal (nu, nv) through a pixel, each a mean along the edge.
 
-    The middle of the profile is the pixel; samples are a pixel apart. Returns False if any of it
-    is outside the image.
+    The middle of the profile is the pixel; samples are a pixel apart, each the mean of two places
+    beside each other along the edge. Returns False, and fills nothing, if any of it is outside the
+    image.
     """
+    height, width = image.shape
     reach = len(profile) // 2
+    across, down = reach * abs(nu) + abs(nv), reach * abs(nv) + abs(nu)  # half the box around it
+    if not (across <= u < width - 1.0 - across and down <= v < height - 1.0 - down):
+        return False
+    x, y = int(_PARTS * (u - reach * nu)), int(_PARTS * (v - reach * nv))
+    step_x, step_y = int(_PARTS * nu), int(_PARTS * nv)
+    aside_x, aside_y = int(-_PARTS * _ASIDE_PX * nv), int(_PARTS * _ASIDE_PX * nu)
     for k in range(len(profile)):
-        x, y = u + (k - reach) * nu, v + (k - reach) * nv
-        profile[k] = 0.25 * (
-            grey_at(image, x - nv, y + nu)
-            + 2.0 * grey_at(image, x, y)
-            + grey_at(image, x + nv, y - nu)
-        )
-        if not np.isfinite(profile[k]):
-            return False
+        one = _mixed_grey(image, x - aside_x, y - aside_y)
+        other = _mixed_grey(image, x + aside_x, y + aside_y)
+        profile[k] = (one + other) / (2.0 * _SHARES**2)
+        x, y = x + step_x, y + step_y
     return True
+
+
+@njit(cache=True)
+def _mixed_grey(image: ImageArray, x: int, y: int) -> int:
+    """Return _SHARES² times the grey value between four pixels, at a place in _PARTS of a pixel."""
+    one = np.uint32(1)  # unsigned: indices below zero need not be thought of
+    column, row = np.uint32(x // _PARTS), np.uint32(y // _PARTS)
+    a, b = x % _PARTS // _SHARES, y % _PARTS // _SHARES
+    top = (_SHARES - a) * image[row, column] + a * image[row, column + one]
+    bottom = (_SHARES - a) * image[row + one, column] + a * image[row + one, column + one]
+    value: int = (_SHARES - b) * top + b * bottom
+    return value
 
 
 @njit(cache=True)
@@ -59,7 +79,8 @@ def find_steps(
     """Find the steps of a profile: local maxima of |slope|, to a fraction of a pixel.
 
     A blurred edge is a ramp whose slope has no one maximum; its middle is where the edge is. So
-    each maximum is followed to where the slope has fallen to half, on both sides.
+    each maximum is followed to where the slope has fallen to half, on both sides. A
+    step beyond the reach is left out.
 
     Args:
         profile: grey values a pixel apart, odd in number.
@@ -89,7 +110,8 @@ def find_steps(
             place = k + (0.5 * (abs(before) - abs(after)) / curve if curve < 0.0 else 0.0)
             if width > BLURRED_WIDTH:
                 place = 0.5 * (low + high)
-            count = _insert(offsets, heights, widths, count, place, here, width)
+            if abs(place) <= reach + 0.5:
+                count = _insert(offsets, heights, widths, count, place, here, width)
         before, here = here, after
     return count
 
@@ -97,23 +119,24 @@ def find_steps(
 @njit(cache=True)
 def _half_way(profile: FloatArray, k: int, side: int, height: float) -> float:
     """Return where, to one side of sample k, the slope has fallen to half of its height there."""
-    before = 1.0
+    sign, half = np.copysign(1.0, height), 0.5 * abs(height)
+    before = abs(height)
     place = k
     while 2 <= place + side < len(profile) - 2:
         place += side
-        share = _height(profile, place) / height
-        if share < 0.5:
-            return place - side + side * (before - 0.5) / (before - share)
-        before = share
+        here = sign * _height(profile, place)
+        if here < half:
+            crossed: float = place - side + side * (before - half) / (before - here)
+            return crossed
+        before = here
     return float(place)
 
 
 @njit(cache=True)
 def _height(profile: FloatArray, k: int) -> float:
     """Height of a step at sample k: slope of a smoothing mask, 1 for a step of 1."""
-    height: float = (
-        2.0 * (profile[k + 1] - profile[k - 1]) + profile[k + 2] - profile[k - 2]
-    ) / 3.0
+    near, far = profile[k + 1] - profile[k - 1], profile[k + 2] - profile[k - 2]
+    height: float = _NEAR * near + _FAR * far
     return height
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.parts import knob, part
 from vergence.vision.image import grey_image
 from vergence.vision.marks.coded import CodedMarks, MarkerDetector
@@ -15,7 +15,7 @@ class TagTracking:
     """Follows corners of markers by the markers' numbers, so that none is taken for another."""
 
     dictionary: str = knob("apriltag_36h11")  # of the markers, such as aruco_4x4_50
-    noise_px: float = knob(0.2, "px", above=0, upto=100)  # standard deviation of a found corner
+    noise_px: float = knob(0.05, "px", above=0, upto=100)  # least deviation of a found corner
     away_px: float = knob(10.0, "px", above=0, upto=1e4)  # of a point from its corner at the start
 
     def __post_init__(self) -> None:
@@ -34,7 +34,7 @@ class TagTracking:
         for place, corner in zip(points_px, corners, strict=True):
             if corner is None:
                 u, v = place.round().astype(int).tolist()
-                given = f"no corner of a marker within {self.away_px:g} px of ({u}, {v})"
+                given = Absent(f"no corner of a marker within {self.away_px:g} px of ({u}, {v})")
                 raise InputError("task", "tracker", given, f"markers of {self.dictionary} there")
         return _TagTracker(detector, [corner for corner in corners if corner], points_px)
 

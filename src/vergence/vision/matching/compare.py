@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vergence.arrays import FloatArray, ImageArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.vision.matching.image_faults import image_fault
 from vergence.vision.matching.matcher import Matcher, Matches
@@ -18,6 +18,7 @@ from vergence.vision.two_view import (
 
 NOISE_PX = 0.3  # standard deviation of a matched point
 FEWEST = 12  # matches that have to agree
+_LEAST_OF_MEDIAN = 0.1  # depth, below which a match that agrees is wrong all the same
 LEAST_AREA = 0.01  # of both images, that they have to span
 
 
@@ -69,7 +70,8 @@ def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
         # With little parallax a plane explains everything; what it is not, later images tell.
         view = estimate_two_view(*points, camera, noise_px=NOISE_PX, flat=True)
     if isinstance(view, TwoView):
-        agree, rotation = view.inliers, view.rotation
+        agree = view.inliers & _ahead(view.rho_star) & _ahead(view.rho)
+        rotation = view.rotation
     elif view.problem is TwoViewProblem.NO_TRANSLATION and view.rotation is not None:
         agree, rotation = _turned(matches, camera, view.rotation), view.rotation
     else:
@@ -79,6 +81,12 @@ def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
         return TwoViewFailure(TwoViewProblem.NOT_RECOGNISED, doubt)
     taken = replace_matches(view, agree) if isinstance(view, TwoView) else None
     return Compared(chosen, taken, rotation, len(agree))
+
+
+def _ahead(depth: FloatArray) -> BoolArray:
+    """Tell which points (N,) are not at the camera or behind it, as wrong matches may be."""
+    ahead: BoolArray = depth > _LEAST_OF_MEDIAN * np.nanmedian(depth)  # never true of NaN
+    return ahead
 
 
 def _turned(matches: Matches, camera: Camera, R: FloatArray) -> np.ndarray:

@@ -32,14 +32,14 @@ def fewest_off_a_line(points: FloatArray, tolerance: float) -> int:
     for i in range(count):
         for j in range(i + 1, count):
             pair += 1
-            along = points[j] - points[i]
-            length = np.sqrt(np.sum(along**2))
+            x, y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+            length = np.hypot(x, y)
             if pair % stride != 0 or length <= tolerance:
                 continue
             off = 0
             for k in range(count):
-                d = points[k] - points[i]
-                off += abs(along[0] * d[1] - along[1] * d[0]) > tolerance * length
+                aside = x * (points[k, 1] - points[i, 1]) - y * (points[k, 0] - points[i, 0])
+                off += abs(aside) > tolerance * length
             fewest = min(fewest, off)
     return fewest
 
@@ -53,15 +53,15 @@ def triangle_area(points: FloatArray, a: int, b: int, c: int) -> float:
 
 
 @njit(cache=True)
-def widest_triples(m_star: FloatArray, m: FloatArray, wanted: int) -> IntArray:
-    """Return the triples of points, (desired, 3), that span the largest triangles.
+def widest_triples(m_star: FloatArray, m: FloatArray, count: int) -> IntArray:
+    """Return the triples of points, (count, 3), that span the largest triangles.
 
     What counts is the smaller of a triangle's areas in the two views. The triples are drawn from
     at most sixteen points, spread over the list, and come best first.
     """
     stride = max(1, len(m) // 16)
-    triples = np.zeros((wanted, 3), np.int64)
-    areas = np.full(wanted, -1.0)
+    triples = np.zeros((count, 3), np.int64)
+    areas = np.full(count, -1.0)
     for a in range(0, len(m), stride):
         for b in range(a + stride, len(m), stride):
             for c in range(b + stride, len(m), stride):

@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.geometry import so3_log
-from vergence.geometry.chi_square import chi_square_quantile
+from vergence.geometry.chi_square import chi_square_quantile, normal_deviate_of_ratio
 from vergence.vision.two_view import bundle
 from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION, TwoViewState
 from vergence.vision.two_view.covariance import bundle_covariance
@@ -18,6 +18,8 @@ ITERATIONS = 25  # most steps of bundle adjustment
 FEWEST_GENERAL = 8  # matches of an object that is not flat
 RIVAL = 13.8  # by how much χ² of a second motion must be larger: odds of one to a thousand
 LIKELY = 1.64  # standard deviations: 95 %
+NO_PLANE = 4.5  # standard deviations beyond which a plane is no rival
+NOISE_FROM = 16  # matches from which on they tell how large the noise is
 _CAP = 13.8  # of χ² that a single match adds: one may be wrong
 _FAR = 21.1  # χ² of a rotation: one in ten thousand
 _MOTIONS = 4  # most that are adjusted
@@ -103,8 +105,9 @@ def compare_models(views: Views) -> Comparison:
     The models are nested, so 2 log of the ratio is χ² with as many degrees of freedom as the
     larger has unknowns more [Wilks1938]: a simpler model is kept unless that is beyond 99.9 %, and
     not alone unless it is within 95 %. The noise is estimated from the largest model, since lens
-    and matcher may add to the stated noise. All local minima of the general model are compared
-    with each other as well.
+    and matcher may add to the stated noise; so a plane stays a rival unless the ratio of mean
+    squares excludes it, which counts how little so many matches tell of their noise. All local
+    minima of the general model are compared with each other as well.
     """
     count = len(views)
     state = TwoViewState(
@@ -137,7 +140,12 @@ def compare_models(views: Views) -> Comparison:
         return Comparison([plane], plane, scale)
     if gain <= chi_square_quantile(unknowns[PLANE]):
         return Comparison([plane, *rivals], plane, scale)
-    return Comparison(rivals, plane, scale)
+    # The noise that the largest model leaves is an estimate; and few matches are not to raise it.
+    known = scale == 1.0 and count < NOISE_FROM
+    deviate = normal_deviate_of_ratio(
+        gain / unknowns[PLANE], unknowns[PLANE], np.inf if known else largest.freedom
+    )
+    return Comparison([*rivals, plane] if deviate < NO_PLANE else rivals, plane, scale)
 
 
 def hinging_on_one(views: Views, best: Fit, scale: float) -> list[Fit]:

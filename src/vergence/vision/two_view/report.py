@@ -19,7 +19,9 @@ from vergence.vision.two_view.explain import Explanation
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
 from vergence.vision.two_view.fit import Fit
 from vergence.vision.two_view.linear import homogeneous
+from vergence.vision.two_view.resampling import draw_replicas, widen_for_general
 from vergence.vision.two_view.result import TwoView
+from vergence.vision.two_view.widening import DRAWS, widen_for_plane
 
 
 class Report(NamedTuple):
@@ -56,8 +58,8 @@ class Report(NamedTuple):
             key=lambda result: -float(result.normal @ self.hint),
         )
         if len(possible) == 2 and np.allclose(possible[0].upsilon, possible[1].upsilon, atol=1e-6):
-            return possible[:1]
-        return possible
+            possible = possible[:1]
+        return _widened(possible, fit, found.scale)
 
     def _planar_motion(
         self, fit: Fit, found: Explanation, R: FloatArray, t: FloatArray, n: FloatArray
@@ -102,7 +104,17 @@ class Report(NamedTuple):
         blocks = bundle.normal_blocks(GENERAL, state, fit.residuals, fit.views.weight)
         rays = homogeneous(state.x_star)
         rho_star = inverse_distance / state.w
-        covariance = upsilon_covariance(GENERAL, state, blocks, chosen)
+        covariance = found.scale * upsilon_covariance(GENERAL, state, blocks, chosen)
+        widen_for_general(
+            covariance[None],
+            np.ascontiguousarray(state.R),
+            state.t,
+            fit.views.m_star,
+            fit.views.m,
+            found.scale * fit.views.noise**2,
+            chosen,
+            *draw_replicas(len(fit.views)),
+        )
         return TwoView(
             rotation=state.R.T.copy(),
             translation=-state.R.T @ state.t * inverse_distance,
@@ -111,7 +123,7 @@ class Report(NamedTuple):
             rho_star=self._spread(rho_star, fit),
             rho=self._spread(rho_star * fit.depths, fit),
             delta=self._spread(rays @ N / inverse_distance - 1.0 / rho_star, fit),
-            covariance=found.scale * covariance,
+            covariance=covariance,
             inliers=self._inliers(fit),
             planar=False,
             rms_px=self._rms_px(fit),
@@ -131,6 +143,26 @@ class Report(NamedTuple):
         result = np.full((self.total, *values.shape[1:]), np.nan)
         result[fit.views.index] = values
         return result
+
+
+def _widened(motions: list[TwoView], fit: Fit, scale: float) -> list[TwoView]:
+    """Let the covariances of the motions behind a homography contain those of all likely ones."""
+    if not motions:
+        return motions
+    covariances = np.array([motion.covariance for motion in motions])
+    widen_for_plane(
+        covariances,
+        np.array([motion.upsilon for motion in motions]),
+        np.ascontiguousarray(motions[0].homography),
+        fit.views.m_star,
+        fit.views.m,
+        scale * fit.views.noise**2,
+        DRAWS,
+    )
+    return [
+        replace(motion, covariance=covariance)
+        for motion, covariance in zip(motions, covariances, strict=True)
+    ]
 
 
 def _with_doubt(motions: list[TwoView], turned: int) -> TwoView:

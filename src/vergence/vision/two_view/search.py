@@ -9,6 +9,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.vision.two_view.evidence import least_false_alarms, log_densities
+from vergence.vision.two_view.five_point import five_point_matrices
 from vergence.vision.two_view.linear import homogeneous, linear_homography
 from vergence.vision.two_view.motions import choose_motion, essential
 from vergence.vision.two_view.sampson import refine_essential
@@ -66,28 +67,11 @@ def find_motion(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
         m: the same points in the current view, (N, 2).
         noise: stated standard deviation of a normalized coordinate.
     """
-    matrices = five_point_motions(m_star, m, MOTION_SAMPLES)
+    matrices = five_point_matrices(_samples(len(m), 5, MOTION_SAMPLES), m_star, m)
     _, band = log_densities(m_star, m)
     return _agreement(
         *_best_motion(matrices, m_star, m, band, _FLOOR * noise, ceiling(len(m)) * noise)
     )
-
-
-def five_point_motions(m_star: FloatArray, m: FloatArray, most: int) -> FloatArray:
-    """Return the essential matrices (M, 3, 3) of samples of five matches, up to ten a sample.
-
-    By the five-point algorithm of Nistér, in OpenCV.
-    """
-    import cv2
-
-    found = []
-    for sample in _samples(len(m), 5, most):
-        matrices, _ = cv2.findEssentialMat(
-            np.ascontiguousarray(m_star[sample]), np.ascontiguousarray(m[sample]), np.eye(3)
-        )
-        if matrices is not None:
-            found.append(np.asarray(matrices, dtype=np.float64).reshape(-1, 3, 3))
-    return np.concatenate(found) if found else np.zeros((0, 3, 3))
 
 
 def _agreement(log_alarms: float, error: float, errors: FloatArray) -> Agreement:

@@ -3,13 +3,15 @@
 
 import { context_of } from "./dom.js";
 import { inside } from "./polygon.js";
+import { Steering } from "./steering.js";
 
 /** @import { Mouse } from "./mouse.js" */
+/** @import { Picking } from "./picking.js" */
 /** @import { About, CameraAbout, ImageHeader, Place } from "./protocol.js" */
 
 const INK = {
   found: "#14e696", lost: "#ff6e0a", predicted: "#ffffff", windows: "#d6dbe1",
-  desired: "#f0e442", true: "#64c8ff", unasked: "#aaaaaa", outline: "#7fd0ff",
+  desired: "#f0e442", true: "#64c8ff", unasked: "#aaaaaa", outline: "#7fd0ff", picked: "#ff7ad9",
 };
 const OUTLINE = "rgba(15, 18, 22, 0.75)";
 
@@ -18,10 +20,14 @@ export class Images {
    * @param {HTMLElement} root
    * @param {HTMLElement} legend
    * @param {Mouse} mouse
+   * @param {Picking} picking
    */
-  constructor(root, legend, mouse) {
+  constructor(root, legend, mouse, picking) {
     this.root = root;
     this.mouse = mouse;
+    this.picking = picking;
+    picking.changed = () => { for (const view of this.views.values()) view.draw(); };
+    picking.begun = () => this.views.get(picking.camera)?.canvas.focus(); // for the arrow keys
     /** @type {Map<string, View>} */
     this.views = new Map();
     /** @type {Set<string>} */
@@ -94,12 +100,35 @@ class View {
     this.words = document.createElement("span");
     this.caption.append(name, this.words);
     this.hover = false;
+    this.canvas.role = "img";
+    this.canvas.ariaLabel = `image of ${camera.name}`;
+    if (about.mode !== "live") return;
+    this.steering = new Steering(this.canvas, camera, images.mouse);
+    this.canvas.role = "application"; // arrow keys belong to the image
+    this.canvas.addEventListener("keydown", (event) => this.key(event, about.draggable));
     if (about.draggable) this.listen();
+    if (about.images && camera.name === about.task_camera) this.listen_for_points();
+  }
+
+  /**
+   * @param {KeyboardEvent} event
+   * @param {boolean} draggable
+   */
+  key(event, draggable) {
+    const { steering, images: { picking } } = this;
+    if (!steering || event.metaKey) return;
+    if (this.picks ? steering.point(event) : draggable && steering.drag(event)) {
+      event.preventDefault();
+      if (this.picks) this.draw();
+    } else if (this.picks && this.header && (event.key === " " || event.key === "Enter")) {
+      event.preventDefault();
+      picking.click(steering.cursor, this.canvas.clientWidth / this.camera.width, this.header);
+    }
   }
 
   /**
    * A place in the image, px, from one in the window.
-   * @param {PointerEvent} event
+   * @param {MouseEvent} event
    * @returns {Place}
    */
   place(event) {
@@ -110,10 +139,22 @@ class View {
     ];
   }
 
+  get picks() { return this.images.picking.on && this.camera.name === this.images.picking.camera; }
+
+  listen_for_points() {
+    this.canvas.addEventListener("pointerdown", () => { if (this.steering) this.steering.points = false; });
+    this.canvas.addEventListener("click", (event) => {
+      if (!this.picks || !this.header) return;
+      const place = this.place(event), { width, height } = this.camera;
+      if (place[0] < 0 || place[1] < 0 || place[0] > width - 1 || place[1] > height - 1) return;
+      this.images.picking.click(place, this.canvas.clientWidth / width, this.header);
+    });
+  }
+
   listen() {
     const { canvas } = this;
     /** @param {PointerEvent} event */
-    const on = (event) => this.header?.outline && inside(this.place(event), this.header.outline);
+    const on = (event) => !this.picks && this.header?.outline && inside(this.place(event), this.header.outline);
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0 || !on(event)) return;
       canvas.setPointerCapture(event.pointerId);
@@ -121,9 +162,9 @@ class View {
       event.preventDefault();
     });
     canvas.addEventListener("pointermove", (event) => {
-      this.images.mouse.move(this.camera.name, ...this.place(event), event.shiftKey);
+      this.images.mouse.move(this.camera.name, ...this.place(event), event);
       const hover = Boolean(on(event)) || this.images.mouse.holds;
-      canvas.style.cursor = this.images.mouse.holds ? "grabbing" : hover ? "grab" : "";
+      canvas.style.cursor = this.picks ? "crosshair" : this.images.mouse.holds ? "grabbing" : hover ? "grab" : "";
       if (hover !== this.hover) { this.hover = hover; this.draw(); }
     });
     const release = () => this.images.mouse.release();
@@ -157,6 +198,10 @@ class View {
     /** @type {(place: Place) => Place} */
     const at = ([u, v]) => [(u + 0.5) * kx, (v + 0.5) * ky];
     marks(context, header, at, this.images.layers, window.devicePixelRatio);
+    if (this.picks) picked(context, this.images.picking.points.map(at), window.devicePixelRatio);
+    if (this.picks && this.steering?.points) {
+      new Pen(context, window.devicePixelRatio).sight(at(this.steering.cursor), INK.picked);
+    }
     if (this.hover && header.outline) outline(context, header.outline.map(at));
   }
 }
@@ -192,6 +237,20 @@ function marks(context, header, at, layers, unit) {
       pen.box(at([u - hu, v - hv]), at([u + hu, v + hv]), INK.windows);
     });
   }
+  if (header.curves?.length) {
+    for (const { points: numbers, closed } of header.curves) {
+      /** @type {(name: "true" | "desired" | "found", places: Place[] | undefined) => void} */
+      const curve = (name, places) => {
+        if (!places || !layers.has(name)) return;
+        const known = numbers.map((j) => places[j]);
+        if (known.every((place) => place && place[0] !== null)) pen.curve(known.map(at), closed, INK[name]);
+      };
+      curve("true", header.true);
+      curve("desired", header.desired);
+      if (numbers.every((j) => found[j])) curve("found", points);
+    }
+    return;
+  }
   if (layers.has("desired")) each(header.desired, (place) => pen.plus(place, 8, INK.desired));
   if (layers.has("true")) each(header.true, (place) => pen.ring(place, 2.5, INK.true));
   if (layers.has("predicted")) each(predicted, (place) => pen.diamond(place, 3.5, INK.predicted));
@@ -199,6 +258,26 @@ function marks(context, header, at, layers, unit) {
   if (layers.has("lost")) {
     each(points, (place, j) => { if (!found[j] && asked[j]) pen.cross(place, 6, INK.lost); });
   }
+}
+
+/**
+ * Draws numbered crosses where points are picked.
+ * @param {CanvasRenderingContext2D} context
+ * @param {Place[]} places
+ * @param {number} unit
+ */
+function picked(context, places, unit) {
+  const pen = new Pen(context, unit);
+  context.font = `600 ${11 * unit}px system-ui, sans-serif`;
+  places.forEach((place, j) => {
+    pen.plus(place, 7, INK.picked);
+    const [x, y] = [place[0] + 6 * unit, place[1] - 6 * unit];
+    context.lineWidth = 3 * unit;
+    context.strokeStyle = OUTLINE;
+    context.strokeText(String(j + 1), x, y);
+    context.fillStyle = INK.picked;
+    context.fillText(String(j + 1), x, y);
+  });
 }
 
 /**
@@ -267,6 +346,18 @@ class Pen {
   }
 
   /**
+   * @param {Place[]} places
+   * @param {boolean} closed
+   * @param {string} ink
+   */
+  curve(places, closed, ink) {
+    const path = new Path2D();
+    places.forEach(([x, y]) => path.lineTo(x, y));
+    if (closed) path.closePath();
+    this.stroke(path, ink);
+  }
+
+  /**
    * @param {Place} place
    * @param {number} r
    * @param {string} ink
@@ -287,6 +378,15 @@ class Pen {
    */
   diamond(place, r, ink) {
     this.lines(place, r, ink, [[0, -1, 1, 0], [1, 0, 0, 1], [0, 1, -1, 0], [-1, 0, 0, -1]], 1);
+  }
+
+  /**
+   * The cursor of the keyboard: four lines that leave the middle free.
+   * @param {Place} place
+   * @param {string} ink
+   */
+  sight(place, ink) {
+    this.lines(place, 12, ink, [[-1, 0, -0.3, 0], [0.3, 0, 1, 0], [0, -1, 0, -0.3], [0, 0.3, 0, 1]], 1.2);
   }
 
   /**

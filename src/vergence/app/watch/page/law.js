@@ -23,6 +23,8 @@ export class Law {
     this.shown = null;
     /** @type {Map<string, (value: any) => void>} */
     this.fields = new Map();
+    /** @type {Map<string, (value: any) => void>} */
+    this.undos = new Map();
     this.choice.addEventListener("change", () => {
       this.shown = null;
       ask({ do: "law", name: this.choice.value });
@@ -39,7 +41,10 @@ export class Law {
     const names = [law.choice, ...law.knobs.map(({ key }) => key)].join();
     if (names !== this.shown) this.build(law);
     this.shown = names;
-    for (const knob of law.knobs) this.fields.get(knob.key)?.(knob.value);
+    for (const knob of law.knobs) {
+      this.fields.get(knob.key)?.(knob.value);
+      this.undos.get(knob.key)?.(knob.value);
+    }
     this.settings.replaceChildren(...command(law.settings));
   }
 
@@ -61,8 +66,27 @@ export class Law {
     /** @type {Turn} */
     const turn = (value) => this.ask({ do: "knob", key: knob.key, value });
     const make = { number: this.number, choice: this.choices, switch: this.flag }[knob.kind];
-    row.append(name, ...make.call(this, knob, turn));
+    const [field, ...rest] = make.call(this, knob, turn);
+    const slider = rest.at(-1)?.matches("[type=range]") ? rest.splice(-1) : [];
+    row.append(name, field, ...rest, this.undo(knob, turn), ...slider);
     return row;
+  }
+
+  /**
+   * A button back to the value that the law has by itself; unseen while it has it.
+   * @param {KnobAbout} knob
+   * @param {Turn} turn
+   */
+  undo(knob, turn) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "undo";
+    button.textContent = "↺";
+    button.title = `back to ${typeof knob.own === "number" ? short(knob.own) : knob.own}`;
+    button.ariaLabel = `${knob.label}: ${button.title}`;
+    button.addEventListener("click", (event) => { event.preventDefault(); turn(knob.own); });
+    this.undos.set(knob.key, (value) => { button.style.visibility = value === knob.own ? "hidden" : "visible"; });
+    return button;
   }
 
   /**
@@ -74,6 +98,7 @@ export class Law {
     const field = document.createElement("input");
     field.type = "number";
     field.step = "any";
+    field.title = range(knob);
     const unit = document.createElement("span");
     unit.className = "soft";
     unit.textContent = knob.unit;
@@ -134,6 +159,15 @@ function command(settings) {
   const code = document.createElement("code");
   code.textContent = settings.map((setting) => `--set '${setting}'`).join(" ");
   return ["The same from the command line: ", code];
+}
+
+/**
+ * Says between which values a number may be.
+ * @param {KnobAbout} knob
+ */
+function range({ low, high, unit }) {
+  const ends = [low !== undefined ? `from ${short(low)}` : "", high !== undefined ? `up to ${short(high)}` : ""];
+  return [...ends, unit].filter(Boolean).join(" ");
 }
 
 /**

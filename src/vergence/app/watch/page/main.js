@@ -6,6 +6,7 @@ import { Images } from "./images.js";
 import { Law } from "./law.js";
 import { Log } from "./log.js";
 import { Mouse } from "./mouse.js";
+import { Picking } from "./picking.js";
 import { Plots } from "./plots.js";
 import { Scene } from "./scene.js";
 import { Transport } from "./transport.js";
@@ -17,15 +18,16 @@ const ask = (command) => connection.ask(command);
 
 const mouse = new Mouse(ask);
 const transport = new Transport(ask);
-const images = new Images(element("images"), element("legend"), mouse);
+const picking = new Picking(element("picking"), ask);
+const images = new Images(element("images"), element("legend"), mouse, picking);
 const plots = new Plots(element("plots"), (value) => ask({ do: "seek", value }));
-const scene = new Scene(element("stage"), element("scene-hint"), mouse);
+const scene = new Scene(element("stage"), element("scene-hint"), mouse, ask);
 const law = new Law(element("law"), ask);
 const log = new Log(element("log"));
 const connection = new Connection(
   hear,
   (reason) => log.refused(reason),
-  (open) => transport.connected(open),
+  (open) => { for (const part of [transport, scene]) part.connected(open); },
 );
 
 /**
@@ -33,11 +35,12 @@ const connection = new Connection(
  * @param {(Blob | null)[]} blobs
  */
 function hear({ about, status, rows, events, images: headers }, blobs) {
-  if (about) for (const part of [transport, images, plots, scene, log]) part.begin(about);
+  if (about) for (const part of [transport, picking, images, plots, scene, log]) part.begin(about);
   if (about) hint(about);
   transport.status(status);
   scene.status(status);
   law.status(status.law);
+  limits(status);
   loose(status);
   plots.add(rows);
   plots.at(status.time ?? 0);
@@ -48,9 +51,24 @@ function hear({ about, status, rows, events, images: headers }, blobs) {
 /** @param {About} about */
 function hint({ draggable, carried_by, mode }) {
   if (mode === "recording") return;
+  if (mode === "robot") {
+    element("drag-hint").textContent = "A real arm: the space bar stops it. In 3D, the arm is where its joints are; everything else is where the cell file has it.";
+    return;
+  }
   element("drag-hint").textContent = draggable
-    ? "Drag the target with the mouse, in an image or in 3D; with Shift it comes nearer or goes away. "
+    ? "Drag the target with the mouse, in an image or in 3D, or move it with the arrow keys once an image has the focus. With Shift it comes nearer or goes away, with Alt it turns. "
     : `${carried_by} holds the target: the mouse cannot move it.`;
+}
+
+/**
+ * Says which limits shape the motion at the moment.
+ * @param {Status} status
+ */
+function limits({ limits: now }) {
+  const names = (now ?? []).map(({ name, relaxed }) => (relaxed ? `${name} (relaxed)` : name));
+  const words = `Limits that shape the motion now: ${names.join(", ") || "none"}`;
+  const line = element("limits");
+  if (line.textContent !== words) line.textContent = words;
 }
 
 /**
@@ -69,4 +87,4 @@ function loose({ held }) {
   element("drag-hint").append(fresh);
 }
 
-Object.assign(window, { watch: { scene, images, plots, law, mouse } }); // for those who script the page
+Object.assign(window, { watch: { scene, images, picking, plots, law, mouse } }); // for those who script the page

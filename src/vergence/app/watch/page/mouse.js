@@ -30,12 +30,12 @@ export class Mouse {
    * @param {string} view
    * @param {number} u
    * @param {number} v
-   * @param {boolean} along  the optical axis
+   * @param {{ shiftKey: boolean, ctrlKey: boolean, altKey: boolean, metaKey: boolean }} keys
    */
-  move(view, u, v, along) {
+  move(view, u, v, { shiftKey, ctrlKey, altKey, metaKey }) {
     if (this.view !== view) return;
     if (!this.next) requestAnimationFrame(() => this.send());
-    this.next = { do: "move", view, u, v, along };
+    this.next = { do: "move", view, u, v, along: shiftKey, turn: ctrlKey || altKey || metaKey };
   }
 
   send() {

@@ -212,17 +212,20 @@ class Plot {
   }
 
   /**
-   * Writes the value at the cursor, or the newest, of a plot with one curve; else the largest.
+   * Writes the value at the cursor, or the newest, and whose it is: of several the largest.
    * @param {Row[]} rows
    */
   tell(rows) {
     const { cursor } = this.plots;
     const known = rows.filter((row) => this.values(row).some((value) => value !== null));
     const row = cursor === null ? known.at(-1) : known.findLast((each) => each[0] <= cursor + 1e-9);
-    const values = row ? this.values(row).filter((value) => value !== null) : [];
-    if (!values.length) { this.value.textContent = ""; return; }
-    const most = values.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
-    this.value.textContent = (values.length > 1 ? "largest " : "") + most.toPrecision(3);
+    const values = row ? this.values(row) : [];
+    let most = -1;
+    values.forEach((value, j) => {
+      if (value !== null && (most < 0 || Math.abs(value) > Math.abs(values[most] ?? 0))) most = j;
+    });
+    const whose = values.length > 1 ? this.about.series[most] : "";
+    this.value.textContent = most < 0 ? "" : [whose, values[most]?.toPrecision(3).replace("-", "−")].filter(Boolean).join(" ");
   }
 }
 

@@ -16,7 +16,7 @@
  * @typedef {{ name: string, width: number, height: number }} CameraAbout
  *
  * @typedef {object} About  what runs
- * @property {"live" | "recording"} mode
+ * @property {"live" | "robot" | "recording"} mode
  * @property {string} cell
  * @property {CameraAbout[]} cameras
  * @property {PlotAbout[]} plots
@@ -25,6 +25,8 @@
  * @property {number} [duration]  of a recording, s
  * @property {string} [no_scene]
  * @property {string | null} [carried_by]
+ * @property {boolean} [images]  whether cameras deliver any
+ * @property {string} [task_camera]
  *
  * @typedef {object} KnobAbout
  * @property {string} key
@@ -32,6 +34,9 @@
  * @property {string} unit
  * @property {"number" | "choice" | "switch"} kind
  * @property {any} value
+ * @property {any} own  what the law has by itself
+ * @property {number} [low]  of a number's range
+ * @property {number} [high]
  * @property {string[]} [choices]
  *
  * @typedef {{ choices: string[], choice: string, knobs: KnobAbout[], settings: string[] }} LawStatus
@@ -43,6 +48,8 @@
  * @property {number} [measured]
  * @property {boolean} [held]
  * @property {LawStatus} [law]
+ * @property {boolean} [preparing]  kernels are loaded or compiled; nothing moves yet
+ * @property {{ name: string, relaxed: boolean }[]} [limits]  that shape the motion now
  * @property {Place[] | null} [outline]  of the target in the view in three dimensions, normalized
  * @property {number} [fovy]
  * @property {{ kind: string, reason: string, time: number, succeeded: boolean } | null} [outcome]
@@ -57,6 +64,7 @@
  * @property {Place[]} [points]
  * @property {Place[]} [predicted]
  * @property {Place[]} [half]
+ * @property {{ points: number[], closed: boolean }[]} [curves]  which points make one
  * @property {boolean[]} [found]
  * @property {boolean[]} [asked]
  * @property {string[]} [reasons]

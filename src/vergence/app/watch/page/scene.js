@@ -5,17 +5,30 @@ import { outline } from "./images.js";
 import { inside } from "./polygon.js";
 
 /** @import { Mouse } from "./mouse.js" */
-/** @import { About, Place, Status } from "./protocol.js" */
+/** @import { About, Ask, Place, Status } from "./protocol.js" */
 
+const VIEWER = "/index.html";
+const LINES = ["/state", "/ui"]; // its connections
+const AGAIN_MS = 1000;
+const PATIENCE_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
 const BAR = 32; // px of the viewer's own bar, which is left outside
+const TURN_DEG = 5; // of a press of an arrow
+const ZOOM = 1.1;
+/** @type {Record<string, [number, number, number]>} */
+const KEYS = {
+  ArrowLeft: [TURN_DEG, 0, 1], ArrowRight: [-TURN_DEG, 0, 1],
+  ArrowUp: [0, -TURN_DEG, 1], ArrowDown: [0, TURN_DEG, 1],
+  "+": [0, 0, ZOOM], "=": [0, 0, ZOOM], "-": [0, 0, 1 / ZOOM],
+};
 
 export class Scene {
   /**
    * @param {HTMLElement} stage
    * @param {HTMLElement} hint
    * @param {Mouse} mouse
+   * @param {Ask} ask
    */
-  constructor(stage, hint, mouse) {
+  constructor(stage, hint, mouse, ask) {
     this.stage = stage;
     this.hint = hint;
     this.mouse = mouse;
@@ -25,37 +38,107 @@ export class Scene {
     this.draggable = this.hover = false;
     /** @type {HTMLIFrameElement | null} */
     this.frame = null;
+    this.open = false; // the page's own connection
+    /** @type {Set<string>} */
+    this.lines = new Set(); // the viewer's connections over which something has come
+    this.waiting = 0; // a timer
     this.over = document.createElement("canvas");
+    stage.addEventListener("keydown", (event) => {
+      const turn = KEYS[event.key];
+      if (!turn || !this.frame || event.altKey || event.ctrlKey || event.metaKey) return;
+      event.preventDefault();
+      ask({ do: "look", azimuth_deg: turn[0], elevation_deg: turn[1], zoom: turn[2] });
+    });
   }
 
   /** @param {About} about */
   begin(about) {
     this.draggable = about.draggable;
     this.hint.textContent = about.scene
-      ? `drag turns, right drag shifts, wheel zooms${about.draggable ? "; the target can be dragged" : ""}`
+      ? `drag turns, right drag shifts, wheel zooms; so do arrow keys, + and −${about.draggable ? "; the target can be dragged" : ""}`
       : "";
     if (!about.scene) return this.say(about.no_scene ?? "");
     if (this.frame) return;
     this.stage.replaceChildren();
     const frame = document.createElement("iframe");
     frame.title = "the cell in three dimensions";
+    frame.tabIndex = -1; // the keys are the stage's
+    this.stage.tabIndex = 0;
+    this.stage.role = "application";
+    this.stage.ariaLabel = "View in 3D: arrow keys turn it, plus and minus zoom";
     frame.style.height = `calc(100% + ${BAR}px)`;
     this.stage.append(frame, this.over);
     frame.addEventListener("load", () => this.listen(frame));
-    frame.src = "/index.html";
     this.frame = frame;
+    this.load();
   }
 
+  /** @param {boolean} open  whether the page itself is connected */
+  connected(open) {
+    this.open = open;
+    if (open && this.lost) this.load();
+  }
+
+  get lost() { return this.stage.classList.contains("lost"); }
+
+  /** Loads the viewer, again if it has lost its connection. */
+  load() {
+    const { frame } = this;
+    if (!frame) return;
+    clearTimeout(this.waiting);
+    const before = frame.contentWindow?.document;
+    frame.src = VIEWER;
+    const begun = () => { // as soon as the new document is there, before its script connects
+      const page = frame.contentDocument && frame.contentWindow;
+      if (page && page.document !== before && page.location.pathname === VIEWER) this.follow(page);
+      else requestAnimationFrame(begun);
+    };
+    begun();
+  }
+
+  /**
+   * Hears whether the viewer is connected; loads it again when it is not, sooner than it would try by itself.
+   * @param {Window} page
+   */
+  follow(page) {
+    const scene = this, { WebSocket: Own } = /** @type {typeof globalThis} */ (/** @type {unknown} */ (page));
+    /** @type {Set<string>} */
+    const open = this.lines = new Set();
+    Object.assign(page, { WebSocket: class extends Own {
+      /** @param {string} address */
+      constructor(address) {
+        super(address);
+        const path = new URL(address, location.href).pathname;
+        this.addEventListener("message", () => scene.heard(page, open.add(path)), { once: true });
+        this.addEventListener("close", () => { open.delete(path); scene.heard(page, open, AGAIN_MS); });
+      }
+    } });
+  }
+
+  /**
+   * @param {Window} page
+   * @param {Set<string>} open  its connections over which something has come
+   * @param {number} wait_ms  until the viewer is loaded again, unless all are open by then
+   */
+  heard(page, open, wait_ms = PATIENCE_MS) {
+    if (this.frame?.contentWindow !== page) return; // one that is no longer shown
+    const lost = !LINES.every((path) => open.has(path));
+    this.stage.classList.toggle("lost", lost);
+    clearTimeout(this.waiting);
+    if (lost) this.waiting = setTimeout(() => { if (this.open) this.load(); }, wait_ms);
+  }
   /** @param {string} text */
   say(text) {
     const words = document.createElement("p");
     words.textContent = text;
     this.stage.replaceChildren(words);
+    this.stage.tabIndex = -1;
     this.frame = null;
   }
 
   /** @param {Status} status */
-  status({ outline: around, fovy }) {
+  status({ outline: around, fovy, preparing }) {
+    this.stage.classList.toggle("preparing", preparing ?? false);
     this.outline = around ?? null;
     this.fovy = fovy ?? this.fovy;
     this.draw();
@@ -66,7 +149,7 @@ export class Scene {
    * @param {HTMLIFrameElement} frame
    */
   listen(frame) {
-    const page = frame.contentWindow;
+    const page = frame.contentDocument && frame.contentWindow;
     if (!page) return;
     const kinds = /** @type {const} */ (
       ["pointerdown", "mousedown", "pointermove", "mousemove", "pointerup", "mouseup"]
@@ -80,7 +163,7 @@ export class Scene {
    * @param {MouseEvent | PointerEvent} event
    */
   hear(kind, event) {
-    if (!this.draggable) return;
+    if (!this.draggable || this.lost) return;
     const place = this.place(event);
     const hit = this.outline !== null && inside(place, this.outline);
     const ours = this.mouse.holds || (hit && event.buttons === 1 && kind.endsWith("down"));
@@ -91,7 +174,7 @@ export class Scene {
       if ("pointerId" in event) /** @type {Element} */ (event.target).setPointerCapture?.(event.pointerId);
       this.mouse.grab("", ...place);
     }
-    if (kind === "pointermove") this.mouse.move("", ...place, event.shiftKey);
+    if (kind === "pointermove") this.mouse.move("", ...place, event);
     if (kind === "pointerup") this.mouse.release();
   }
 

@@ -12,6 +12,7 @@ export class Transport {
     this.pause = /** @type {HTMLButtonElement} */ (element("pause"));
     this.step = /** @type {HTMLButtonElement} */ (element("step"));
     this.reset = element("reset");
+    this.stop = /** @type {HTMLButtonElement} */ (element("stop"));
     this.speed = /** @type {HTMLSelectElement} */ (element("speed"));
     this.measured = element("measured");
     this.badge = element("badge");
@@ -19,7 +20,8 @@ export class Transport {
     this.slider = element("slider");
     this.seek = /** @type {HTMLInputElement} */ (element("seek"));
     this.cell = element("cell");
-    this.paused = this.recording = this.sliding = false;
+    this.paused = this.recording = this.robot = this.sliding = false;
+    this.stop.addEventListener("click", () => ask({ do: "stop" }));
     this.pause.addEventListener("click", () => this.toggle());
     this.step.addEventListener("click", () => ask({ do: "step" }));
     this.reset.addEventListener("click", () => ask({ do: "reset" }));
@@ -28,7 +30,7 @@ export class Transport {
     this.seek.addEventListener("pointerdown", () => { this.sliding = true; });
     this.seek.addEventListener("pointerup", () => { this.sliding = false; });
     document.addEventListener("keydown", (event) => {
-      if (event.key !== " " || (event.target instanceof Element && event.target.matches("input, select, button"))) return;
+      if (event.key !== " " || event.defaultPrevented || (event.target instanceof Element && event.target.matches("input, select, button"))) return;
       event.preventDefault();
       this.toggle();
     });
@@ -41,10 +43,14 @@ export class Transport {
     this.recording = about.mode === "recording";
     this.slider.hidden = !this.recording;
     if (this.recording) this.seek.max = String(about.duration);
+    this.robot = about.mode === "robot";
+    this.stop.hidden = !this.robot;
+    this.pause.hidden = this.step.hidden = this.reset.hidden = this.robot;
+    element("speed-choice").hidden = this.robot;
     this.reset.textContent = this.recording ? "To the start" : "Reset";
   }
 
-  toggle() { this.ask({ do: this.paused ? "resume" : "pause" }); }
+  toggle() { this.ask({ do: this.robot ? "stop" : this.paused ? "resume" : "pause" }); }
 
   /** @param {boolean} open */
   connected(open) {
@@ -52,7 +58,7 @@ export class Transport {
   }
 
   /** @param {Status} status */
-  status({ time, paused, speed, measured, outcome }) {
+  status({ time, paused, speed, measured, outcome, preparing }) {
     this.paused = paused ?? false;
     this.time.textContent = time === undefined ? "" : `${time.toFixed(2)} s`;
     this.pause.textContent = paused ? "Resume" : "Pause";
@@ -60,9 +66,10 @@ export class Transport {
     this.measured.textContent = paused || measured === undefined ? "" : `${measured.toFixed(2)} × real time`;
     if (this.recording && !this.sliding) this.seek.value = String(time ?? 0);
     const over = outcome && !this.recording;
-    this.pause.disabled = this.step.disabled = Boolean(over);
+    this.pause.disabled = this.step.disabled = this.stop.disabled = Boolean(over);
     if (over) this.measured.textContent = "";
-    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}${over ? ". Reset begins again." : ""}`);
+    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}${over && !this.robot ? ". Reset begins again." : ""}`);
+    else if (preparing) this.mark("preparing", "plain", "Loading kernels. The first time on a computer they are compiled, which takes a minute or two.");
     else this.mark(paused ? "paused" : "running", paused ? "plain" : "good", "");
   }
 

@@ -1,0 +1,211 @@
+"""Draws charts as SVG that stands in a page: the page's style sheet gives ink and colours.
+
+Text is text and takes its place from what it can be at most; the legend stands above the chart as
+a line of HTML. So no label is cut off, and nothing lies over the data.
+"""
+
+from collections.abc import Iterator, Sequence
+from html import escape
+
+import numpy as np
+
+from vergence.app.figures.axis import range_of, thinned, ticks
+from vergence.app.figures.chart import Chart, Curve, Marks, Panel
+from vergence.arrays import FloatArray
+
+WIDTH, LEFT, RIGHT = 940.0, 62.0, 14.0  # of the whole, and free beside the axes
+_IMAGE_WIDTH = 420.0  # of an image's frame with its margin
+_TITLE, _EVENTS, _TICKS, _GAP = 24.0, 14.0, 18.0, 10.0  # heights of what stands about a panel
+_HEIGHT, _ROW, _BAR = 140.0, 36.0, 12.0  # heights of a panel, of a row of stretches, of its bar
+_MOST_TICKS, _FEW_TICKS = 9, 5
+
+_SHAPES = {
+    "start": '<circle class="mark hollow" cx="{x}" cy="{y}" r="4"/>',
+    "end": '<circle class="mark" cx="{x}" cy="{y}" r="3.5"/>',
+    "desired": '<path class="mark" d="M{x} {y}m-6 0h12m-6 -6v12"/>',
+}
+
+
+class _Axes:
+    """A panel's place in the drawing: from values to coordinates."""
+
+    def __init__(self, chart: Chart, panel: Panel, top: float) -> None:
+        self.panel, self.top = panel, top
+        self.left, self.right = LEFT, WIDTH - RIGHT
+        self.x_low, self.x_high = chart.x_low, chart.x_high
+        self.height = _HEIGHT
+        values = np.concatenate([curve.y for curve in panel.curves] or [np.empty(0)])
+        self.low, self.high = range_of(values, panel.low, panel.high)
+        if panel.rows:
+            self.height = _ROW * len(panel.rows)
+            self.low, self.high = float(len(panel.rows)), 0.0
+        if panel.image is not None:
+            width, height = panel.image
+            self.right = LEFT + _IMAGE_WIDTH
+            margin = 0.02 * width
+            self.x_low, self.x_high = -0.5 - margin, width - 0.5 + margin
+            self.low, self.high = height - 0.5 + margin, -0.5 - margin
+            self.height = _IMAGE_WIDTH * (height + 2 * margin) / (width + 2 * margin)
+
+    @property
+    def bottom(self) -> float:
+        return self.top + self.height
+
+    def x(self, value: "float | FloatArray") -> FloatArray:
+        share = (np.asarray(value) - self.x_low) / (self.x_high - self.x_low)
+        return np.asarray(self.left + share * (self.right - self.left))
+
+    def y(self, value: "float | FloatArray") -> FloatArray:
+        share = (np.asarray(value) - self.low) / (self.high - self.low)
+        return np.asarray(self.bottom - share * self.height)
+
+
+def chart_svg(chart: Chart, name: str) -> str:
+    """Return a chart as HTML: its legend, and under it the drawing.
+
+    Args:
+        chart: what to draw.
+        name: of the drawing, for who cannot see it.
+    """
+    top = _EVENTS if chart.events else 0.0  # free for the numbers of the events
+    parts: list[str] = []
+    for panel in chart.panels:
+        axes = _Axes(chart, panel, top + _TITLE)
+        parts += _panel(axes, chart.events)
+        top = axes.bottom + _GAP
+    parts += _x_axis(axes, chart.x_title)
+    parts += (
+        _text(float(axes.x(place)), _TITLE + _EVENTS - 4, number, "middle")
+        for place, number in chart.events
+    )
+    width, height = axes.right + RIGHT, axes.bottom + 2 * _TICKS + 2
+    clock = ""
+    if chart.over_time:
+        clock = f' data-time="{chart.x_high:g}" data-left="{axes.left}" data-right="{axes.right}"'
+        parts.append(f'<path class="cursor" d="M0 {_TITLE}V{axes.bottom:.0f}"/>')
+    drawing = (
+        f'<svg class="chart" viewBox="0 0 {width:.0f} {height:.0f}" role="img" '
+        f'aria-label="{escape(name)}"{clock}>{"".join(parts)}</svg>'
+    )
+    return _legend(chart) + drawing
+
+
+def _panel(axes: _Axes, events: Sequence[tuple[float, str]]) -> Iterator[str]:
+    panel = axes.panel
+    first = axes.top < 2 * _TITLE
+    title_at = axes.top - 8 - (_EVENTS if first and events else 0)
+    yield _text(axes.left, title_at, panel.title, "title")
+    if not panel.rows:
+        yield from _y_axis(axes)
+    if panel.limits is not None:
+        yield from _limits(axes, panel.limits)
+    if panel.image is not None:
+        yield _image_frame(axes, *panel.image)
+    yield from (_curve(axes, curve) for curve in panel.curves)
+    yield from (_marks(axes, marks) for marks in panel.marks)
+    yield from _stretches(axes)
+    for place, _ in events:
+        x = float(axes.x(place))
+        yield f'<path class="event" d="M{x:.1f} {axes.top:.1f}V{axes.bottom:.1f}"/>'
+
+
+def _y_axis(axes: _Axes) -> Iterator[str]:
+    low, high = sorted((axes.low, axes.high))
+    most = _MOST_TICKS if axes.panel.image is not None else _FEW_TICKS
+    for place, name in zip(*ticks(low, high, most), strict=True):
+        y = float(axes.y(place))
+        yield f'<path class="grid" d="M{axes.left:.0f} {y:.1f}H{axes.right:.0f}"/>'
+        yield _text(axes.left - 7, y + 4, name, "end")
+
+
+def _x_axis(axes: _Axes, title: str) -> Iterator[str]:
+    for place, name in zip(*ticks(axes.x_low, axes.x_high, _MOST_TICKS), strict=True):
+        x = float(axes.x(place))
+        yield f'<path class="axis" d="M{x:.1f} {axes.bottom:.1f}v4"/>'
+        yield _text(x, axes.bottom + _TICKS, name, "middle")
+    yield f'<path class="axis" d="M{axes.left:.0f} {axes.bottom:.1f}H{axes.right:.0f}"/>'
+    yield _text(axes.right, axes.bottom + 2 * _TICKS - 2, title, "end")
+
+
+def _limits(axes: _Axes, limits: tuple[float, float]) -> Iterator[str]:
+    width = axes.right - axes.left
+    low, high = (float(axes.y(limit)) for limit in limits)
+    for top, bottom in ((axes.top, high), (low, axes.bottom)):
+        yield (
+            f'<rect class="beyond" x="{axes.left:.0f}" y="{top:.1f}" width="{width:.0f}" '
+            f'height="{max(bottom - top, 0.0):.1f}"/>'
+        )
+    for y in (low, high):
+        yield f'<path class="limit" d="M{axes.left:.0f} {y:.1f}H{axes.right:.0f}"/>'
+
+
+def _image_frame(axes: _Axes, width: int, height: int) -> str:
+    left, right = (float(axes.x(u)) for u in (-0.5, width - 0.5))
+    top, bottom = (float(axes.y(v)) for v in (-0.5, height - 0.5))
+    return (
+        f'<rect class="frame" x="{left:.1f}" y="{top:.1f}" '
+        f'width="{right - left:.1f}" height="{bottom - top:.1f}"/>'
+    )
+
+
+def _curve(axes: _Axes, curve: Curve) -> str:
+    x, y = curve.x, curve.y
+    if axes.panel.image is None:
+        x, y = thinned(x, y, int(axes.right - axes.left))
+    known = np.isfinite(x) & np.isfinite(y)
+    places = np.column_stack((axes.x(x), axes.y(y)))[known]
+    begins = known & ~np.concatenate(([False], known[:-1]))
+    commands = np.where(begins[known], "M", "L").tolist()
+    path = "".join(
+        f"{command}{u:.1f} {v:.1f}"
+        for command, (u, v) in zip(commands, places.tolist(), strict=True)
+    )
+    return f'<path class="curve c{curve.color} {curve.dash}" d="{path}"/>'
+
+
+def _marks(axes: _Axes, marks: Marks) -> str:
+    known = marks.points[np.isfinite(marks.points).all(axis=1)]
+    places = np.column_stack((axes.x(known[:, 0]), axes.y(known[:, 1]))).round(1)
+    return "".join(_SHAPES[marks.shape].format(x=u, y=v) for u, v in places.tolist())
+
+
+def _stretches(axes: _Axes) -> Iterator[str]:
+    panel = axes.panel
+    for row, name in enumerate(panel.rows):
+        y = axes.top + _ROW * row + 0.7 * _ROW
+        yield f'<path class="grid" d="M{axes.left:.0f} {y:.1f}H{axes.right:.0f}"/>'
+        yield _text(axes.left, y - 10, name, "")
+    for one in panel.stretches:
+        y = axes.top + _ROW * one.row + 0.7 * _ROW - 0.5 * _BAR
+        for start, length in one.spans:
+            left, right = (float(axes.x(time)) for time in (start, start + length))
+            yield (
+                f'<rect class="fill c{one.color}" x="{left:.1f}" y="{y:.1f}" '
+                f'width="{max(right - left, 1.0):.1f}" height="{_BAR}"/>'
+            )
+
+
+def _text(x: float, y: float, text: str, kind: str) -> str:
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}">{escape(text)}</text>'
+
+
+def _legend(chart: Chart) -> str:
+    """Return what colours, dashes and marks mean, each once; nothing for a single curve."""
+    entries: dict[str, str] = {}
+    for panel in chart.panels:
+        for curve in panel.curves:
+            line = f'<path class="curve c{curve.color} {curve.dash}" d="M1 8H23"/>'
+            entries.setdefault(curve.label, line)
+        for marks in panel.marks:
+            if len(marks.points):
+                entries.setdefault(marks.label, _SHAPES[marks.shape].format(x=12, y=8))
+        for one in panel.stretches:
+            entries.setdefault(
+                one.label, f'<rect class="fill c{one.color}" x="3" y="3" width="18" height="10"/>'
+            )
+    entries.pop("", None)
+    keys = "".join(
+        f'<span><svg viewBox="0 0 24 16" aria-hidden="true">{ink}</svg>{escape(label)}</span>'
+        for label, ink in entries.items()
+    )
+    return f'<p class="legend">{keys}</p>' if entries else ""

@@ -1,0 +1,119 @@
+"""The options of `vergence compare` and `vergence map`."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app import names
+from vergence.app.options.shared import CellName, Json, Settings
+from vergence.errors import InputError, nearest
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignOptions:
+    """Which cell is run many times, and how."""
+
+    cell: CellName
+    tolerance_px: Annotated[
+        float,
+        typer.Option(
+            min=0.0, help="A run has converged if every feature ends within so many pixels."
+        ),
+    ] = 2.0
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of processes on this machine. Default: one per core."),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Address of a Dask scheduler whose workers do the runs."
+        ),
+    ] = None
+    physics: Annotated[
+        bool,
+        typer.Option("--physics", help="Simulate physics too: slower, with servos that lag."),
+    ] = False
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write to, instead of runs/NAME-TIME. Runs in it are not repeated."
+        ),
+    ] = None
+    settings: Settings = None
+    as_json: Json = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions(CampaignOptions):
+    """Which laws are compared, and from what draws."""
+
+    laws: Annotated[
+        str | None,
+        typer.Option(
+            help="Names separated by commas: own (the cell's law), a name in the file's laws, "
+            "image_based, image_based_desired, image_based_mean, optimal_tracking, "
+            "constrained, constrained_tracking. Default: own and the file's laws.",
+            autocompletion=names.laws,
+        ),
+    ] = None
+    starts: Annotated[int, typer.Option(min=1, help="Number of starts for each law.")] = 20
+    vary: Annotated[
+        str,
+        typer.Option(
+            help="What is drawn at random: starts, targets, motions, separated by commas."
+        ),
+    ] = "starts"
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0
+    spread: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="Spread of the draws: of starts, as a share of a joint's range; of targets, as a "
+            "share of their distance.",
+        ),
+    ] = 0.2
+    speed: Annotated[
+        float, typer.Option(min=0.0, help="Speed of the fastest motion that is drawn, in m/s.")
+    ] = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOptions(CampaignOptions):
+    """What is mapped."""
+
+    over: Annotated[
+        str,
+        typer.Option(
+            help="What is varied: places (the target goes to points of a square) or headings.",
+            autocompletion=names.over,
+        ),
+    ] = "places"
+    extent: Annotated[
+        float,
+        typer.Option(min=0.0, help="Half the side of the square, or the length of the path, in m."),
+    ] = 0.5
+    steps: Annotated[
+        int, typer.Option(min=2, help="Number of points along a side, or of directions.")
+    ] = 11
+    speeds: Annotated[
+        str,
+        typer.Option(
+            help="Speeds of the target in m/s, separated by commas; places use the first."
+        ),
+    ] = "0.1"
+    laws: Annotated[
+        str,
+        typer.Option(help="Laws, as for `vergence compare`.", autocompletion=names.laws),
+    ] = "own"
+
+    def __post_init__(self) -> None:
+        """Raise InputError if a value is none of those allowed."""
+        if self.over not in names.OVER:
+            raise InputError("--over", "", self.over, nearest(self.over, names.OVER))
+        if not 0 < self.extent < math.inf:
+            raise InputError("--extent", "", self.extent, "above zero, in m")

@@ -1,0 +1,33 @@
+"""The options of `vergence check`."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from vergence.app import names
+from vergence.app.options.shared import CellName, Json, Out, Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions:
+    """Which robot is brought up, and how far its joints are moved."""
+
+    cell: CellName
+    driver: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME[:ADDRESS]",
+            help="The robot: a driver by its name, or module:Class of your own.",
+            autocompletion=names.drivers,
+        ),
+    ]
+    nudge_deg: Annotated[
+        float, typer.Option(min=0.1, max=20, help="Angle that each joint is turned by.")
+    ] = 2.0
+    nudge_mm: Annotated[
+        float, typer.Option(min=0.1, max=100, help="Distance that each sliding joint is moved by.")
+    ] = 5.0
+    out: Out = None
+    settings: Settings = None
+    as_json: Json = False

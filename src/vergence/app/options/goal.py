@@ -1,0 +1,33 @@
+"""The options of `vergence goal`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app.options.shared import CellName, Driver, Json, Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalOptions:
+    """Where a photograph is taken, and what is kept with it."""
+
+    cell: CellName
+    out: Annotated[Path, typer.Option(help="File of the photograph: .png or .jpg.")] = Path(
+        "goal.png"
+    )
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEG,DEG,…",
+            help="Joint positions to take it from, in simulation. Default: the start.",
+        ),
+    ] = None
+    distance_m: Annotated[
+        float | None,
+        typer.Option(help="Distance from camera to object, if you know it roughly.", min=1e-6),
+    ] = None
+    settings: Settings = None
+    driver: Driver = None
+    as_json: Json = False

@@ -1,0 +1,64 @@
+"""The options of `vergence track`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vergence.app.options.shared import Json, Out
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackOptions:
+    """Which footage, which object, and how it is followed."""
+
+    images: Annotated[str, typer.Argument(help="A folder of images, a video, or a ROS 2 bag.")]
+    model: Annotated[str, typer.Option(help="The object: an OBJ, STL or MJCF file.")]
+    start: Annotated[
+        str,
+        typer.Option(
+            help="The object's pose in the camera, in the first image: "
+            "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file."
+        ),
+    ]
+    camera: Annotated[
+        Path | None,
+        typer.Option(help="Camera file with the intrinsics: TOML, JSON or YAML, also ROS's."),
+    ] = None
+    fx: Annotated[float | None, typer.Option("--fx", help="Focal length along u, in pixels.")] = (
+        None
+    )
+    fy: Annotated[
+        float | None, typer.Option("--fy", help="Focal length along v, in pixels. Default: --fx.")
+    ] = None
+    cx: Annotated[
+        float | None, typer.Option("--cx", help="Principal point along u. Default: the middle.")
+    ] = None
+    cy: Annotated[
+        float | None, typer.Option("--cy", help="Principal point along v. Default: the middle.")
+    ] = None
+    distortion: Annotated[
+        str | None, typer.Option(help="Distortion k1,k2,p1,p2,k3. Default: none.")
+    ] = None
+    topic: Annotated[
+        str | None, typer.Option(help="Topic of the images, if the bag has several.")
+    ] = None
+    rate: Annotated[float | None, typer.Option(help="Frame rate, in images per second.")] = None
+    scale: Annotated[
+        float, typer.Option(help="Metres per unit of the model file: 0.001 for millimetres.")
+    ] = 1.0
+    contrast: Annotated[
+        float, typer.Option(help="Smallest step in grey levels that counts as an edge.")
+    ] = 5.0
+    jolt: Annotated[
+        float, typer.Option(help="Unpredicted motion to allow for, in pixels per image.")
+    ] = 3.0
+    share: Annotated[
+        float, typer.Option(help="Share of the edges that has to be found for an image to count.")
+    ] = 0.5
+    overlay: Annotated[
+        bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
+    ] = True
+    out: Out = None
+    as_json: Json = False

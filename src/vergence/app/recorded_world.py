@@ -1,0 +1,61 @@
+"""The cell that a recording was made in, to be put up in the poses of the recording."""
+
+from typing import Self
+
+from vergence.arrays import FloatArray
+from vergence.cell import load_cell
+from vergence.errors import InputError
+from vergence.runtime import RunInfo
+from vergence.simulation import choose_renderer
+from vergence.simulation.world import World
+
+_SETTING = "# set: "  # before what was set on the command line, in the text of a cell
+
+
+class RecordedWorld:
+    """A world without physics.
+
+    Args:
+        world: of the cell.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    @classmethod
+    def of(cls, info: RunInfo) -> Self | str:
+        """Return the world of a recorded run, or why it cannot be put up here."""
+        if not info.text:
+            return "It says nothing of a cell."
+        for source in (info.path, info.cell):
+            try:
+                cell = load_cell(source, _settings(info.text), info.seed)
+            except InputError:
+                continue
+            if _plain(cell.text) != _plain(info.text):
+                return f"{source} is not what it was when the recording was made."
+            choose_renderer(needed=False)
+            try:
+                return cls(World(cell))
+            except InputError as error:
+                return str(error)
+        return "The cell file that was run is not on this machine."
+
+    def place(self, joints: dict[str, FloatArray], T_world_target: FloatArray | None) -> FloatArray:
+        """Put the arms and the target somewhere, a target of None where it is; return the state."""
+        if T_world_target is not None:
+            self.world.move_target(T_world_target)
+        self.world.place(joints)
+        return self.world.state()
+
+
+def _settings(text: str) -> dict[str, str]:
+    """Return what was set on the command line, but for the seed."""
+    lines = (line.removeprefix(_SETTING) for line in text.splitlines() if line.startswith(_SETTING))
+    pairs = (line.partition(" = ") for line in lines)
+    return {key: value for key, _, value in pairs if key != "seed"}
+
+
+def _plain(text: str) -> list[str]:
+    """Return the lines of a cell file, without blank ones and what was set on the command line."""
+    return [line for line in text.splitlines() if line and not line.startswith(_SETTING)]

@@ -1,0 +1,155 @@
+"""The report of two runs side by side: their numbers in one table, their signals on one axis."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from vergence.app import markup
+from vergence.app.figures.pair import arms_chart, errors_chart
+from vergence.app.recorded_images import camera_images
+from vergence.app.robot_film import robot_film
+from vergence.app.signals_csv import write_signals
+from vergence.app.table import Row, arm_rows, camera_rows, run_rows
+from vergence.runtime.recording import Recording
+
+Runs = Mapping[str, Recording]  # by the name that tells them apart
+
+
+def write_pair(first: Path, second: Path) -> Path:
+    """Write the page of two runs beside the first one's report; return where it is.
+
+    The numbers of each run lie beside it.
+
+    Raises:
+        InputError: if a folder holds no recording.
+    """
+    recordings = [Recording.open(path) for path in (first, second)]
+    runs = dict(zip(_names((first, second)), recordings, strict=True))
+    page = recordings[0].folder / f"report-against-{_stem(second)}.html"
+    signals = {name: f"{page.stem}-{number}.csv" for number, name in enumerate(runs, 1)}
+    for name, run in runs.items():
+        write_signals(run, page.with_name(signals[name]))
+    page.write_text(make_pair(runs, signals), encoding="utf-8")
+    return page
+
+
+def make_pair(runs: Runs, signals: Mapping[str, str]) -> str:
+    """Return the page of runs beside each other, which needs nothing but itself.
+
+    Args:
+        runs: what it is of.
+        signals: names of the files beside it that have the numbers of each run.
+    """
+    cameras = _common([run.cameras for run in runs.values()])
+    arms = _common([run.arms for run in runs.values()])
+    parts = [
+        _header(runs),
+        _summary(runs, cameras, arms),
+        _robot(runs),
+        *(_camera(runs, name) for name in cameras),
+        *(_arm(runs, name) for name in arms),
+        _footer(signals),
+        markup.script("report.js"),
+    ]
+    title = " and ".join(runs)
+    return markup.page(f"{title} · vergence", "\n".join(filter(None, parts)))
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Return short names of runs, their paths where those are the same."""
+    names = [_stem(path) for path in paths]
+    return names if len(set(names)) == len(names) else [f"{n}: {p}" for n, p in enumerate(paths, 1)]
+
+
+def _stem(path: Path) -> str:
+    resolved = path.resolve()
+    return resolved.name if resolved.is_dir() else resolved.stem
+
+
+def _common(named: Sequence[Mapping[str, object]]) -> list[str]:
+    """Return the names that all have, in the order of the first."""
+    return [name for name in named[0] if all(name in other for other in named[1:])]
+
+
+def _header(runs: Runs) -> str:
+    lines = "".join(
+        f"<p>{markup.badge(run.outcome.kind.value, run.outcome.succeeded)}"
+        f"<b>{escape(name)}</b> ({escape(run.info.cell)}) after {run.outcome.time:.2f} s: "
+        f"{escape(run.outcome.reason)}</p>"
+        for name, run in runs.items()
+    )
+    title = escape(" and ".join(runs))
+    return f'<header><span class="kicker">vergence report</span><h1>{title}</h1>{lines}</header>'
+
+
+def _summary(runs: Runs, cameras: Sequence[str], arms: Sequence[str]) -> str:
+    tables = [_table("Run", runs, [run_rows(run) for run in runs.values()])]
+    if any(tasks := [_task_rows(run) for run in runs.values()]):
+        tables.append(_table("Tasks", runs, tasks))
+    for name in cameras:
+        rows = [camera_rows(run.cameras[name]) for run in runs.values()]
+        tables.append(_table(f"Camera {name}", runs, rows))
+    for name in arms:
+        rows = [arm_rows(run.info.arms[name], run.arms[name]) for run in runs.values()]
+        tables.append(_table(f"Arm {name}", runs, rows))
+    return markup.section("Summary", *tables)
+
+
+def _task_rows(run: Recording) -> list[Row]:
+    """Return how each of several tasks ended, numbered: two may be of one name."""
+    return [
+        Row(f"{number}. {task.name}", f"{task.outcome.kind.value}, {task.outcome.time:.2f} s")
+        for number, task in enumerate(run.outcome.tasks, 1)
+    ]
+
+
+def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
+    """Return the rows of all runs as one table, a column a run; what a run lacks is empty."""
+    by_name = [{row.name: row for row in own} for own in rows]
+    names = dict.fromkeys(name for own in by_name for name in own)
+    heading = "".join(f'<th class="number">{escape(run)}</th>' for run in runs)
+    lines = []
+    for name in names:
+        cells = [own.get(name, Row(name, "–")) for own in by_name]
+        numbers = "".join(f'<td class="number">{escape(cell.value)}</td>' for cell in cells)
+        unit = next((cell.unit for cell in cells if cell.unit), "")
+        lines.append(
+            f'<tr><th scope="row">{escape(name)}</th>{numbers}<td class="unit">{escape(unit)}</td>'
+            "</tr>"
+        )
+    body = "\n".join(lines)
+    return (
+        f'<h3>{escape(title)}</h3><table class="pair">'
+        f"<thead><tr><th></th>{heading}<th></th></tr></thead>"
+        f"<tbody>{body}</tbody></table>"
+    )
+
+
+def _robot(runs: Runs) -> str:
+    """Return films of the cells from outside; none where one cannot be drawn."""
+    films = [
+        markup.film(robot_film(run), f"the robot, {label}", escape(label))
+        for label, run in runs.items()
+    ]
+    return markup.section("Robot", markup.beside(*films) if all(films) else "")
+
+
+def _camera(runs: Runs, name: str) -> str:
+    films = [
+        markup.film(camera_images(run, name).film, f"{name}, {label}", escape(label))
+        for label, run in runs.items()
+    ]
+    traces = {label: run.cameras[name] for label, run in runs.items()}
+    chart = markup.chart(errors_chart(traces), "How well the points were followed.")
+    return markup.section(f"Camera {name}", markup.beside(*films), chart)
+
+
+def _arm(runs: Runs, name: str) -> str:
+    arms = {label: (run.info.arms[name], run.arms[name]) for label, run in runs.items()}
+    caption = "How near the arm came to its limits and to singularities."
+    return markup.section(f"Arm {name}", markup.chart(arms_chart(arms), caption))
+
+
+def _footer(signals: Mapping[str, str]) -> str:
+    files = ", ".join(f"{escape(file)} ({escape(name)})" for name, file in signals.items())
+    return f"<footer>The numbers of every tick are beside this page: {files}.</footer>"

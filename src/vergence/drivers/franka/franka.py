@@ -1,0 +1,48 @@
+"""The settings of a robot of Franka."""
+
+from vergence.drivers.arm_driver import ArmDriver
+from vergence.drivers.equipment import Equipment
+from vergence.drivers.franka.connection import connect, connect_hand
+from vergence.drivers.franka.franka_link import FrankaLink
+from vergence.optional_package import optional_package
+from vergence.parts import knob, part
+from vergence.runtime.driver import Driver
+
+_JOINTS = 7
+
+
+@part("driver", "franka")
+class Franka:
+    """A Panda or FR3 through its real-time interface (FCI): joint velocities, limited in jerk."""
+
+    address: str  # of the robot, such as 172.16.0.2
+    rate_hz: float = knob(500.0, "Hz", least=50.0, upto=1000.0)  # of set-points
+    position_gain: float = knob(
+        4.0, "1/s", least=0.0, upto=20.0
+    )  # pulls the joints to the set-points
+    jerk_share: float = knob(
+        0.4, least=0.05, upto=1.0
+    )  # of the robot's limits of jerk; a new set-point may double it for an instant
+    watchdog_s: float = knob(
+        0.1, "s", least=0.02, upto=2.0
+    )  # after a set-point, the arm goes on so long, and brakes
+    gripper: str = ""  # name of the output that is the robot's hand; without one, it is not used
+    gripper_speed_m_s: float = knob(0.1, "m/s", least=0.01, upto=0.2)  # at which it opens, closes
+    gripper_force_n: float = knob(20.0, "N", least=1.0, upto=70.0)  # with which it holds
+    realtime: bool = True  # refuse a computer without a real-time kernel
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)  # the robot's clock may stand so long
+    connect_s: float = knob(10.0, "s", above=0.0, upto=60.0)  # for the robot to answer
+
+    def open(self, equipment: Equipment) -> Driver:
+        """Connect to the robot; nothing moves before the first set-point."""
+        name = equipment.only_arm("franka", _JOINTS)
+        equipment.check_sources("franka")
+        franky = optional_package("franka", "franky", "franka")
+        robot = connect(franky, self.address, self.realtime, self.connect_s)
+        hand = connect_hand(franky, self.address, self.connect_s) if self.gripper else None
+        link = FrankaLink(franky, robot, self, equipment.arms[name], hand)
+        try:
+            return ArmDriver(equipment, name, link, self.timeout_s)
+        except BaseException:
+            link.close()
+            raise

@@ -1,0 +1,137 @@
+"""The settings of a robot behind ROS 2."""
+
+from dataclasses import field
+from pathlib import Path
+from typing import Any, Literal
+
+from vergence.camera import Camera
+from vergence.camera.encodings import PIXEL_BYTES
+from vergence.drivers import bridges
+from vergence.drivers.bridge_process import BridgeProcess, BridgeProgram
+from vergence.drivers.equipment import Equipment
+from vergence.drivers.ros2.camera_info import check_image, check_info
+from vergence.drivers.ros2.ros2_driver import Ros2Driver
+from vergence.errors import NOTHING, InputError, nearest
+from vergence.parts import knob, part
+from vergence.runtime.driver import Driver
+
+_TOPICS = {
+    "trajectory": "/joint_trajectory_controller/joint_trajectory",
+    "velocity": "/forward_velocity_controller/commands",
+    "position": "/forward_position_controller/commands",
+    "twist": "/servo_node/delta_twist_cmds",
+}
+_INSTALL = (
+    "a Python that has rclpy: /usr/bin/python3 after sourcing ROS's setup.bash, or one of its own: "
+    "python3 -m venv ros2 && ros2/bin/pip install 'ros-kilted-rclpy[fastrtps]' "
+    "ros-kilted-sensor-msgs ros-kilted-std-srvs ros-kilted-trajectory-msgs, "
+    "and --driver ros2:ros2/bin/python"
+)
+_AHEAD_S = 0.02  # that a trajectory goes on before it brakes, at least
+
+
+@part("driver", "ros2")
+class Ros2:
+    """A robot behind ROS 2: joint states and images in, commands of its arm controller out."""
+
+    address: str = "/usr/bin/python3"  # the Python that has rclpy
+    command: Literal["trajectory", "velocity", "position", "twist"] = "trajectory"  # see the guide
+    command_topic: str = ""  # of the arm's controller; the usual one of `command` if empty
+    joint_states: str = "/joint_states"  # topic; the stamps are the driver's clock
+    joints: tuple[str, ...] = ()  # their names there, one a joint; those of the model if absent
+    images: dict[str, str] = field(
+        default_factory=dict
+    )  # topic by camera name; /NAME/image_raw if absent
+    image_latency_s: float = knob(
+        0.0, "s", least=0.0, upto=2.0
+    )  # from exposure to an image's stamp
+    running: str = ""  # topic of a Bool, false while the robot takes no commands
+    speed_scale: str = ""  # topic of a Float64, in percent
+    twist_frame: str = ""  # of `twist`: TF's name of the cell's camera, the end effector of Servo
+    position_gain: float = knob(
+        4.0, "1/s", least=0.0, upto=20.0
+    )  # of `velocity` and `twist`: pulls the joints to the set-points
+    outputs: dict[str, str] = field(
+        default_factory=dict
+    )  # topic by name, of Bool, Float64 or Float64MultiArray; or a service SetBool
+    output_values: dict[str, tuple[float, float]] = field(
+        default_factory=dict
+    )  # by name, what a topic of numbers is told at 0 and at 1; 0 and 1 if absent
+    watchdog_s: float = knob(
+        0.25, "s", least=0.02, upto=10.0
+    )  # without a set-point, the bridge brakes an arm that moves
+    timeout_s: float = knob(
+        0.5, "s", above=0.0, upto=10.0
+    )  # without joint states, the robot is silent
+    connect_s: float = knob(10.0, "s", above=0.0, upto=600.0)  # for topics that are starting
+
+    def open(self, equipment: Equipment) -> Driver:
+        """Start the bridge and wait for the robot's topics; nothing moves before a set-point."""
+        name = equipment.only_arm("ros2")
+        images = self._topics_of_images(equipment)
+        settings = self._settings(equipment, name, images)
+        program = BridgeProgram(Path(bridges.__file__).parent, "ros2", "ROS 2", _INSTALL)
+        place = equipment.source, "driver.address"
+        bridge = BridgeProcess(program, self.address, place, settings, self.connect_s)
+        try:
+            self._check_cameras(equipment, bridge.found, images)
+            return Ros2Driver(bridge, equipment, name, self)
+        except BaseException:
+            bridge.close()
+            raise
+
+    def _topics_of_images(self, equipment: Equipment) -> dict[str, str]:
+        """Return the topics of the cameras that ROS 2 has to deliver."""
+        for name in self.images:
+            if name not in equipment.cameras:
+                allowed = nearest(name, equipment.cameras)
+                raise InputError(equipment.source, "driver.images", name, allowed)
+        needed = [name for name in equipment.watched if name not in equipment.sources]
+        return {name: f"/{name}/image_raw" for name in needed} | self.images
+
+    def _settings(self, equipment: Equipment, name: str, images: dict[str, str]) -> dict[str, Any]:
+        """Return what the bridge has to know."""
+        arm = equipment.arms[name]
+        if self.joints and len(self.joints) != arm.joint_count:
+            given, allowed = (
+                f"{len(self.joints)} names",
+                f"{arm.joint_count}, one a joint of {name}",
+            )
+            raise InputError(equipment.source, "driver.joints", given, allowed)
+        for output in self.output_values:
+            if output not in self.outputs:
+                allowed = nearest(output, self.outputs)
+                raise InputError(equipment.source, "driver.output_values", output, allowed)
+        if self.command == "twist" and not self.twist_frame:
+            allowed = "TF's name of the frame of the cell's camera, for command twist"
+            raise InputError(equipment.source, "driver.twist_frame", NOTHING, allowed)
+        return {
+            "arm": name,
+            "joints": list(self.joints or arm.names),
+            "acceleration_max": arm.acceleration_max.tolist(),
+            "command": self.command,
+            "command_topic": self.command_topic or _TOPICS[self.command],
+            "joint_states": self.joint_states,
+            "images": images,
+            "image_latency_s": self.image_latency_s,
+            "pixel_bytes": PIXEL_BYTES,
+            "outputs": self.outputs,
+            "output_values": self.output_values,
+            "running": self.running,
+            "speed_scale": self.speed_scale,
+            "twist_frame": self.twist_frame,
+            "trajectory_ahead_s": _AHEAD_S,
+            "watchdog_s": self.watchdog_s,
+            "timeout_s": self.timeout_s,
+            "connect_s": self.connect_s,
+        }
+
+    def _check_cameras(
+        self, equipment: Equipment, found: dict[str, Any], topics: dict[str, str]
+    ) -> None:
+        for name, topic in topics.items():
+            camera: Camera = equipment.cameras[name]
+            check_image(equipment.source, name, camera, topic, found["images"][name])
+            if (info := found["infos"].get(name)) is not None:
+                rectified = "rect" in topic.removesuffix("/compressed").rpartition("/")[2]
+                check_info(equipment.source, name, camera, info, rectified)

@@ -1,0 +1,99 @@
+"""The last part of the way: the photograph's own points are followed, and the end is judged."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.estimation.displacement import Displacement
+from vergence.estimation.goal_fit import GoalFit
+from vergence.geometry import se3_inverse
+from vergence.planning.approach.answers import Arrived, in_words
+from vergence.planning.approach.arrival import GoalPoints
+from vergence.planning.approach.goal import ApproachSettings, GoalImage
+from vergence.planning.approach.recognition import Recognition, confirm
+from vergence.signals import Frame, Outcome, OutcomeKind
+from vergence.vision.tracks import Tracks
+
+NEAR_PX = 32.0  # of the photograph's points from their places, at which they are followed
+
+
+class Closing:
+    """Follows the photograph's points, and says how far the camera is from its goal.
+
+    Args:
+        goal: the photograph.
+        settings: see `ApproachSettings`.
+
+    Attributes:
+        points: the photograph's own points; None before it is recognised.
+        begun: whether they are followed.
+        scale_deviation: relative, of all lengths; the least so far.
+    """
+
+    def __init__(self, goal: GoalImage, settings: ApproachSettings) -> None:
+        self._goal, self._settings = goal, settings
+        self.points: GoalPoints | None = None
+        self.begun = False
+        self.scale_deviation = 1.0
+
+    def take(self, found: Recognition) -> None:
+        """Go on from points recognised anew."""
+        self.points, self.begun = GoalPoints(self._goal, found.recognised_px), False
+
+    def begin(self, fit: GoalFit, T_world_camera: FloatArray, frame: Frame) -> str:
+        """Follow the photograph's points if they are where they are expected; say how many are."""
+        assert self.points is not None
+        assert frame.image is not None
+        self.points.learn(fit)
+        T_goal_camera = se3_inverse(fit.T_world_goal) @ T_world_camera
+        if self.points.shift_px(T_goal_camera) > NEAR_PX:
+            return ""
+        tracks = self.points.track(frame.image, frame.time, T_goal_camera)
+        if tracks is None:
+            return ""
+        self.begun = True
+        return f"{np.count_nonzero(tracks.found)} of {len(tracks.found)}"
+
+    def tracks(self, frame: Frame) -> Tracks | None:
+        """Return the points in an image, as far as they are followed; None where they are lost."""
+        assert self.points is not None
+        assert frame.image is not None
+        tracks = self.points.track(frame.image, frame.time)
+        self.begun = tracks is not None
+        return tracks
+
+    def at_rest(self) -> Displacement | None:
+        """Return how far the camera is from its goal, once it hardly moves."""
+        assert self.points is not None
+        settings = self._settings
+        if not self.points.at_rest(settings.tolerance_m, settings.tolerance_rad):
+            return None
+        return self.points.displacement
+
+    def arrived(self, displacement: Displacement, frame: Frame) -> Callable[[], Arrived] | None:
+        """Return the last comparison to be made, if the camera is at its goal for sure."""
+        far_m, far_rad = self._at_most(displacement)
+        if far_m > self._settings.tolerance_m or far_rad > self._settings.tolerance_rad:
+            return None
+        goal, image, reason = self._goal, frame.image, self.where(displacement)
+        assert image is not None
+        return lambda: Arrived(confirm(goal, image), reason)
+
+    def where(self, displacement: Displacement) -> str:
+        """Say how far the camera is from its goal."""
+        where = in_words(displacement.distance_m, displacement.angle_rad)
+        return f"{where} from the goal; sure within {in_words(*self._at_most(displacement))}"
+
+    def unfinished(self, time: float) -> Outcome:
+        """Return how the task ends if its time is over."""
+        displacement = self.points.displacement if self.points else None
+        reason = "its time is over on the way"
+        if self.begun and displacement is not None:
+            reason = f"its time is over at {self.where(displacement)}"
+        return Outcome(OutcomeKind.NOT_REACHED, reason, time)
+
+    def _at_most(self, displacement: Displacement) -> tuple[float, float]:
+        """Return the largest distance, m, and angle, rad, that the camera may be off, for sure."""
+        far_m, far_rad = displacement.at_most()
+        return far_m * (1.0 + 3.0 * self.scale_deviation), far_rad

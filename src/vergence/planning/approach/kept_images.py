@@ -1,0 +1,34 @@
+"""The images that tell the scale: those taken from elsewhere than the ones before."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.estimation.goal_fit import points_in, pose_difference
+from vergence.planning.approach.goal import GoalImage
+from vergence.planning.approach.recognition import Recognition, tracked_image
+from vergence.vision.tracks import Tracks
+
+_PARALLAX = 0.03  # of the object's distance, or rad, that the camera moves between two images kept
+_MOST_IMAGES = 20
+
+
+def with_tracks(known: Recognition, goal: GoalImage, T: FloatArray, tracks: Tracks) -> Recognition:
+    """Return what is known with an image's points as well, if it was taken from elsewhere.
+
+    Args:
+        known: before it.
+        goal: the photograph.
+        T: T_world_camera of the image, (4, 4).
+        tracks: the points followed into it.
+    """
+    distance = float(np.median(points_in(T, known.fit.points_world)[:, 2]))
+    moves = (pose_difference(T, image.T_world_camera) for image in known.images)
+    near = any(
+        np.linalg.norm(d[:3]) < _PARALLAX * distance and np.linalg.norm(d[3:]) < _PARALLAX
+        for d in moves
+    )
+    if near or len(known.images) >= _MOST_IMAGES or len(known.star_px) != len(tracks.found):
+        return known
+    return known.with_image(
+        tracked_image(goal, T, tracks.points_px, tracks.covariance_px, tracks.found)
+    )

@@ -1,0 +1,53 @@
+"""Which of the six directions of its tip an arm of few joints cannot serve."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+
+_DIRECTIONS = (*(f"move along {axis}" for axis in "xyz"), *(f"turn about {axis}" for axis in "xyz"))
+_ALL, _SOME = 0.98, 0.02  # of a direction, as the share of it that no joint serves
+_ZERO = 1e-6  # of the largest singular value
+
+
+class UnservedDirections(NamedTuple):
+    """What an arm cannot do with its tip at one configuration; false if it can do everything."""
+
+    impossible: tuple[str, ...]  # directions that no motion of the joints has a part in
+    tied: tuple[str, ...]  # directions that come only together with others
+
+    def __bool__(self) -> bool:
+        return bool(self.impossible or self.tied)
+
+    def __str__(self) -> str:
+        words = [f"cannot {_listed(self.impossible, 'or')}"] if self.impossible else []
+        if self.tied:
+            words.append(f"can {_listed(self.tied, 'and')} only in combination")
+        return " and ".join(words)
+
+
+def unserved_directions(J: FloatArray, length_m: float) -> UnservedDirections:
+    """Return the directions that the columns of a Jacobian do not span.
+
+    They are the null space of Jᵀ, shifts measured in a length so that they compare with turns.
+
+    Args:
+        J: (6, n) of the tip in its own axes.
+        length_m: such as the distance from a camera to what it looks at.
+    """
+    scale = np.repeat((1.0 / length_m, 1.0), 3)
+    U, values, _ = np.linalg.svd(scale[:, None] * J)
+    rank = np.count_nonzero(values > _ZERO * max(values.max(initial=0.0), 1e-12))
+    share = np.sum(U[:, rank:] ** 2, axis=1)
+    named = list(zip(_DIRECTIONS, share.tolist(), strict=True))
+    return UnservedDirections(
+        tuple(name for name, part in named if part > _ALL),
+        tuple(name for name, part in named if _SOME < part <= _ALL),
+    )
+
+
+def _listed(names: tuple[str, ...], word: str) -> str:
+    """Return names as a list in a sentence."""
+    *first, last = names
+    return f"{', '.join(first)} {word} {last}" if first else last

@@ -1,0 +1,56 @@
+"""A driver around another."""
+
+from collections.abc import Mapping
+
+from vergence.camera import Camera
+from vergence.robot import Arm
+from vergence.runtime.driver import Driver, HasOutputs, outputs_of
+from vergence.signals import Sample, Setpoint
+
+
+class DriverWrapper:
+    """Passes everything on to another driver; a class that changes something derives from it.
+
+    Args:
+        driver: the one behind it.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self.driver = driver
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return self.driver.arms
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The cameras by name."""
+        return self.driver.cameras
+
+    @property
+    def inner_rate_hz(self) -> float:
+        """How often `step` returns."""
+        return self.driver.inner_rate_hz
+
+    def read(self) -> Sample:
+        """Return what the driver has."""
+        return self.driver.read()
+
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Hand the set-points on."""
+        self.driver.step(setpoints)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs; none if the driver has none."""
+        return outputs_of(self.driver)
+
+    def set_output(self, name: str, value: float) -> None:
+        """Set an output of the driver."""
+        assert isinstance(self.driver, HasOutputs), "only an output that there is can be set"
+        self.driver.set_output(name, value)
+
+    def close(self) -> None:
+        """Let go."""
+        self.driver.close()

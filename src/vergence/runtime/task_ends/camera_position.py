@@ -1,0 +1,33 @@
+"""Where the camera comes near a place."""
+
+import numpy as np
+
+from vergence.parts import knob, part
+from vergence.runtime.task_ends.task_end import EndSetting, Moment, Until
+from vergence.signals import Outcome, OutcomeKind
+
+
+@part("task_end", "pose")
+class CameraPosition:
+    """The task is over once the camera, or what its arm holds, is near a place in the world."""
+
+    position_m: tuple[float, float, float] = knob(..., "m")  # x, y, z of the place
+    tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # how near
+
+    def bind(self, setting: EndSetting) -> Until:
+        """Return what watches the camera."""
+        return _Watch(self, setting)
+
+
+class _Watch:
+    def __init__(self, end: CameraPosition, setting: EndSetting) -> None:
+        self._end, self._camera_pose = end, setting.camera_pose
+
+    def over(self, now: Moment) -> Outcome | None:
+        """Return how the task ends, once it does."""
+        away = self._camera_pose(now.joints)[:3, 3] - np.array(self._end.position_m)
+        distance = float(np.linalg.norm(away))
+        if distance > self._end.tolerance_m:
+            return None
+        reason = f"the camera is {1e3 * distance:.1f} mm from its place"
+        return Outcome(OutcomeKind.REACHED, reason, now.time)

@@ -1,0 +1,51 @@
+"""Where a joint passes a position."""
+
+import numpy as np
+from pydantic import model_validator
+
+from vergence.errors import InputError
+from vergence.parts import knob, part
+from vergence.runtime.task_ends.task_end import EndSetting, Moment, Until
+from vergence.signals import Outcome, OutcomeKind
+
+
+@part("task_end", "joint")
+class JointPosition:
+    """The task is over once a joint is above or below a position."""
+
+    joint: str = knob(...)  # its name
+    above_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # over from here up,
+    below_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # or from here down
+
+    @model_validator(mode="after")
+    def _one_side(self) -> "JointPosition":
+        if (self.above_deg is None) == (self.below_deg is None):
+            raise ValueError("either above_deg or below_deg")
+        return self
+
+    def bind(self, setting: EndSetting) -> Until:
+        """Return what watches the joint.
+
+        Raises:
+            InputError: if the arm has no joint of that name.
+        """
+        try:
+            number = setting.arm.index(self.joint)
+        except InputError as error:
+            raise InputError("until", "joint", self.joint, error.allowed) from None
+        return _Watch(self, number, 1.0 if setting.arm.sliding[number] else np.pi / 180)
+
+
+class _Watch:
+    def __init__(self, end: JointPosition, number: int, unit: float) -> None:
+        self._end, self._number, self._unit = end, number, unit
+
+    def over(self, now: Moment) -> Outcome | None:
+        """Return how the task ends, once it does."""
+        end, position = self._end, float(now.joints[self._number]) / self._unit
+        above = end.above_deg is not None and position >= end.above_deg
+        below = end.below_deg is not None and position <= end.below_deg
+        unit = "m" if self._unit == 1.0 else "°"
+        if not (above or below):
+            return None
+        return Outcome(OutcomeKind.REACHED, f"{end.joint} is at {position:.4g} {unit}", now.time)

@@ -1,0 +1,67 @@
+"""At the goal, and at rest."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.geometry import se3_compose, se3_inverse, so3_log
+from vergence.parts import knob, part
+from vergence.runtime.task_ends.task_end import EndSetting, Moment, Until
+from vergence.signals import Outcome, OutcomeKind
+
+
+@part("task_end", "reached")
+class Reached:
+    """The task is over once every image of some time shows the features, or the pose, as desired.
+
+    A task that knows its goal by itself, such as `reach` or `advance`, ends there whatever these
+    tolerances say.
+    """
+
+    tolerance_px: float = knob(1.0, "px", above=0, upto=1e4)  # of every feature, for image points
+    tolerance_m: float = knob(2e-3, "m", above=0, upto=10)  # of the target, for a desired pose
+    tolerance_deg: float = knob(0.3, "°", above=0, upto=180)  # and its angle
+    time_s: float = knob(0.5, "s", least=0, upto=60)  # for so long
+
+    def bind(self, setting: EndSetting) -> Until:
+        """Return what watches the error."""
+        return _Watch(self, setting)
+
+
+class _Watch:
+    def __init__(self, end: Reached, setting: EndSetting) -> None:
+        self._end, self._camera_pose = end, setting.camera_pose
+        self._since = float("nan")  # s, since when every image was within the tolerance
+
+    def over(self, now: Moment) -> Outcome | None:
+        """Return how the task ends, once it does."""
+        where = self._off(now)
+        if not where:
+            self._since = float("nan")
+        elif self._since != self._since:
+            self._since = now.since_s
+        if not now.since_s - self._since >= self._end.time_s:  # true of NaN as well
+            return None
+        return Outcome(OutcomeKind.REACHED, where, now.time)
+
+    def _off(self, now: Moment) -> str:
+        """Return how far the target is from where it should be; empty if that is too far."""
+        if now.reference.T_camera_target is not None:
+            return self._off_pose(now, now.reference.T_camera_target)
+        views = [v for v in now.observation.views if v.camera not in now.reference.elsewhere_px]
+        desired = now.reference.points_px
+        if not views or desired is None or views[-1].points_px.shape != desired.shape:
+            return ""
+        far = np.linalg.norm(views[-1].points_px - desired, axis=1).max()
+        near = views[-1].found.all() and far <= self._end.tolerance_px
+        return f"{far:.2g} px from the goal" if near else ""
+
+    def _off_pose(self, now: Moment, desired: FloatArray) -> str:
+        if now.observation.target is None:
+            return ""
+        T_camera_world = se3_inverse(self._camera_pose(now.joints))
+        seen = se3_compose(T_camera_world, now.observation.target.T_world_target)
+        off = se3_compose(se3_inverse(np.ascontiguousarray(desired)), seen)
+        distance = float(np.linalg.norm(off[:3, 3]))
+        angle = float(np.rad2deg(np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))))
+        near = distance <= self._end.tolerance_m and angle <= self._end.tolerance_deg
+        return f"{1e3 * distance:.2f} mm and {angle:.2f}° from the goal" if near else ""

@@ -1,0 +1,35 @@
+"""Once the target is seen."""
+
+from typing import ClassVar
+
+from vergence.parts import knob, part
+from vergence.runtime.task_ends.task_end import EndSetting, Moment, Until
+from vergence.signals import Outcome, OutcomeKind
+
+
+@part("task_end", "seen")
+class TargetSeen:
+    """The task is over once some features of the target were found in several images in a row."""
+
+    images: int = knob(3, least=1, upto=1000)  # in a row
+    looks_for_target: ClassVar[bool] = True  # so that a task without images has to
+
+    features: int = knob(4, least=1, upto=1000)  # found in each, over all cameras
+
+    def bind(self, setting: EndSetting) -> Until:
+        """Return what counts."""
+        return _Watch(self)
+
+
+class _Watch:
+    def __init__(self, end: TargetSeen) -> None:
+        self._end, self._images = end, 0
+
+    def over(self, now: Moment) -> Outcome | None:
+        """Return how the task ends, once it does."""
+        found = sum(int(view.found.sum()) for view in now.observation.views)
+        self._images = self._images + 1 if found >= self._end.features else 0
+        if self._images < self._end.images:
+            return None
+        reason = f"{found} features seen, in {self._images} images in a row"
+        return Outcome(OutcomeKind.REACHED, reason, now.time)

@@ -1,0 +1,89 @@
+"""How far the task of a loop is: what is lost, what holds the arm, and when the task is over."""
+
+from vergence.arrays import FloatArray
+from vergence.runtime import endings
+from vergence.runtime.arrival import Arrival
+from vergence.runtime.listeners import Listeners
+from vergence.runtime.losses import LossReports
+from vergence.runtime.stages import EndsTask, PlansAgain, Stages, Tells
+from vergence.runtime.task_ends import Moment
+from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Reference
+
+
+class TaskWatch:
+    """Watches one task, and tells listeners what changes.
+
+    Args:
+        stages: what the task is done by.
+        begun: when it began, s since the start of the run.
+        rate_max: of the joints, (n,).
+        listeners: who is told.
+    """
+
+    def __init__(
+        self, stages: Stages, begun: float, rate_max: FloatArray, listeners: Listeners
+    ) -> None:
+        self._planner, self._until = stages.planner, stages.until
+        self._begun, self._duration_s = begun, stages.duration_s
+        self._listeners, self._losses = listeners, LossReports(listeners)
+        self._arrival = None if stages.goal is None else Arrival(stages.goal, rate_max)
+        self._stalled = False  # as it was told last
+
+    def end(self, duration_s: float) -> float:
+        """Return when the time of the task is over, s, in a run of so many."""
+        added = self._planner.added_s if isinstance(self._planner, PlansAgain) else 0.0
+        return min(duration_s, self._begun + self._duration_s + added)
+
+    def see(self, time: float, observation: Observation) -> None:
+        """Tell what is lost and found again."""
+        self._losses.report(time, observation)
+
+    def judge(
+        self,
+        time: float,
+        observation: Observation,
+        reference: Reference,
+        command: JointCommand,
+        q: FloatArray,
+    ) -> None:
+        """See how near the goal is; tell where the arm comes to rest before it."""
+        self._tell_of_plans()
+        if self._arrival is None:
+            return
+        self._arrival.observe(observation, reference, command, q)
+        stalled = self._arrival.stalled
+        if stalled != self._stalled:
+            self._stalled = stalled
+            text = f"held by {self._arrival.holder()}" if stalled else "the arm moves again"
+            self._listeners.event(time, "stalled" if stalled else "moving", text)
+            if stalled and isinstance(self._planner, PlansAgain):
+                self._planner.stalled(time, self._arrival.points_px, q)
+
+    def _tell_of_plans(self) -> None:
+        if isinstance(self._planner, Tells):
+            for event in self._planner.events():
+                self._listeners.event(*event)
+
+    def planned_end(self, time: float) -> Outcome | None:
+        """Tell what the planner has to tell; return how the task ends by it, once it does."""
+        self._tell_of_plans()
+        return self._planner.conclusion(time) if isinstance(self._planner, EndsTask) else None
+
+    def asked_end(
+        self, time: float, q: FloatArray, observation: Observation, reference: Reference
+    ) -> Outcome | None:
+        """Return how the task ends by its `until`, once it does."""
+        if self._until is None:
+            return None
+        return self._until.over(Moment(time, time - self._begun, q, observation, reference))
+
+    def time_over(self, end: float, time: float) -> Outcome:
+        """Return how the task ends whose time is over."""
+        if isinstance(self._planner, EndsTask):
+            return self._planner.unfinished(time)
+        if self._until is not None:
+            reason = "the time of the run is over before the task is"
+            return Outcome(OutcomeKind.NOT_REACHED, reason, time)
+        if self._arrival is None:
+            return endings.completed(end, time)
+        return self._arrival.outcome(end, time)

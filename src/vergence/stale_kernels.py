@@ -1,0 +1,90 @@
+"""Compiled kernels that were made from sources as they are no longer.
+
+numba keeps a compiled kernel beside its source file, and compiles it again when that file changes.
+But a kernel contains the kernels that it calls: after an update of a checkout it could go on with
+what another file said before, even with arrays laid out in another way.
+"""
+
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping
+from hashlib import blake2b
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parent
+_NOTED = "kernels_made_from.json"  # in the package's __pycache__
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(vergence[\w.]*)(?:\s+import\s+\(?([\w, \n]*))?", re.M)
+
+
+def forget_stale_kernels(package: Path = _PACKAGE) -> list[Path]:
+    """Delete the compiled kernels of every file that, or an import of which, has changed.
+
+    What was compiled before this was first asked is taken for right, and so are the kernels that
+    came with a wheel. Costs some milliseconds, and
+    a tenth of a second after a change.
+
+    Returns:
+        The files whose kernels were deleted.
+    """
+    if (package / "kernels.json").exists():
+        return []
+    note = package / "__pycache__" / _NOTED
+    times = {str(path): time for path, time in _sources(package)}
+    try:
+        noted = json.loads(note.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        noted = {}
+    if noted.get("times") == times:
+        return []
+    marks = _marks([Path(path) for path in times], package.parent)
+    before = noted.get("marks")
+    changed = [] if before is None else [p for p in times if before.get(p) != marks[p]]
+    stale = [Path(path) for path in changed]
+    try:
+        for path in stale:
+            for kernel in path.parent.glob(f"__pycache__/{path.stem}.*.nb[ic]"):
+                kernel.unlink(missing_ok=True)
+        note.parent.mkdir(exist_ok=True)
+        fresh = note.with_suffix(f".{os.getpid()}")
+        fresh.write_text(json.dumps({"times": times, "marks": marks}), encoding="utf-8")
+        fresh.replace(note)
+    except OSError:  # nobody may write there, so numba keeps its kernels elsewhere
+        return []
+    return stale
+
+
+def _sources(folder: Path) -> Iterator[tuple[str, int]]:
+    """Yield every source below a folder, and when it was last written, ns."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield entry.path, entry.stat().st_mtime_ns
+            elif entry.is_dir(follow_symlinks=False) and entry.name != "__pycache__":
+                yield from _sources(Path(entry.path))
+
+
+def _marks(paths: list[Path], root: Path) -> dict[str, str]:
+    """Return a mark of each file that changes with it and with all that it imports, by path."""
+    texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in paths}
+    imports = {path: set(_imported(text, root)) & texts.keys() for path, text in texts.items()}
+    own = {path: blake2b(text.encode(), digest_size=8).hexdigest() for path, text in texts.items()}
+    return {str(path): _mark(path, imports, own) for path in paths}
+
+
+def _imported(text: str, root: Path) -> Iterator[Path]:
+    for module, names in _IMPORT.findall(text):
+        place = root.joinpath(*module.split("."))
+        yield place.with_suffix(".py")
+        yield place / "__init__.py"
+        for name in re.findall(r"\w+", names):
+            yield place / f"{name}.py"
+
+
+def _mark(path: Path, imports: Mapping[Path, set[Path]], own: Mapping[Path, str]) -> str:
+    reached, left = {path}, [path]
+    while left:
+        for other in imports[left.pop()] - reached:
+            reached.add(other)
+            left.append(other)
+    return blake2b("".join(sorted(own[p] for p in reached)).encode(), digest_size=8).hexdigest()

@@ -1,0 +1,36 @@
+"""An ellipse as what a cell follows."""
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.errors import InputError
+from vergence.geometry import ellipse_through
+from vergence.parts import knob, part
+from vergence.vision.curves.ellipse_tracker import POINTS, EllipseTracker
+
+
+@part("tracker", "ellipse")
+class EllipseTracking:
+    """Follows the image of a circle or a sphere by its edge; see `EllipseTracker`."""
+
+    reach_px: float = knob(20.0, "px", least=4, upto=200)  # the edge moves no more between images
+    contrast: float = knob(15.0, least=3, upto=255)  # least step across the edge, grey values
+    least_share: float = knob(0.4, least=0.25, upto=1)  # of the ellipse that has to be in view
+
+    def start(self, image: ImageArray, points_px: FloatArray) -> EllipseTracker:
+        """Return the tracker of the ellipse around one place, or through five or more.
+
+        Raises:
+            InputError: if there is no ellipse.
+        """
+        return EllipseTracker(image, points_px, self.reach_px, self.contrast, self.least_share)
+
+    def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
+        """Return the points that stand for the ellipse through five or more, (POINTS, 2).
+
+        Raises:
+            InputError: if no ellipse goes through them.
+        """
+        shape = ellipse_through(points_px)
+        if shape is None:
+            given = f"{len(points_px)} points on no ellipse"
+            raise InputError("ellipse", "points", given, "five or more points around an ellipse")
+        return shape.points(POINTS)

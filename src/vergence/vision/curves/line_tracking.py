@@ -1,0 +1,32 @@
+"""Straight lines as what a cell follows."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+from vergence.parts import knob, part
+from vergence.vision.curves.line_tracker import LineTracker, lines_through
+
+
+@part("tracker", "lines")
+class LineTracking:
+    """Follows straight edges, each given by two points on it; see `LineTracker`."""
+
+    reach_px: float = knob(20.0, "px", least=4, upto=200)  # a line moves no more between images
+    length_px: float = knob(240.0, "px", least=32, upto=1e4)  # of each line, that is looked at
+    contrast: float = knob(15.0, least=3, upto=255)  # least step across a line, grey values
+
+    def start(self, image: ImageArray, points_px: FloatArray) -> LineTracker:
+        """Return the tracker of the lines through pairs of points.
+
+        Raises:
+            InputError: if a line is not there.
+        """
+        return LineTracker(image, points_px, self.reach_px, self.length_px, self.contrast)
+
+    def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
+        """Return the points that stand for the lines through pairs, (2 L, 2).
+
+        Raises:
+            InputError: if they make no lines.
+        """
+        return np.concatenate([line.points(size) for line in lines_through(points_px, size)])

@@ -1,0 +1,102 @@
+"""The patch of one grey level around a place, and its outline to a fraction of a pixel."""
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray, ImageArray
+
+_FIRST_HALF_PX = 24.0
+_LEAST_CONTRAST = 20.0  # grey values between the patch and what is around it
+_NEAR_PX = 3.0  # of a place beside the patch
+
+
+class Patch(NamedTuple):
+    """A patch lighter or darker than what is around it."""
+
+    outline_px: FloatArray  # (K, 2) closed, its last point beside its first
+    holes_px: tuple[FloatArray, ...]  # the outlines of its holes
+    light: bool  # whether it is lighter
+    contrast: float  # grey values
+    cut: bool  # whether the border of the image cuts it
+
+
+def patch_at(
+    image: ImageArray, place_px: FloatArray, half_px: float = 0.0, light: bool | None = None
+) -> Patch | str:
+    """Return the patch that a place lies in, or why there is none.
+
+    The grey levels of a window are split in two by Otsu's threshold, halfway between the means of
+    both sides; the window grows until its border does not cut the patch.
+
+    Args:
+        image: grey, (height, width).
+        place_px: (2,).
+        half_px: half the size of the first window.
+        light: whether the patch is lighter than what is around it; if None, as the place is. If it
+            is known, the place may lie in a hole of the patch.
+    """
+    height, width = image.shape
+    u, v = place_px
+    if not (0.0 <= u <= width - 1.0 and 0.0 <= v <= height - 1.0):
+        return "outside the image"
+    half = max(half_px, _FIRST_HALF_PX)
+    while True:
+        left, right = max(int(u - half), 0), min(int(u + half) + 1, width)
+        top, bottom = max(int(v - half), 0), min(int(v + half) + 1, height)
+        whole = right - left == width and bottom - top == height
+        found = _in_window(image[top:bottom, left:right], place_px - (left, top), light)
+        if isinstance(found, str):
+            if whole:
+                return found
+        else:
+            low, high = found.outline_px.min(axis=0), found.outline_px.max(axis=0)
+            ends = np.array([right - left, bottom - top]) - 1.0
+            cut = np.concatenate((low <= 0.0, high >= ends))
+            at_border = np.array([left == 0, top == 0, right == width, bottom == height])
+            if whole or not (cut & ~at_border).any():
+                corner = np.array([left, top], dtype=np.float64)
+                holes = tuple(hole + corner for hole in found.holes_px)
+                outline = found.outline_px + corner
+                return Patch(outline, holes, found.light, found.contrast, bool(cut.any()))
+        half *= 2.0
+
+
+def _in_window(window: ImageArray, place: FloatArray, light: bool | None) -> Patch | str:
+    import cv2
+    from contourpy import FillType, contour_generator
+
+    _, mask = cv2.threshold(window, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    if not 0 < int(mask.sum()) < mask.size:
+        return "no contrast"
+    above, below = float(window[mask > 0].mean()), float(window[mask == 0].mean())
+    if above - below < _LEAST_CONTRAST:
+        return f"no contrast: {above - below:.0f} grey levels, below {_LEAST_CONTRAST:.0f}"
+    level = 0.5 * (above + below)
+    given = light is not None
+    if light is None:
+        column, row = np.rint(place).astype(int)
+        near = window[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+        light = bool(np.median(near) > level)
+    sign = 1.0 if light else -1.0
+    grey = sign * window.astype(np.float64)
+    contours = contour_generator(z=grey, fill_type=FillType.OuterOffset)
+    filled: Any = contours.filled(sign * level, np.inf)
+    patches, ends = filled
+    for points, offsets in zip(patches, ends, strict=True):
+        curves = [points[a : b - 1] for a, b in pairwise(offsets)]
+        if _reaches(curves[:1] if given else curves, place):
+            return Patch(curves[0], tuple(curves[1:]), light, above - below, False)
+    return "no patch there"
+
+
+def _reaches(curves: list[FloatArray], place: FloatArray) -> bool:
+    """Tell whether a place lies in a patch, or within a few pixels of it."""
+    import cv2
+
+    first, *holes = [curve.astype(np.float32)[:, None] for curve in curves]
+    at = (float(place[0]), float(place[1]))
+    if len(first) < 3 or cv2.pointPolygonTest(first, at, True) < -_NEAR_PX:
+        return False
+    return all(len(hole) < 3 or cv2.pointPolygonTest(hole, at, True) < _NEAR_PX for hole in holes)

@@ -1,0 +1,147 @@
+"""A region of one grey level followed from image to image by its outline, holes and all."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.errors import InputError
+from vergence.vision.curves.patch import Patch, patch_at
+from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rings_of, signed_area
+from vergence.vision.image import grey_image
+from vergence.vision.tracks import Tracks, nothing_found
+
+OUTLINE_POINTS, HOLE_POINTS = 48, 16  # that stand for the outline, and for each hole
+_LEAST_AREA_PX = 60.0
+_LEAST_HOLE = 0.01  # share of the region's area from which a hole counts
+_CHANGE = 1.6  # of the area from one image to the next, at most
+_PLACE_PX = 0.2  # standard deviation that one place on an outline is taken to have at least
+_WINDOW = 1.3  # of the region's half size, for the first window around it
+
+
+class Region(NamedTuple):
+    """A region in one image."""
+
+    points_px: FloatArray  # (M, 2) that stand for it, see `joined_rings`
+    covariance_px: FloatArray  # (M, 2, 2)
+    area_px: float  # without its holes
+    holes: int
+    light: bool  # whether it is lighter than what is around it
+
+
+class RegionTracker:
+    """Follows a leaf, a hole, a blot: what is lighter or darker than all around it.
+
+    Its outline is where the grey level is halfway between the means inside and outside. What is
+    measured flows on as points evenly spaced along the outline, which make the polygon whose
+    moments are those of the region; a hole is cut out of it, see `joined_rings`.
+
+    Args:
+        image: the first image, grey.
+        points_px: one place inside, or its outline roughly, (M, 2).
+        holes: whether holes are cut out.
+
+    Raises:
+        InputError: if there is no region.
+    """
+
+    def __init__(self, image: ImageArray, points_px: FloatArray, holes: bool = True) -> None:
+        self._holes = holes
+        grey, reason = grey_image(image)
+        points = np.asarray(points_px, dtype=np.float64)
+        place = points[0] if len(points) < 3 else inside_of(rings_of(points))
+        found = reason if grey is None else self._at(grey, place, 0.0)
+        if isinstance(found, str):
+            raise InputError("task", "tracker", f"region, {found}", "a region at task.points_px")
+        self._last, self._shift = found, np.zeros(2)
+
+    @property
+    def points_px(self) -> FloatArray:
+        """The points that stand for the region where it was last found, (M, 2)."""
+        return self._last.points_px.copy()
+
+    def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
+        """Find the region in a new image.
+
+        Args:
+            image: grey, (height, width).
+            predicted_px: points that stand for it where it is expected, (M, 2); None to go on as
+                between the last two images.
+        """
+        last = self._last.points_px
+        expected = last + self._shift if predicted_px is None else np.asarray(predicted_px)
+        grey, reason = grey_image(image)
+        found = reason if grey is None else self._same(grey, expected)
+        if isinstance(found, str):
+            self._shift = np.zeros(2)
+            return nothing_found(last, found, joined=_joined(last))
+        self._shift = found.points_px.mean(axis=0) - last.mean(axis=0)
+        self._last = found
+        points = found.points_px
+        return Tracks(
+            points,
+            found.covariance_px,
+            np.ones(len(points), dtype=np.bool_),
+            ("",) * len(points),
+            joined=_joined(points),
+        )
+
+    def _same(self, grey: ImageArray, expected: FloatArray) -> Region | str:
+        """Return the region where it is expected, or why it is not the one of the last image."""
+        half = _WINDOW * float(np.ptp(expected, axis=0).max()) / 2.0
+        found = self._at(grey, inside_of(rings_of(expected)), half, self._last.light)
+        if isinstance(found, str):
+            return found
+        change = found.area_px / self._last.area_px
+        if not 1.0 / _CHANGE < change < _CHANGE:
+            return f"not the same region: {change:.1f} times its area in one image"
+        if found.holes != self._last.holes:
+            return f"not the same region: holes: {found.holes}, before: {self._last.holes}"
+        return found
+
+    def _at(
+        self, grey: ImageArray, place_px: FloatArray, half_px: float, light: bool | None = None
+    ) -> Region | str:
+        patch = patch_at(grey, place_px, half_px, light)
+        if isinstance(patch, str):
+            return patch
+        if patch.cut:
+            return "partly out of the image"
+        area = abs(signed_area(patch.outline_px))
+        if area < _LEAST_AREA_PX:
+            return f"too small: {area:.0f} px, below {_LEAST_AREA_PX:.0f}"
+        holes = _counted(patch, area) if self._holes else []
+        rings = [resampled(patch.outline_px, OUTLINE_POINTS)]
+        rings += [resampled(hole, HOLE_POINTS) for hole in holes]
+        points = joined_rings(rings)
+        area -= sum(abs(signed_area(hole)) for hole in holes)
+        return Region(points, _covariance(grey, points), area, len(holes), patch.light)
+
+
+def _counted(patch: Patch, area: float) -> list[FloatArray]:
+    """Return the holes that are no specks, the largest first."""
+    areas = [abs(signed_area(hole)) for hole in patch.holes_px]
+    order = np.argsort(areas)[::-1]
+    return [patch.holes_px[j] for j in order if areas[j] > _LEAST_HOLE * area]
+
+
+def _joined(points: FloatArray) -> BoolArray:
+    return np.ones(len(points), dtype=np.bool_)
+
+
+def _covariance(grey: ImageArray, points: FloatArray) -> FloatArray:
+    """Return the covariance of places on an outline, (M, 2, 2): noise over slope, both ways."""
+    low, high = points.min(axis=0).astype(int), points.max(axis=0).astype(int) + 2
+    window = grey[max(low[1], 0) : high[1], max(low[0], 0) : high[0]].astype(np.float64)
+    # What a smooth image has none of [Immerkaer1996].
+    mask = np.array([1.0, -2.0, 1.0])
+    rough = np.apply_along_axis(np.convolve, 0, window, mask, "valid")
+    rough = np.apply_along_axis(np.convolve, 1, rough, mask, "valid")
+    noise = 1.4826 * float(np.median(np.abs(rough))) / 6.0
+    column, row = np.clip(np.rint(points).astype(int), 1, np.array(grey.shape[::-1]) - 2).T
+    across = grey[row, column + 1].astype(np.float64) - grey[row, column - 1]
+    down = grey[row + 1, column].astype(np.float64) - grey[row - 1, column]
+    slope = np.maximum(0.5 * np.hypot(across, down), 1.0)
+    variance = _PLACE_PX**2 + (noise / slope) ** 2
+    covariance: FloatArray = variance[:, None, None] * np.eye(2)
+    return covariance

@@ -1,0 +1,85 @@
+"""A report in a real browser: one instant is shown in charts and film alike, in light and dark."""
+
+from collections.abc import Iterator
+
+import accessibility
+import numpy as np
+import pytest
+from browser import Browser
+
+from vergence.app.report import report
+from vergence.runtime.recording import Recording
+
+CLOCK = "document.querySelector('.film output').textContent"
+CURSORS = (
+    "[...document.querySelectorAll('svg.chart[data-time] .cursor.on')]"
+    ".map((one) => one.getAttribute('transform'))"
+)
+CHARTS = "document.querySelectorAll('svg.chart[data-time]').length"
+
+
+@pytest.fixture(scope="module")
+def browser(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    page = report(recording, tmp_path_factory.mktemp("report") / "report.html")
+    browser = Browser(tmp_path_factory.mktemp("chromium"))
+    browser.open(page.as_uri())
+    browser.wait("document.readyState === 'complete'")
+    yield browser
+    browser.close()
+
+
+def test_the_instant_under_the_pointer_is_shown_everywhere(browser: Browser) -> None:
+    before = browser.value("document.querySelector('.film img').src")
+    x, y = browser.middle("svg.chart[data-time]")
+    browser.mouse("mouseMoved", x, y)
+    cursors = browser.wait(CURSORS, bool)
+    assert len(cursors) == browser.value(CHARTS)
+    assert len(set(cursors)) == 1
+    shown = float(browser.value(CLOCK).removesuffix(" s"))
+    assert shown == pytest.approx(2.83, abs=0.07)  # of 6 s; the axes are not in the chart's middle
+    assert browser.value("document.querySelector('.film img').src") != before
+    assert not browser.complaints
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_to_complain_of(browser: Browser, scheme: str) -> None:
+    assert accessibility.complaints(browser, scheme) == []
+
+
+def test_the_film_plays_to_its_end(browser: Browser) -> None:
+    browser.value(
+        "(() => { const s = document.querySelector('.film input'); s.value = s.max - 8;"
+        "s.dispatchEvent(new Event('input')) })()"
+    )
+    browser.click(".film button")
+    browser.wait(CLOCK, lambda text: text == "5.93 s")
+    browser.wait("document.querySelector('.film button').textContent", lambda text: text == "Play")
+    assert not browser.complaints
+
+
+def test_no_text_of_a_chart_is_cut_off_in_the_browser(browser: Browser) -> None:
+    outside = browser.value(
+        "[...document.querySelectorAll('svg.chart')].flatMap((chart) => {"
+        "const b = chart.getBoundingClientRect();"
+        "return [...chart.querySelectorAll('text')].filter((text) => {"
+        "const t = text.getBoundingClientRect();"
+        "return t.left < b.left || t.right > b.right || t.top < b.top || t.bottom > b.bottom;"
+        "}).map((text) => text.textContent) })"
+    )
+    assert outside == []
+
+
+@pytest.mark.parametrize(("scheme", "bright"), [("light", True), ("dark", False)])
+def test_a_chart_has_the_ground_of_the_readers_scheme(
+    browser: Browser, scheme: str, bright: bool
+) -> None:
+    media = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.call("Emulation.setEmulatedMedia", features=media)
+    image = browser.image("svg.chart").astype(float)
+    ground = np.median(image)
+    assert (ground > 200) == bright
+    assert np.abs(image - ground).max() > 100  # and something can be seen on it
+
+
+def test_a_page_asks_nobody_for_anything(browser: Browser) -> None:
+    assert all(address.startswith(("file:", "data:")) for address in browser.addresses)

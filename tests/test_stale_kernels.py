@@ -1,0 +1,55 @@
+"""A compiled kernel goes when its file, or any that it is made of, has changed."""
+
+from pathlib import Path
+
+import pytest
+
+from vergence.stale_kernels import forget_stale_kernels
+
+SOURCES = {
+    "__init__.py": "",
+    "low/__init__.py": "from vergence.low.chain import walk\n",
+    "low/chain.py": "def walk(): ...\n",
+    "low/apart.py": "def other(): ...\n",
+    "high/__init__.py": "",
+    "high/law.py": "from vergence.low import (\n    walk,\n)\n\ndef tick(): ...\n",
+}
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package whose every file has a compiled kernel, as it was when last used."""
+    package = tmp_path / "vergence"
+    for name, text in SOURCES.items():
+        path = package / name
+        path.parent.mkdir(exist_ok=True, parents=True)
+        path.write_text(text)
+        kernel = path.parent / "__pycache__" / f"{path.stem}.walk-3.py311.nbi"
+        kernel.parent.mkdir(exist_ok=True)
+        kernel.write_text("code")
+    assert forget_stale_kernels(package) == []
+    return package
+
+
+def kernels(package: Path) -> set[str]:
+    return {f"{k.parent.parent.name}/{k.name.split('.')[0]}" for k in package.rglob("*.nbi")}
+
+
+def test_what_has_not_changed_is_kept(package: Path) -> None:
+    (package / "low/chain.py").write_text(SOURCES["low/chain.py"])  # written again, the same
+    before = kernels(package)
+    assert forget_stale_kernels(package) == []
+    assert kernels(package) == before
+
+
+def test_kernels_that_call_what_has_changed_go_with_it(package: Path) -> None:
+    (package / "low/chain.py").write_text("def walk(): return 1\n")
+    before = kernels(package)
+    forget_stale_kernels(package)
+    assert before - kernels(package) == {"low/chain", "low/__init__", "high/law"}
+    assert forget_stale_kernels(package) == []
+
+
+def test_a_file_that_nothing_imports_changes_itself_alone(package: Path) -> None:
+    (package / "low/apart.py").write_text("def other(): return 1\n")
+    assert forget_stale_kernels(package) == [package / "low/apart.py"]
