@@ -54,6 +54,21 @@ def test_a_robots_run_does_not_begin_with_joints_from_before_its_preparation(
     assert all(frame.time >= first.time for frame in first.frames)
 
 
+class Simulator(Robot):
+    """A user's own simulator, whose time passes in `step` only."""
+
+    sim_time = True
+
+
+def test_the_time_of_a_simulator_of_ones_own_stands_meanwhile(simulated: SimulatedDriver) -> None:
+    robot = Simulator(simulated)
+    started = StartedDriver(robot, ("wrist",))
+    simulated.close()
+    waited_until = robot.read().time
+    sleep(PREPARING_S)
+    assert started.read().time == waited_until
+
+
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_a_simulations_time_stands_meanwhile(simulated: SimulatedDriver, wrapped: bool) -> None:
     started = StartedDriver(DriverWrapper(simulated) if wrapped else simulated, ("wrist",))

@@ -20,6 +20,8 @@ CELLS = sorted({folder.name for folder in (files("vergence") / "cells").iterdir(
 class Bare:
     """A driver reduced to the protocol, its frames to what a real camera knows."""
 
+    sim_time = True
+
     def __init__(self, driver):
         self._driver = driver
         self.arms, self.cameras = driver.arms, driver.cameras

@@ -8,7 +8,6 @@ from vergence.arrays import FloatArray
 from vergence.planning.approach import InlineWorker, ThreadWorker, Worker
 from vergence.runtime import Driver, DriverWrapper
 from vergence.signals import Frame, JointState, Sample
-from vergence.simulation import SimulatedDriver
 
 _TIMEOUT_S = 5.0  # for a first image
 
@@ -61,7 +60,7 @@ class StartedDriver(DriverWrapper):
 
     def worker(self) -> Worker:
         """Return who does what takes longer than an image, without delaying the loop."""
-        return InlineWorker() if self._waits_for_us else ThreadWorker()
+        return InlineWorker() if self.sim_time else ThreadWorker()
 
     @property
     def joints(self) -> dict[str, FloatArray]:
@@ -93,14 +92,6 @@ class StartedDriver(DriverWrapper):
         of_run = (frame for frame in sample.frames if not frame.time < self._begin)
         return replace(sample, frames=tuple(sorted(of_run, key=lambda frame: frame.time)))
 
-    @property
-    def _waits_for_us(self) -> bool:
-        """Whether the driver's time stands while the loop does something else."""
-        driver = self.driver
-        while isinstance(driver, DriverWrapper):
-            driver = driver.driver
-        return isinstance(driver, SimulatedDriver)
-
     def _first(self) -> Sample:
         """Return a sample of now, with all images since the last one.
 
@@ -108,7 +99,7 @@ class StartedDriver(DriverWrapper):
         that began with them would miss that time, and its images, in its second tick.
         """
         sample = self.driver.read()
-        if self._waits_for_us:
+        if self.sim_time:
             return sample
         now = self._waited_until + monotonic() - self._read_at
         period_s, frames = 1.0 / self.driver.inner_rate_hz, sample.frames

@@ -11,6 +11,7 @@ from vergence.assembly.rest import Rest
 from vergence.assembly.task_stages import stages_of, timeouts_of
 from vergence.assembly.warm_up import warm_up
 from vergence.cell import Cell
+from vergence.cell.schema import FollowTable, TrackTable
 from vergence.cell.tasks import naming_task
 from vergence.errors import InputError
 from vergence.runtime import Driver, Listener
@@ -18,6 +19,7 @@ from vergence.runtime.listeners import Listeners
 from vergence.runtime.stages import Stages
 from vergence.signals import Frame, Outcome, OutcomeKind, TaskOutcome
 from vergence.simulation import SimulatedDriver
+from vergence.simulation.cell_model import CellModel
 
 
 class TaskSequence:
@@ -59,15 +61,28 @@ class TaskSequence:
         Raises:
             InputError: if the cell cannot be run as it is written.
         """
-        with self._naming(0):
-            parts = assemble_parts(self._cells[0], driver, self._images, frames=frames)
-        if isinstance(parts, Parts):
-            self._first = parts
-            for number, cell in enumerate(self._cells):  # before anything moves
-                with self._naming(number):
-                    check_task(cell, parts.context, driver, self._images)
-            warm_up(parts, self._cell.task.arm, 1.0 / self._cell.outer_rate_hz)
+        parts = self._assembled(driver, frames)
+        if not isinstance(parts, Parts):
+            return parts
+        for number, cell in enumerate(self._cells):  # before anything moves
+            with self._naming(number):
+                check_task(cell, parts.context, driver, self._images)
+        warm_up(parts, self._cell.task.arm, 1.0 / self._cell.outer_rate_hz)
+        follows = isinstance(self._cells[0].task, TrackTable | FollowTable)
+        if follows and not frames and not parts.driver.sim_time:
+            # A target that moves is no longer where the first images show it; by now this is quick.
+            parts = self._assembled(driver, model=parts.context.model)
+        self._first = parts if isinstance(parts, Parts) else None
         return parts
+
+    def _assembled(
+        self,
+        driver: Driver,
+        frames: Mapping[str, Frame] | None = None,
+        model: CellModel | None = None,
+    ) -> Parts | Outcome:
+        with self._naming(0):
+            return assemble_parts(self._cells[0], driver, self._images, model, frames)
 
     def begin(self) -> None:
         """Say that the first task begins."""

@@ -65,6 +65,21 @@ class HasOutputs(Protocol):
         ...
 
 
+@runtime_checkable
+class HasSimTime(Protocol):
+    """A driver whose time may pass in `step` only, such as a simulator's."""
+
+    @property
+    def sim_time(self) -> bool:
+        """Whether it does: what takes long delays nothing then, and is waited for."""
+        ...
+
+
+def has_sim_time(driver: object) -> bool:
+    """Tell whether a driver's time stands while the loop does something else."""
+    return driver.sim_time if isinstance(driver, HasSimTime) else False
+
+
 def outputs_of(driver: object) -> tuple[str, ...]:
     """Return the names of the outputs of a driver, or of an arm's link; none if it has none."""
     return tuple(driver.outputs) if isinstance(driver, HasOutputs) else ()

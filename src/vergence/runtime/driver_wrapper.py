@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from vergence.camera import Camera
 from vergence.robot import Arm
-from vergence.runtime.driver import Driver, HasOutputs, outputs_of
+from vergence.runtime.driver import Driver, HasOutputs, has_sim_time, outputs_of
 from vergence.signals import Sample, Setpoint
 
 
@@ -32,6 +32,11 @@ class DriverWrapper:
     def inner_rate_hz(self) -> float:
         """How often `step` returns."""
         return self.driver.inner_rate_hz
+
+    @property
+    def sim_time(self) -> bool:
+        """Whether the driver's time passes in `step` only."""
+        return has_sim_time(self.driver)
 
     def read(self) -> Sample:
         """Return what the driver has."""

@@ -77,7 +77,7 @@ class Loop:
         self._driver, self._arm = driver, arm
         self._timeouts, self._following = timeouts or Timeouts(), following or FollowingBound()
         self._next_stages = next_stages
-        self._period_s = 1.0 / outer_rate_hz
+        self._period_s, self._half_tick_s = 1.0 / outer_rate_hz, 0.5 / driver.inner_rate_hz
         self._schedule = Schedule(driver.inner_rate_hz, outer_rate_hz)
         age_s = max(self._timeouts.image_s, _IMAGE_AGE_S)
         self._border = Border(driver, lambda: not self._moving, age_s)
@@ -197,11 +197,11 @@ class Loop:
                 names = self._driver.arms[self._arm].names
                 at_limit = [name for name, held in zip(names, stuck, strict=True) if held]
                 return endings.joint_limit(at_limit, self._now)
+        if self._now > (end := self._task.end(duration_s)) - self._half_tick_s:
+            return self._completed(end, sample)
         if not turns:
             return None
         sample = self._border.in_run_time(sample)
-        if self._now >= (end := self._task.end(duration_s)):
-            return self._completed(end, sample)
         self._part = "perception"
         observation = self._perception.observe(sample.frames)
         self._part = "planner"

@@ -23,7 +23,9 @@ class TaskWatch:
     def __init__(
         self, stages: Stages, begun: float, rate_max: FloatArray, listeners: Listeners
     ) -> None:
-        self._planner, self._until = stages.planner, stages.until
+        planner = self._planner = stages.planner
+        self._plans_again = planner if isinstance(planner, PlansAgain) else None
+        self._until = stages.until
         self._begun, self._duration_s = begun, stages.duration_s
         self._listeners, self._losses = listeners, LossReports(listeners)
         self._arrival = None if stages.goal is None else Arrival(stages.goal, rate_max)
@@ -31,7 +33,7 @@ class TaskWatch:
 
     def end(self, duration_s: float) -> float:
         """Return when the time of the task is over, s, in a run of so many."""
-        added = self._planner.added_s if isinstance(self._planner, PlansAgain) else 0.0
+        added = self._plans_again.added_s if self._plans_again else 0.0
         return min(duration_s, self._begun + self._duration_s + added)
 
     def see(self, time: float, observation: Observation) -> None:
@@ -56,8 +58,8 @@ class TaskWatch:
             self._stalled = stalled
             text = f"held by {self._arrival.holder()}" if stalled else "the arm moves again"
             self._listeners.event(time, "stalled" if stalled else "moving", text)
-            if stalled and isinstance(self._planner, PlansAgain):
-                self._planner.stalled(time, self._arrival.points_px, q)
+            if stalled and self._plans_again:
+                self._plans_again.stalled(time, self._arrival.points_px, q)
 
     def _tell_of_plans(self) -> None:
         if isinstance(self._planner, Tells):

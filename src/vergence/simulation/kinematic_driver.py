@@ -62,6 +62,11 @@ class KinematicDriver:
         return {CAMERA: self._cell.camera}
 
     @property
+    def sim_time(self) -> bool:
+        """Always: time passes in `step` only."""
+        return True
+
+    @property
     def inner_rate_hz(self) -> float:
         """How often `step` is to be called."""
         return self._cell.inner_rate_hz

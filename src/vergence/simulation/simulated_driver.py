@@ -81,6 +81,11 @@ class SimulatedDriver:
         return self.world.cameras
 
     @property
+    def sim_time(self) -> bool:
+        """Always: time passes in `step` only."""
+        return True
+
+    @property
     def inner_rate_hz(self) -> float:
         """The rate of the physics and of the servos."""
         return self.cell.inner_rate_hz
