@@ -66,7 +66,9 @@ class TestPlayback:
             assert playback.views(time)[0] is view
 
     def test_marks_belong_to_the_image_they_are_drawn_in(self, puma_run: Recording) -> None:
-        (view,) = Playback(puma_run, None).views(1.0)
+        playback = Playback(puma_run, None)
+        assert playback.knows_truth
+        (view,) = playback.views(1.0)
         trace = puma_run.cameras["wrist"]
         row = int(np.argmin(np.abs(trace.time - view.time)))
         np.testing.assert_array_equal(view.points.points_px, trace.points_px[row])

@@ -121,6 +121,7 @@ class Live:
             "draggable": self._driver.world.target_is_free,
             "carried_by": cell.target.carried_by,
             "images": self._images,
+            "truth": True,
         }
         publisher = Publisher(self.view_state, cell, self._driver, about)
         self.view_state.status(preparing=True)  # until kernels are loaded and the loop begins

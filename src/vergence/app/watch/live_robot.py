@@ -68,6 +68,7 @@ class LiveRobot:
             "draggable": False,
             "carried_by": self._cell.target.carried_by,
             "images": True,
+            "truth": False,
         }
         publisher = Publisher(self.view_state, self._cell, self._mirror, about)
         self.view_state.status(preparing=True, folder=str(self.folder))

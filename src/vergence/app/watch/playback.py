@@ -42,6 +42,7 @@ class Playback:
     Attributes:
         cameras: those that took images.
         plots: the panels that the recording fills.
+        knows_truth: whether it says where the points truly were; that of a robot cannot.
     """
 
     def __init__(self, recording: Recording, world: RecordedWorld | None) -> None:
@@ -51,6 +52,7 @@ class Playback:
         self.cameras = tuple(name for name in traces if len(traces[name].time))
         self._jpegs = {name: tuple(recording.jpegs(name)) for name in self.cameras}
         self._views: dict[str, CameraView] = {}
+        self.knows_truth = any(np.isfinite(traces[n].true_px).any() for n in self.cameras)
         self._poses = RecordedPoses(recording)
         self.plots = tuple(self._choose_plots())
 

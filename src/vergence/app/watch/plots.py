@@ -69,13 +69,14 @@ def joints_plot(arm: ArmInfo) -> Plot:
     return Plot("joints", title, "±1 = limits", drawn_names(arm), -1.1, 1.1, (-1.0, 1.0))
 
 
-def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
+def live_plots(cell: Cell, points: int, arm: ArmInfo, truth: bool = True) -> tuple[Plot, ...]:
     """Return the panels of a running cell: of everything that one of its tasks is about.
 
     Args:
         cell: that runs.
         points: how many image points of the target its task speaks of.
         arm: the one that is moved.
+        truth: whether it is known where the target truly is; if not, poses are by the estimate.
     """
     kinds = {stage.task.kind for stage in cell.stages}
     panels: list[Plot] = []
@@ -87,7 +88,9 @@ def live_plots(cell: Cell, points: int, arm: ArmInfo) -> tuple[Plot, ...]:
         panels[0] = replace(panels[0], title=title)
         panels.append(error_plot(len(tool.features), tool.camera))
     if "follow" in kinds:
-        panels += (POSE_MM, POSE_DEG, TARGET_MM)
+        poses = (POSE_MM, POSE_DEG)
+        by_estimate = [replace(plot, title=f"{plot.title} by the estimate") for plot in poses]
+        panels += (*poses, TARGET_MM) if truth else by_estimate
     return (*panels, joints_plot(arm), MANIPULABILITY)
 
 

@@ -15,7 +15,7 @@ from vergence.cell import Cell
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import manipulability_measure
 from vergence.runtime import RunInfo, TickRecord
-from vergence.runtime.results import tick_pose_errors
+from vergence.runtime.results import angle_between, tick_pose_errors
 from vergence.signals import Frame, FrameTruth, ImagePoints, Outcome, Reference
 from vergence.simulation import SimulatedDriver
 
@@ -29,7 +29,7 @@ class Publisher:
         view_state: what the page shows.
         cell: what runs.
         driver: of that cell.
-        about: what else the page has to know of the run.
+        about: what else the page has to know of the run; `truth`, whether its frames have any.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Publisher:
         about: Mapping[str, object],
     ) -> None:
         self._view_state, self._cell, self._driver = view_state, cell, driver
-        self._about = about
+        self._about, self._truth = about, bool(about["truth"])
         self._corners = target_corners(driver.world)
         self._plots: tuple[Plot, ...] = ()
         self._info: RunInfo | None = None
@@ -50,7 +50,7 @@ class Publisher:
         """Tell the page what is about to run."""
         self._info = info
         arm = info.arms[self._cell.task.arm]
-        self._plots = live_plots(self._cell, len(self._driver.features), arm)
+        self._plots = live_plots(self._cell, len(self._driver.features), arm, self._truth)
         self._view_state.begin(
             {
                 "cell": info.cell,
@@ -152,6 +152,8 @@ class Publisher:
 
     def _pose_errors(self, record: TickRecord) -> dict[str, FloatArray]:
         assert self._info is not None, "a run begins before it ticks"
+        if not self._truth:
+            return self._estimated_errors(record)
         errors = tick_pose_errors(record, self._info)
         if not len(errors.time):
             return {}
@@ -159,6 +161,24 @@ class Publisher:
             "pose_mm": _MM * np.linalg.norm(errors.camera_m, axis=1),
             "pose_deg": np.rad2deg(errors.camera_rad),
             "target_mm": _MM * np.linalg.norm(errors.target_m, axis=1),
+        }
+
+    def _estimated_errors(self, record: TickRecord) -> dict[str, FloatArray]:
+        """Return how far the camera is from its desired pose to where the target seems to be."""
+        assert record.observation is not None
+        assert record.reference is not None
+        target, desired = record.observation.target, record.reference.T_camera_target
+        task, carries = self._cell.task, self._cell.cameras[self._cell.task.camera].arm
+        mine = (frame for frame in record.sample.frames if frame.camera == task.camera)
+        frame = next(mine, None)
+        if target is None or desired is None or frame is None or carries != task.arm:
+            return {}
+        T_world_camera = self._driver.arms[task.arm].forward_kinematics(frame.joints[task.arm])
+        T_camera_target = se3_inverse(T_world_camera) @ target.T_world_target
+        away_m = T_camera_target[:3, 3] - desired[:3, 3]
+        return {
+            "pose_mm": np.array([_MM * np.linalg.norm(away_m)]),
+            "pose_deg": np.array([np.rad2deg(angle_between(T_camera_target, desired))]),
         }
 
     def _looks_at_tool(self, camera: str) -> bool:

@@ -79,6 +79,7 @@ class Replay:
             "scene": self.scene is not None,
             "no_scene": f"No view in space: {why_no_scene}",
             "draggable": False,
+            "truth": self._playback.knows_truth,
         }
         self.view_state.begin(about, self._playback.rows())
         for event in self._recording.events:

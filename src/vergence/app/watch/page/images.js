@@ -1,7 +1,7 @@
 // The cameras' images, with what was looked for, found, desired and true drawn over them.
 // Places are in pixels whose centres are at integers; the canvas has its edges there.
 
-import { context_of } from "./dom.js";
+import { context_of, element } from "./dom.js";
 import { inside } from "./polygon.js";
 import { Steering } from "./steering.js";
 
@@ -48,6 +48,7 @@ export class Images {
   begin(about) {
     this.root.replaceChildren();
     this.root.classList.toggle("one", about.cameras.length === 1);
+    element("truth").hidden = !about.truth;
     this.views = new Map(about.cameras.map((camera) => [camera.name, new View(this, camera, about)]));
   }
 

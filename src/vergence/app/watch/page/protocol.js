@@ -22,6 +22,7 @@
  * @property {PlotAbout[]} plots
  * @property {boolean} scene
  * @property {boolean} draggable
+ * @property {boolean} truth  whether it is known where the points truly are
  * @property {number} [duration]  of a recording, s
  * @property {string} [no_scene]
  * @property {string | null} [carried_by]

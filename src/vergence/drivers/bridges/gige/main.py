@@ -1,11 +1,11 @@
 """The bridge's main program, started by the camera source."""
 
 import os
-import signal
-import socket
 from threading import Condition, Thread
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from ..serve import serve
 from ..wire import Wire
 
 if TYPE_CHECKING:
@@ -44,25 +44,21 @@ class Newest:
 
 def main(descriptor: int) -> None:
     """Deliver a camera's images to the other end of a socket, until that hangs up."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the run's
-    wire = Wire(socket.socket(fileno=descriptor))
-    settings = wire.receive()
-    if settings is None:
-        return
-    Thread(target=_end_with, args=(wire,), daemon=True).start()
-    _serve(wire, settings)
-    os._exit(0)
+    serve(descriptor, _camera, _work)
 
 
-def _serve(wire: Wire, settings: dict[str, Any]) -> None:
+def _camera() -> ModuleType:
+    from . import camera
+
+    return camera
+
+
+def _work(wire: Wire, settings: dict[str, Any], library: Any) -> None:
     """Deliver images until that cannot go on, and say why."""
+    Thread(target=_end_with, args=(wire,), daemon=True).start()
     try:
-        from .camera import CameraGoneError, GigeCamera, WrongSettingError
-    except (ImportError, ValueError) as error:  # no PyGObject, or no Aravis behind it
-        return wire.send({"cannot": str(error)})
-    try:
-        camera = GigeCamera(settings)
-    except WrongSettingError as error:
+        camera = library.GigeCamera(settings)
+    except library.WrongSettingError as error:
         return wire.send({"wrong": list(error.args)})
     wire.send(camera.found)
     newest = Newest(wire)
@@ -70,9 +66,8 @@ def _serve(wire: Wire, settings: dict[str, Any]) -> None:
         while True:
             if (image := camera.next_image()) is not None:
                 newest.offer(image)
-    except CameraGoneError as error:
+    except library.CameraGoneError as error:  # to let go of the camera, Aravis would wait for it
         wire.send({"refused": str(error)})
-        os._exit(0)  # to let go of the camera, Aravis would wait for it
 
 
 def _end_with(wire: Wire) -> None:

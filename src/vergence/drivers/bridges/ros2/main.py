@@ -1,14 +1,12 @@
 """The bridge's main program, started by the driver."""
 
-import os
 import signal
-import socket
-import sys
 from threading import Event, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from ..exchange import Exchange
+from ..serve import serve
 from ..wire import Wire
 from .command import Command
 
@@ -100,17 +98,17 @@ class Bridge:
 
 def main(descriptor: int) -> None:
     """Serve the driver at the other end of a socket."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's; it brakes the arm
-    wire = Wire(socket.socket(fileno=descriptor))
-    settings = wire.receive()
-    if settings is None:
-        return
-    try:
-        from .topics import Topics
-    except ImportError as error:
-        wire.send({"cannot": str(error)})
-        return
-    topics = Topics(settings)
+    serve(descriptor, _topics, _work)
+
+
+def _topics() -> "type[Topics]":
+    from .topics import Topics
+
+    return Topics
+
+
+def _work(wire: Wire, settings: dict[str, Any], topics_of: "type[Topics]") -> None:
+    topics = topics_of(settings)
     found = topics.found()
     wire.send(found)
     if "refused" not in found:
@@ -118,5 +116,3 @@ def main(descriptor: int) -> None:
         bridge = Bridge(wire, topics, settings)
         signal.signal(signal.SIGTERM, bridge.stop)
         bridge.serve()
-    sys.stderr.flush()
-    os._exit(0)  # rclpy's threads end with it

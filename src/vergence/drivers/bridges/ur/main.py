@@ -1,13 +1,12 @@
 """The bridge's main program, started by the driver."""
 
-import os
 import signal
-import socket
 from threading import Event, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from ..exchange import Exchange
+from ..serve import serve
 from ..wire import Wire
 from .gone_error import GoneError
 
@@ -84,23 +83,22 @@ class Bridge:
 
 def main(descriptor: int) -> None:
     """Serve the driver at the other end of a socket."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's; it brakes the arm
-    wire = Wire(socket.socket(fileno=descriptor))
-    settings = wire.receive()
-    if settings is None:
-        return
+    serve(descriptor, _robot, _work)
+
+
+def _robot() -> "type[Robot]":
+    from .robot import Robot
+
+    return Robot
+
+
+def _work(wire: Wire, settings: dict[str, Any], robot_of: "type[Robot]") -> None:
     try:
-        from .robot import Robot
-    except ImportError as error:
-        wire.send({"cannot": str(error)})
-        return
-    try:
-        robot = Robot(settings)
+        robot = robot_of(settings)
     except GoneError as error:
         wire.send({"refused": str(error)})
-        os._exit(0)
+        return
     wire.send({"rate_hz": settings["rate_hz"]})
     bridge = Bridge(wire, robot, settings)
     signal.signal(signal.SIGTERM, bridge.stop)
     bridge.serve()
-    os._exit(0)  # ur_rtde's threads end with it; they may be waiting for the robot
