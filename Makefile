@@ -64,7 +64,7 @@ test-driver-%: .drivers/%/.installed $(RENDERS)
 	.drivers/$*/bin/python -m pytest tests/drivers/protocol_$*.py $(PYTEST_ARGS)
 
 .PRECIOUS: .drivers/%/.installed
-.drivers/%/.installed: $(INSTALLED) scripts/make-driver-venv
+.drivers/%/.installed: $(INSTALLED) scripts/make-driver-venv scripts/build-tf2-msgs
 	@scripts/make-driver-venv $* $(VENV)
 	@touch $@
 

@@ -10,17 +10,23 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
 from other_side import Motion, OtherSide, client_to_be_killed
 
-from vergence.assembly import run_cell, run_driver
+from vergence.app.mounting import mounting
+from vergence.app.options import CalibrateOptions
+from vergence.assembly import open_driver, run_cell, run_driver
 from vergence.assembly.open_driver import equipment
 from vergence.cell import load_cell
+from vergence.cell.settings_text import toml_value
 from vergence.drivers import Equipment
 from vergence.drivers.ros2 import Ros2
 from vergence.errors import DriverSilent, InputError
+from vergence.places import CELLS
 from vergence.runtime import Driver
 from vergence.runtime.driver import outputs_of
 from vergence.signals import RobotMode
@@ -207,6 +213,50 @@ def test_a_camera_that_is_not_the_cells_is_refused() -> None:
             made.open(SEEING, images=images)
 
 
+S = 0.5**0.5
+FRAMES = [  # a wrist camera, its optical frame told from its body, beside a base that TF has too
+    ["world", "base_link", [0.0, 0.0, 0.3], [0.0, 0.0, 0.0, 1.0]],
+    ["tool0", "camera_link", [0.02, -0.03, 0.05], [0.0, -S, 0.0, S]],
+    ["/camera_link", "optical_frame", [0.0, 0.01, 0.0], [-0.5, 0.5, -0.5, 0.5]],
+]
+
+
+def test_a_mounting_comes_from_tf_and_one_that_differs_is_refused_or_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "cell.toml"
+    text = (CELLS / "ur5" / "cell.toml").read_text().replace("../puma560", str(CELLS / "puma560"))
+    with robot(frames=FRAMES, images="mono8") as made:
+        table = asdict(made.driver()) | {"mountings": {"wrist": ["tool0", "optical_frame"]}}
+        table["images"] = {"wrist": f"{made.space}/wrist/image_raw"}
+        lines = [f"{key} = {toml_value(value)}" for key, value in table.items()]
+        file.write_text("\n".join([text, "[driver]", 'kind = "ros2"', *lines, ""]))
+        with pytest.raises(InputError, match=r"cameras.wrist: given a mounting .* mm and .*° from"):
+            open_driver(load_cell(file), "ros2")
+        ask = CalibrateOptions(mounting=str(file), driver="ros2", write=True, as_json=True)
+        assert mounting(ask) == 0
+        told = json.loads(capsys.readouterr().out)["mountings"]["wrist"]
+        np.testing.assert_allclose(told["position_m"], [0.02, -0.02, 0.05], atol=1e-6)
+        # The camera's body looks along tool0's z; so does the optical frame, its x to the right.
+        np.testing.assert_allclose(told["rotation_rpy_deg"], [0.0, 0.0, -90.0], atol=1e-3)
+        open_driver(load_cell(file), "ros2").close()
+        rest = dict(load_cell(file).cameras["wrist"])
+        assert rest.pop("position_m") == pytest.approx(told["position_m"])
+        before = dict(load_cell("ur5").cameras["wrist"])
+        assert all(value == before[key] for key, value in rest.items() if "rotation" not in key)
+        nowhere = {**table, "mountings": {"wrist": ("tool0", "camera")}, "connect_s": 8.0}
+        with pytest.raises(
+            DriverSilent, match=r"TF does not connect tool0 with camera; it has bas"
+        ):
+            Ros2(**nowhere).open(SEEING)
+        broken = tmp_path / "tf2_msgs"
+        broken.mkdir()
+        (broken / "__init__.py").write_text("raise ImportError")
+        monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+        with pytest.raises(DriverSilent, match="this Python has no tf2_msgs, which TF needs: take"):
+            Ros2(**nowhere).open(SEEING)
+
+
 def test_a_second_client_is_refused_and_the_first_goes_on() -> None:
     with robot() as made:
         driver = made.open()
@@ -309,8 +359,6 @@ driver = Ros2(**json.loads(sys.argv[2])).open(BLIND)
 
 @pytest.mark.parametrize("command", ["velocity", "trajectory"])
 def test_an_arm_whose_client_is_killed_brakes(command: str) -> None:
-    from dataclasses import asdict
-
     with robot(command=command) as made:
         with client_to_be_killed(CLIENT, json.dumps(asdict(made.driver()))):
             assert made.tell()["qd"][5] > 0.2

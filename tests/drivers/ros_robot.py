@@ -113,6 +113,8 @@ class Robot:
         if settings.get("listens", True):
             kind = TYPES[settings["command"]]
             node.create_subscription(kind, f"{space}/commands", self.hear, 10)
+        if "frames" in settings:
+            self.tell_frames(settings["frames"])
         self.outputs: dict[str, Any] = {}  # what each was told last
         for name, kind in settings.get("outputs", {}).items():
             kinds = {"Bool": Bool, "Float64": Float64, "Float64MultiArray": Float64MultiArray}
@@ -128,6 +130,21 @@ class Robot:
     def hear(self, message: Any) -> None:
         with self.lock:
             self.controller.hear(message, time.monotonic())
+
+    def tell_frames(self, frames: list[list[Any]]) -> None:
+        """Publish fixed transforms: parent, child, origin, and the quaternion x, y, z, w."""
+        from geometry_msgs.msg import Transform, TransformStamped
+        from tf2_msgs.msg import TFMessage
+
+        self.tf = []  # of several nodes, as they often are: publishers with a message each
+        for parent, child, origin, turn in frames:
+            told = TransformStamped(child_frame_id=child, transform=Transform())
+            told.header.frame_id = parent
+            place, rotation = told.transform.translation, told.transform.rotation
+            place.x, place.y, place.z = origin
+            rotation.x, rotation.y, rotation.z, rotation.w = turn
+            self.tf.append(self.node.create_publisher(TFMessage, "/tf_static", LASTING))
+            self.tf[-1].publish(TFMessage(transforms=[told]))
 
     def output(self, name: str) -> Callable[[Any], None]:
         def hear(message: Any) -> None:

@@ -9,7 +9,7 @@ import pytest
 from vergence.app.bring_up import carried_camera
 from vergence.app.options import CalibrateOptions
 from vergence.cell import load_cell
-from vergence.cell.driver_text import write_driver_keys
+from vergence.cell.written_keys import write_driver_keys
 from vergence.drivers.bring_up import Excited, delay_of, excite, latencies
 from vergence.errors import InputError
 from vergence.places import CELLS

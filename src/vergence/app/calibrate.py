@@ -108,7 +108,7 @@ def _require_one_source(options: "CalibrateOptions") -> None:
         allowed = "a folder of images, a ROS 2 bag, --synthetic CELL, or --driver NAME --cell CELL"
         raise InputError("vergence calibrate", "", given, allowed)
     if options.driver and not options.cell:
-        allowed = "it with --cell CELL, or with --latency CELL"
+        allowed = "it with --cell CELL, or with --latency CELL or --mounting CELL"
         raise InputError("vergence calibrate", "--driver", options.driver, allowed)
     bag = options.images is not None and is_bag(options.images)
     for key, given_too, fits in (
@@ -223,7 +223,7 @@ def _robot_data(options: "CalibrateOptions", board: "Board | None", folder: Path
     if options.move:
         _require_agreement(cell, camera, options.yes)
     images = _empty_folder(folder / "images")
-    driver = open_driver(cell, str(options.driver))
+    driver = open_driver(cell, str(options.driver), mounted_as_told=False)
     count = options.image_count
     try:
         if options.move:

@@ -23,8 +23,8 @@ def latency(options: "CalibrateOptions") -> int:
     """Swing a joint, say how late images and servo are; return the exit code."""
     from vergence.assembly import check_driver, open_driver, rehearse
     from vergence.cell import load_cell
-    from vergence.cell.driver_text import write_driver_keys
     from vergence.cell.settings_text import toml_value
+    from vergence.cell.written_keys import write_driver_keys
     from vergence.drivers.bring_up import excite, latencies
 
     cell, driver = str(options.latency), options.driver

@@ -249,14 +249,21 @@ def calibrate(options: CalibrateOptions) -> int:
     Images alone give the lens. With the arm's pose at each image, lens and mounting are
     refined together. With --driver and --cell they come from a robot that you move from stop to
     stop. With --latency an arm swings one joint by 2°, and the delay of the camera's
-    images comes from their motion.
+    images comes from their motion. With --mounting the robot says where its cameras are.
     """
+    if options.mounting is not None and options.latency is not None:
+        raise InputError("calibrate", "--mounting", options.mounting, "it without --latency")
     if options.latency is not None:
         from vergence.app.latency import latency as measure
 
         return measure(options)
+    if options.mounting is not None:
+        from vergence.app.mounting import mounting
+
+        return mounting(options)
     if options.write:
-        raise InputError("calibrate", "--write", True, "it with --latency CELL")
+        allowed = "it with --latency CELL or --mounting CELL"
+        raise InputError("calibrate", "--write", True, allowed)
     if options.settings and not options.driver:
         raise InputError("calibrate", "--set", options.settings, "it with --driver NAME")
     from vergence.app.calibrate import calibrate as command

@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vergence.assembly.mountings import check_mountings
 from vergence.cell import Cell
 from vergence.cell.schema import DriverTable
 from vergence.drivers import CameraSource, Equipment
+from vergence.drivers.mountings import mountings_of
 from vergence.errors import InputError, VergenceError
 from vergence.loading import Place, load_part, make_part
 from vergence.registry import find, kinds
@@ -14,7 +16,7 @@ from vergence.runtime import Driver
 from vergence.runtime.hardware import LateStamps
 
 
-def open_driver(cell: Cell, named: str) -> Driver:
+def open_driver(cell: Cell, named: str, *, mounted_as_told: bool = True) -> Driver:
     """Return a driver for a cell, its images at the times of their exposure.
 
     Args:
@@ -22,13 +24,21 @@ def open_driver(cell: Cell, named: str) -> Driver:
             the same kind.
         named: ``NAME``, or ``module:Class`` of one's own in a file beside the cell, in this folder
             or in an installed package; with ``:ADDRESS`` behind it where the driver takes one.
+        mounted_as_told: whether cameras have to be mounted as the robot says, if it says.
 
     Raises:
-        InputError: if there is no such driver, or it cannot be opened.
+        InputError: if there is no such driver, it cannot be opened, or a camera is mounted
+            elsewhere than in the cell.
         DriverSilent: if the robot does not answer.
     """
     kind, _ = split_name(named)
     driver = _opened(cell, named)
+    if mounted_as_told:
+        try:
+            check_mountings(cell, mountings_of(driver))
+        except BaseException:
+            driver.close()
+            raise
     table = _table(cell, kind)
     if table is None or not table.stamp_latency_s:
         return driver

@@ -121,6 +121,14 @@ class CalibrateOptions:
             autocompletion=names.cells,
         ),
     ] = None
+    mounting: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CELL",
+            help="Ask the robot where the cell's cameras are mounted; needs --driver.",
+            autocompletion=names.cells,
+        ),
+    ] = None
     driver: Driver = None
     move: Annotated[
         bool,
@@ -130,7 +138,10 @@ class CalibrateOptions:
         False
     )
     write: Annotated[
-        bool, typer.Option("--write", help="Write what --latency finds into the cell file.")
+        bool,
+        typer.Option(
+            "--write", help="Write what --latency or --mounting finds into the cell file."
+        ),
     ] = False
     settings: Settings = None
     out: Out = None

@@ -42,6 +42,9 @@ class Ros2:
     images: dict[str, str] = field(
         default_factory=dict
     )  # topic by camera name; /NAME/image_raw if absent
+    mountings: dict[str, tuple[str, str]] = field(
+        default_factory=dict
+    )  # by camera, TF's names of what carries it and of its optical frame; else the cell's is used
     image_latency_s: float = knob(
         0.0, "s", least=0.0, upto=2.0
     )  # from exposure to an image's stamp
@@ -82,10 +85,11 @@ class Ros2:
 
     def _topics_of_images(self, equipment: Equipment) -> dict[str, str]:
         """Return the topics of the cameras that ROS 2 has to deliver."""
-        for name in self.images:
-            if name not in equipment.cameras:
-                allowed = nearest(name, equipment.cameras)
-                raise InputError(equipment.source, "driver.images", name, allowed)
+        for key, given in (("images", self.images), ("mountings", self.mountings)):
+            for name in given:
+                if name not in equipment.cameras:
+                    allowed = nearest(name, equipment.cameras)
+                    raise InputError(equipment.source, f"driver.{key}", name, allowed)
         needed = [name for name in equipment.watched if name not in equipment.sources]
         return {name: f"/{name}/image_raw" for name in needed} | self.images
 
@@ -113,6 +117,7 @@ class Ros2:
             "command_topic": self.command_topic or _TOPICS[self.command],
             "joint_states": self.joint_states,
             "images": images,
+            "mountings": self.mountings,
             "image_latency_s": self.image_latency_s,
             "pixel_bytes": PIXEL_BYTES,
             "outputs": self.outputs,

@@ -9,7 +9,12 @@ from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+)
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import CameraInfo, CompressedImage, JointState
 from sensor_msgs.msg import Image as RawImage
@@ -18,6 +23,7 @@ from std_msgs.msg import Bool, Float64
 from ..joints import Joints
 from .command import Command
 from .command_messages import CommandMessages
+from .frames import Frames
 from .images import Image, compressed_image, intrinsics, raw_image
 from .joint_states import JointStates
 from .outputs import Outputs
@@ -43,6 +49,10 @@ class Topics:
         self.infos: dict[str, Any] = {}
         self.first_images: dict[str, Image] = {}
         self._images: dict[str, str] = settings["images"]
+        self._mountings: dict[str, list[str]] = settings["mountings"]
+        self._frames = Frames()
+        self._tf: list[Any] = []  # subscriptions
+        self._lacking = ""  # what this Python would need besides
         self._runs: bool | None = None
         self._scale: float | None = None
         self.on_joints: Callable[[Joints, list[Any] | None], None] = lambda *_: None
@@ -74,10 +84,19 @@ class Topics:
         while len(self.infos) < len(self._images) and monotonic() < info_until:
             wait.wait(0.02)
         sizes = {n: [i.width, i.height, i.encoding] for n, i in self.first_images.items()}
-        return {"rate_hz": self.joint_states.rate_hz(), "infos": self.infos, "images": sizes}
+        found = {"rate_hz": self.joint_states.rate_hz(), "infos": self.infos, "images": sizes}
+        for subscription in self._tf:  # it would be told as often as the joints
+            self._node.destroy_subscription(subscription)
+        for camera, frames in self._mountings.items():
+            if wrong := self._frames.wrong(*frames):
+                return {"refused": f"{wrong}: see driver.mountings.{camera}"}
+        of = {camera: self._frames.between(*frames) for camera, frames in self._mountings.items()}
+        return found | {"mountings": of}
 
     def barred(self) -> str:
         """Return why the arm may not be moved: others move it, or it does not run."""
+        if self._lacking:
+            return self._lacking
         if self._runs is False:
             running = self._settings["running"]
             return f"the robot says on {running} that it does not run: start it on its pendant"
@@ -112,6 +131,10 @@ class Topics:
                 return f"no image of camera {camera} came on {topic} {waited}"
         if self._node.count_subscribers(topic := self._settings["command_topic"]) == 0:
             return f"no controller listens on {topic}: start it, or set driver.command_topic"
+        for camera, frames in self._mountings.items():
+            if self._frames.between(*frames) is None:
+                wrong = self._frames.wrong(*frames)
+                return f"{wrong}: name the right frames in driver.mountings.{camera}"
         return self.outputs.missing()
 
     def _subscribe(self) -> None:
@@ -126,12 +149,29 @@ class Topics:
             node.create_subscription(
                 CameraInfo, f"{folder}/camera_info", self._info_of(camera), quick
             )
+        if self._mountings:
+            self._subscribe_to_tf()
         lasting = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for qos in (quick, lasting):  # some robots say it once, to whoever comes later
             if settings["running"]:
                 node.create_subscription(Bool, settings["running"], self._take_running, qos)
         if settings["speed_scale"]:
             node.create_subscription(Float64, settings["speed_scale"], self._take_scale, quick)
+
+    def _subscribe_to_tf(self) -> None:
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            self._lacking = (
+                "this Python has no tf2_msgs, which TF needs: take that of a ROS installation, "
+                "or leave out driver.mountings"
+            )
+            return
+        lasting = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        passing = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for topic, qos in (("/tf_static", lasting), ("/tf", passing)):
+            made = self._node.create_subscription(TFMessage, topic, self._frames.take, qos)
+            self._tf.append(made)
 
     def _take_joints(self, message: Any) -> None:
         joints = self.joint_states.read(message)
