@@ -1,5 +1,7 @@
 """How every figure looks: sizes, colours, and where legends go."""
 
+import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -10,6 +12,27 @@ if TYPE_CHECKING:
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 LIMIT = "#a33"
 INK = "#333"
+# Each colour's counterpart on a dark system; white becomes the ground of a report's cards.
+DARK = {
+    "#ffffff": "#1a2028",
+    "#333333": "#d5dce4",
+    "#222222": "#e3e8ee",
+    "#000000": "#eef2f6",
+    "#555555": "#a5b0bc",
+    "#888888": "#6b7682",
+    "#999999": "#808b97",
+    "#e4e4e4": "#29323c",
+    "#e6e6e6": "#242c35",
+    "#ececec": "#20272f",
+    "#f2f2f2": "#1e252d",
+    "#0072b2": "#3d9fe0",
+    "#d55e00": "#ff8533",
+    "#009e73": "#27b88a",
+    "#cc79a7": "#e295bf",
+    "#56b4e9": "#94d3fb",
+    "#e69f00": "#f4bc45",
+    "#aa3333": "#e8796a",
+}
 SETTINGS: dict[Any, Any] = {
     "font.size": 9,
     "axes.edgecolor": "#888",
@@ -60,10 +83,36 @@ def save(drawn: "Figure", path: Any) -> None:
     """Write a figure to a file, the same on every machine."""
     import matplotlib as mpl
 
-    metadata = {"Date": None} if str(path).endswith(".svg") else None
+    if str(path).endswith(".svg"):
+        Path(path).write_bytes(svg(drawn))
+        return
     draw_names_as_written(drawn)
     with mpl.rc_context(SETTINGS):
-        drawn.savefig(path, dpi=150, metadata=metadata)
+        drawn.savefig(path, dpi=150)
+
+
+def svg(drawn: "Figure") -> bytes:
+    """Return a figure as SVG: the same on every machine, dark where the reader's system is dark."""
+    import matplotlib as mpl
+
+    out = io.BytesIO()
+    draw_names_as_written(drawn)
+    with mpl.rc_context(SETTINGS):
+        drawn.savefig(out, format="svg", dpi=150, metadata={"Date": None})
+    return with_dark_colors(out.getvalue().decode()).encode()
+
+
+def with_dark_colors(drawing: str) -> str:
+    """Return an SVG by matplotlib that takes the colours of `DARK` on a dark system."""
+    rules = [f"svg{{fill:{DARK['#000000']}}}"]  # matplotlib leaves out that text is black
+    rules += [
+        f'[style*="{role}: {light}"]{{{role}:{dark}!important}}'
+        for light, dark in DARK.items()
+        for role in ("fill", "stroke")
+        if light in drawing
+    ]
+    style = "@media (prefers-color-scheme: dark){" + "".join(rules) + "}"
+    return drawing.replace("</style>", f"{style}</style>", 1)
 
 
 def draw_names_as_written(drawn: "Figure") -> None:

@@ -147,6 +147,7 @@ def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: o
         (["run", "puma560", "--set", "law.Q=abc"], "law.Q: given abc; allowed: a number"),
         (["calibrate", "nowhere"], "nowhere: no such folder; needed: a folder of images"),
         (["run", sys.executable], "not TOML"),
+        (["goal", "ur5", "--out", "goal"], "--out: given goal; allowed: a file name that ends in"),
         (["run", "puma560", "--out", sys.executable], f"{sys.executable}: File exists"),
     ],
 )
@@ -267,12 +268,33 @@ def test_a_report_is_made_again(command: Command, capsys: object, run_folder: Pa
     assert json.loads(capsys.readouterr().out)["report"] == str(run_folder / "report.html")
 
 
+def test_a_report_is_a_page_or_lies_in_a_folder(
+    command: Command, capsys: object, run_folder: Path
+) -> None:
+    assert command("report", str(run_folder), "--out", "report.pdf") == 2
+    assert "a file name that ends in .html, or a folder" in capsys.readouterr().err
+
+
 def test_a_recording_sent_alone_has_a_report_under_its_name(
     command: Command, run_folder: Path
 ) -> None:
     Path("from-anna.mcap").write_bytes((run_folder / "recording.mcap").read_bytes())
     assert command("report", "from-anna.mcap") == 0
     assert "made-up" in Path("from-anna.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_report_goes_where_out_says(
+    command: Command, run_folder: Path, capsys: object, other: bool
+) -> None:
+    runs = [str(run_folder)] * (1 + other)
+    assert command("report", *runs, "--out", "deep/mine.html") == 0
+    assert "made-up" in Path("deep/mine.html").read_text(encoding="utf-8")
+    assert list(Path("deep").glob("mine-*.csv"))
+    assert command("report", *runs, "--out", "folder", "--json") == 0
+    page = Path(json.loads(capsys.readouterr().out.splitlines()[-1])["report"])
+    assert page.parent == Path("folder")
+    assert page.is_file()
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from vergence.app.figures import (
 from vergence.app.figures.arm import normalized
 from vergence.app.figures.axis import range_of, thinned, ticks
 from vergence.app.figures.chart_svg import LEFT, RIGHT, WIDTH
+from vergence.drawing import COLORS, DARK, LIMIT, figure, legend, svg
 from vergence.geometry import se3_exp
 from vergence.runtime import ArmInfo
 from vergence.runtime.recording import Recording
@@ -272,3 +273,17 @@ def test_many_features_are_summed_up(recording: Recording) -> None:
     made = error_chart(crowd)
     assert made is not None
     assert [curve.label for curve in made.panels[0].curves] == ["largest of 20", "median"]
+
+
+def test_every_colour_of_a_figure_has_a_counterpart_on_a_dark_system() -> None:
+    drawn, axes = figure(4.0, 3.0)
+    for index, color in enumerate(COLORS):
+        axes[0].plot([0.0, 1.0], [0.0, index], color=color, label=str(index))
+    axes[0].axhspan(2.0, 3.0, color=LIMIT, alpha=0.1)
+    legend(axes[0])
+    drawing = svg(drawn).decode()
+    used = set(re.findall(r"(?:fill|stroke): (#[0-9a-f]{6})", drawing.partition("</style>")[2]))
+    assert len(used) > len(COLORS)
+    assert used <= set(DARK)
+    for light in used:
+        assert f'[style*="fill: {light}"]{{fill:{DARK[light]}!important}}' in drawing

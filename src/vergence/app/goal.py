@@ -26,6 +26,8 @@ def goal(options: "GoalOptions") -> int:
     from vergence.simulation import SimulatedDriver
     from vergence.vision.matching import image_fault
 
+    if options.out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise InputError("--out", "", options.out, "a file name that ends in .png or .jpg")
     cell = load_cell(options.cell, overrides(options.settings))
     if options.driver is not None and options.at is not None:
         raise InputError("--at", "", options.at, "nothing with --driver: move the robot there")

@@ -117,20 +117,24 @@ def report(
             help="A second run, to compare with the first.", autocompletion=names.recordings
         ),
     ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Page to write (.html), or a folder for it. Default: the run's folder."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Make the report of a recording again, or one page of two recordings side by side."""
     find_recording(run)
     if other is None:
-        from vergence.app.report import write_report
+        from vergence.app.report import page_at, write_report
 
-        path = write_report(run)
+        path = write_report(run, page_at(out))
     else:
         from vergence.app.report_pair import write_pair
 
-        path = write_pair(run, other)
+        path = write_pair(run, other, out)
     if as_json:
-        emit({"command": "report", "run": path.parent, "report": path})
+        emit({"command": "report", "run": find_recording(run).parent, "report": path})
     else:
         say(f"report  {path}")
 

@@ -56,7 +56,7 @@ def figure(panels: "Panels | None", caption: str) -> str:
     """Return a figure by matplotlib with its caption; empty without a figure."""
     if panels is None:
         return ""
-    from vergence.app.figures.layout import svg
+    from vergence.drawing import svg
 
     width = round(_PX_PER_INCH * panels.figure.get_figwidth())
     return image(svg(panels.figure), "image/svg+xml", caption, width)

@@ -25,6 +25,7 @@ from vergence.app.marks_legend import marks_legend
 from vergence.app.recorded_images import camera_images
 from vergence.app.signals_csv import SIGNALS, write_signals
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows, task_rows
+from vergence.errors import InputError
 from vergence.places import RECORDING
 from vergence.runtime.recording import Recording
 from vergence.runtime.results import CameraTrace, Run
@@ -32,16 +33,36 @@ from vergence.runtime.results import CameraTrace, Run
 REPORT = "report.html"
 
 
-def write_report(folder: Path) -> Path:
-    """Write the report of a run beside its recording and return where it is.
+def write_report(folder: Path, page: Path | None = None) -> Path:
+    """Write the report of a run and return where it is.
 
     Args:
         folder: the run folder, or the recording alone.
+        page: file to write; beside the recording if None.
 
     Raises:
         InputError: if the folder holds no recording.
     """
-    return report(folder)
+    return report(folder, page)
+
+
+def page_at(out: Path | None, name: str = REPORT) -> Path | None:
+    """Return the page that ``--out`` asks for, its folder made; None if it was not given.
+
+    Args:
+        out: a file that ends in ``.html``, or a folder.
+        name: of the page in a folder.
+
+    Raises:
+        InputError: if it is neither.
+    """
+    if out is None:
+        return None
+    page = out if out.suffix.lower() == ".html" else out / name
+    if out != page and (out.is_file() or (out.suffix and not out.is_dir())):
+        raise InputError("--out", "", out, "a file name that ends in .html, or a folder")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    return page
 
 
 def report(run: Run | str | Path, path: str | Path | None = None) -> Path:

@@ -7,6 +7,7 @@ from pathlib import Path
 from vergence.app import markup
 from vergence.app.figures.pair import arms_chart, errors_chart
 from vergence.app.recorded_images import camera_images
+from vergence.app.report import page_at
 from vergence.app.robot_film import robot_film
 from vergence.app.signals_csv import write_signals
 from vergence.app.table import Row, arm_rows, camera_rows, run_rows
@@ -15,17 +16,21 @@ from vergence.runtime.recording import Recording
 Runs = Mapping[str, Recording]  # by the name that tells them apart
 
 
-def write_pair(first: Path, second: Path) -> Path:
-    """Write the page of two runs beside the first one's report; return where it is.
+def write_pair(first: Path, second: Path, out: Path | None = None) -> Path:
+    """Write the page of two runs and return where it is; the numbers of each run lie beside it.
 
-    The numbers of each run lie beside it.
+    Args:
+        first: a run folder, or a recording.
+        second: another one.
+        out: the page, or the folder to write it to; the first run's folder if None.
 
     Raises:
-        InputError: if a folder holds no recording.
+        InputError: if a folder holds no recording, or `out` is neither a page nor a folder.
     """
     recordings = [Recording.open(path) for path in (first, second)]
     runs = dict(zip(_names((first, second)), recordings, strict=True))
-    page = recordings[0].folder / f"report-against-{_stem(second)}.html"
+    name = f"report-against-{_stem(second)}.html"
+    page = page_at(out, name) or recordings[0].folder / name
     signals = {name: f"{page.stem}-{number}.csv" for number, name in enumerate(runs, 1)}
     for name, run in runs.items():
         write_signals(run, page.with_name(signals[name]))

@@ -26,7 +26,7 @@ def run_rows(run: Run) -> list[Row]:
     """Return what concerns the whole run, with what the loop itself had to say."""
     rows = [Row("run time", f"{run.duration:.2f}", "s", "from the first tick to the last")]
     if run.info.seed is not None:
-        rows.append(Row("seed", str(run.info.seed), "", "of everything drawn by chance"))
+        rows.append(Row("seed", str(run.info.seed), "", "of everything drawn at random"))
     rows += [
         Row("unserved directions", "some", "", event.text)
         for event in run.events
@@ -54,23 +54,27 @@ def task_rows(run: Run) -> list[Row]:
 
 def camera_rows(trace: CameraTrace) -> list[Row]:
     """Return how well a camera's points were followed."""
-    rows = [Row("images", str(len(trace.time)), "", "that the loop had")]
+    rows = [Row("images", str(len(trace.time)), "", "processed by the loop")]
     if asked := np.count_nonzero(trace.asked):
         share = np.count_nonzero(trace.found & trace.asked) / asked
-        rows.append(Row("points found", f"{100 * share:.1f}", "%", "of those looked for"))
+        rows.append(Row("points found", f"{100 * share:.1f}", "%", "of the points searched for"))
     if (looked := np.count_nonzero(trace.asked.any(axis=1))) < len(trace.time):
-        rows.insert(1, Row("looked into", str(looked), "", "of the others no corner was chosen"))
+        rows.insert(
+            1, Row("images searched", str(looked), "", "in the others no corner was selected")
+        )
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
         note = f"farthest point, last image{_lag(trace)}"
         rows.append(Row("final error", f"{error[-1]:.2f}", "px", note))
         rows.append(Row("largest error", f"{error.max():.2f}", "px", "farthest point, any image"))
     if len(drift):
-        note = "tracked point from the true one"
+        note = "distance of a tracked point from its true place"
         rows.append(Row("largest drift", f"{drift.max():.2f}", "px", note))
     if len(trace.time):
         late = 1e3 * float(np.median(trace.received - trace.time))
-        rows.append(Row("age of an image", f"{late:.0f}", "ms", "median, when the loop had it"))
+        rows.append(
+            Row("age of an image", f"{late:.0f}", "ms", "median, at the time of processing")
+        )
     return rows
 
 
@@ -87,7 +91,7 @@ def _lag(trace: CameraTrace) -> str:
     speed = distance / float(time[-1] - time[late][0])
     if speed < _MOVING_M_S:
         return ""
-    return f"; the target moves at {speed:.2g} m/s: a law that does not know this lags behind it"
+    return f"; the target moves at {speed:.2g} m/s: a law without feed-forward lags behind it"
 
 
 def arm_rows(info: ArmInfo, trace: ArmTrace) -> list[Row]:

@@ -1,10 +1,9 @@
-"""Figures that matplotlib draws: panels above each other, as SVG."""
+"""Figures that matplotlib draws: panels above each other."""
 
-import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from vergence.drawing import SETTINGS, draw_names_as_written, figure
+from vergence.drawing import figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,14 +26,3 @@ def panels(count: int, x_label: str = "time (s)", height: float = _PANEL_HEIGHT)
     drawn, column = figure(*size, rows=count, sharex=True)
     column[-1].set_xlabel(x_label)
     return Panels(drawn, tuple(column))
-
-
-def svg(drawn: "Figure") -> bytes:
-    """Return a figure as SVG that looks the same on every machine."""
-    import matplotlib as mpl
-
-    out = io.BytesIO()
-    draw_names_as_written(drawn)
-    with mpl.rc_context(SETTINGS):
-        drawn.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
