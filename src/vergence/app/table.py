@@ -72,9 +72,7 @@ def camera_rows(trace: CameraTrace) -> list[Row]:
         rows.append(Row("largest drift", f"{drift.max():.2f}", "px", note))
     if len(trace.time):
         late = 1e3 * float(np.median(trace.received - trace.time))
-        rows.append(
-            Row("age of an image", f"{late:.0f}", "ms", "median, at the time of processing")
-        )
+        rows.append(Row("age of an image", f"{late:.0f}", "ms", "median, when it is processed"))
     return rows
 
 

@@ -115,7 +115,9 @@ def _mark_bases(plane: "Axes", bases: Mapping[str, tuple[float, float]], reach: 
     for name, (x, y) in bases.items():
         if max(abs(x), abs(y)) < reach:
             plane.plot(x, y, "s", color=INK, markersize=9)
-            plane.annotate(name, (x, y), textcoords="offset points", xytext=(8, -3), color=INK)
+            ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5}
+            offset: Any = {"textcoords": "offset points", "xytext": (9, -3)}
+            plane.annotate(name, (x, y), **offset, color=INK, bbox=ground)
     plane.set_xlim(-reach, reach)
     plane.set_ylim(-reach, reach)
     plane.set_aspect("equal")
@@ -141,6 +143,7 @@ def headings_figure(results: Sequence[TrialResult]) -> Panels:
                 axes.bar(angle, result.target_m, width=5.6 / len(own), color=color, alpha=0.9)
             axes.set_xlabel(f"{law}, {speed:g} m/s", fontsize=10)
             axes.set_rmax(1.05 * longest)
+            axes.set_rlabel_position(180.0 / len(own))  # in the gap between two directions
             axes.tick_params(labelsize=7.5)
     _legend(drawn, grid[0, -1], dict.fromkeys(result.ending for result in results), "s")
     return Panels(drawn, tuple(grid.ravel()))
