@@ -2,10 +2,13 @@
 
 import io
 import json
+import socket
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from vergence import assembly
 from vergence.app.calibration.board_views import is_shown
 from vergence.app.calibration.suggested_poses import suggested_poses
 from vergence.app.calibration.synthetic import Studio
+from vergence.drivers.socket_robot import Link, LinkBrokenError, read_answer, said_by_robot
 from vergence.geometry import se3_inverse
 from vergence.signals import Frame, JointState, Sample, Setpoint
 from vergence.simulation import SimulatedDriver
@@ -65,7 +69,7 @@ def test_the_mounting_comes_from_the_stops_of_a_robot_that_is_moved_by_hand(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     studio = Studio("ur5", None, True, tmp_path, 0)
-    monkeypatch.setattr(assembly, "open_driver", lambda cell, named: HandGuided(studio, 12))
+    monkeypatch.setattr(assembly, "open_driver", lambda *_, **__: HandGuided(studio, 12))
     board = studio.board
     sides = "--square-mm", 1e3 * board.square_m, "--marker-mm", 1e3 * board.marker_m
     words = ("--board", f"{board.columns}x{board.rows}", *sides, "--dictionary", board.dictionary)
@@ -88,7 +92,9 @@ def test_the_mounting_comes_from_the_stops_of_a_robot_that_is_moved_by_hand(
         (("--driver", "mine", "--cell", "ur5", "photos"), "given several of them"),
         (("--move", "photos"), "--move: given True; allowed: it with --driver NAME --cell CELL"),
         (("--yes", "photos"), "--yes: given True; allowed: it with --move"),
-        (("--write", "photos"), "it with --latency CELL"),
+        (("--write", "photos"), "it with --latency CELL or --mounting CELL"),
+        (("--mounting", "ur5"), "--mounting: given ur5; allowed: it with --driver NAME[:ADDRESS]"),
+        (("--mounting", "ur5", "--latency", "ur5"), "--mounting: given ur5; allowed: it without"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(
@@ -102,48 +108,70 @@ def test_what_does_not_fit_together_is_refused(
     assert said in capsys.readouterr().err
 
 
-def studio_robot(
-    studio: Studio, monkeypatch: pytest.MonkeyPatch, interrupted_at: int = -1
-) -> list[np.ndarray]:
-    """Let the driver be that of the simulated cell with the board; return what it is told.
+class Noting(SimulatedDriver):
+    """The simulated cell with the board, which notes what its arm is told."""
 
-    Somebody presses Ctrl-C at a tick, if that is not negative.
-    """
-    told: list[np.ndarray] = []
+    def __init__(self, studio: Studio) -> None:
+        cell = studio._cell
+        cameras = {n: c.model_copy(update={"rate_hz": 5.0}) for n, c in cell.cameras.items()}
+        super().__init__(cell.replace(inner_rate_hz=100.0, cameras=cameras))
+        self.told: list[np.ndarray] = []
 
-    class Robot(SimulatedDriver):
-        def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-            if len(told) == interrupted_at:
-                told.append(told[-1])
-                raise KeyboardInterrupt
-            told.extend(setpoint.velocity for setpoint in setpoints.values())
-            super().step(setpoints)
-
-    cell = studio._cell.replace(inner_rate_hz=100.0)
-    monkeypatch.setattr(assembly, "open_driver", lambda _, named: Robot(cell))
-    return told
+    def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+        self.told.extend(setpoint.velocity for setpoint in setpoints.values())
+        super().step(setpoints)
 
 
-def words_of(board: Board, out: Path) -> tuple[object, ...]:
+class SocketArm(Thread):
+    """A robot behind the socket protocol, whose clock waits for its client."""
+
+    def __init__(self, studio: Studio) -> None:
+        super().__init__(daemon=True)
+        self.studio, self.told = studio, list[np.ndarray]()
+        self.listener = socket.create_server(("localhost", 0))
+        self.address = f"socket:localhost:{self.listener.getsockname()[1]}"
+        self.start()
+
+    def run(self) -> None:
+        driver = Noting(self.studio)  # its renderer belongs to this thread
+        connection, _ = self.listener.accept()
+        link, period = Link(connection, 1 << 20), 0
+        link.receive(60.0)  # its name
+        with suppress(LinkBrokenError):  # until it hangs up
+            while True:
+                period += 1
+                link.send(said_by_robot(period, driver.read()), 60.0)
+                message = link.receive(60.0)
+                assert message is not None
+                driver.step(read_answer(message, period, driver.arms).setpoints)
+        link.close()
+        self.listener.close()
+        driver.close()
+        self.told += driver.told
+
+
+def words_of(board: Board, out: Path, driver: str = "mine") -> tuple[object, ...]:
     sides = "--square-mm", 1e3 * board.square_m, "--marker-mm", 1e3 * board.marker_m
     words = ("--board", f"{board.columns}x{board.rows}", *sides, "--dictionary", board.dictionary)
-    return (*words, "--driver", "mine", "--cell", "ur5", "--out", out, "--move")
+    return (*words, "--driver", driver, "--cell", "ur5", "--out", out, "--move")
 
 
-def test_the_mounting_comes_from_poses_that_the_arm_is_driven_to(
+def test_the_mounting_comes_from_poses_that_an_arm_behind_a_socket_is_driven_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     studio = Studio("ur5", None, True, tmp_path, 0)
-    told = studio_robot(studio, monkeypatch)
-    words = words_of(studio.board, tmp_path / "out")
-    assert call(*words, "--images", 8, "--yes", "--json", monkeypatch=monkeypatch) == 0
+    robot = SocketArm(studio)
+    words = words_of(studio.board, tmp_path / "out", robot.address)
+    more = ("--images", 8, "--yes", "--json", "--set", "inner_rate_hz=100")
+    assert call(*words, *more, monkeypatch=monkeypatch) == 0
+    robot.join()
     said = json.loads(capsys.readouterr().out)
     assert said["images"] == 8
     T, truth = np.array(said["mounting"]["T_mount_camera"]), studio.truth.T_mount_camera
     assert np.linalg.norm((T - truth)[:3, 3]) < 3e-3
     np.testing.assert_allclose(T[:3, :3], truth[:3, :3], atol=5e-3)
     limits, period_s = studio.world.arms["ur5"], 0.01
-    rates = np.array(told)
+    rates = np.array(robot.told)
     assert (np.abs(rates) <= 0.1 * limits.rate_max + 1e-9).all()
     changes = np.abs(np.diff(rates, axis=0)) / period_s
     assert (changes <= 0.1 * limits.acceleration_max + 1e-6).all()
@@ -167,11 +195,22 @@ def test_ctrl_c_brakes_an_arm_that_is_driven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     studio = Studio("ur5", None, True, tmp_path, 0)
-    told = studio_robot(studio, monkeypatch, interrupted_at=150)
+    told: list[np.ndarray] = []
+
+    class Interrupted(Noting):
+        def step(self, setpoints: Mapping[str, Setpoint]) -> None:
+            if len(self.told) == 150:
+                told[:] = self.told
+                self.told.append(self.told[-1])
+                raise KeyboardInterrupt
+            super().step(setpoints)
+
+    robot = Interrupted(studio)
+    monkeypatch.setattr(assembly, "open_driver", lambda *_, **__: robot)
     words = words_of(studio.board, tmp_path / "out")
     assert call(*words, "--yes", monkeypatch=monkeypatch) == 2  # too few images
-    assert np.abs(told[150]).max() > 1e-3
-    assert np.abs(told[-1]).max() < 1e-9
+    assert np.abs(told[-1]).max() > 1e-3
+    assert np.abs(robot.told[-1]).max() < 1e-9
 
 
 class Touching:
