@@ -58,7 +58,11 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "realsense": "vergence.drivers.cameras:RealSense",
         "video": "vergence.drivers.cameras:Video",
     },
-    "matcher": {"sift": f"{_VISION}.matching:Sift"},
+    "matcher": {
+        "in_turn": f"{_VISION}.matching:InTurn",
+        "sift": f"{_VISION}.matching:Sift",
+        "xfeat": f"{_VISION}.matching.learned:XFeat",
+    },
     "planner": {
         "optimised": f"{_PLANNING}:OptimisedPlanner",
         "potential_field": f"{_PLANNING}:PotentialFieldPlanner",

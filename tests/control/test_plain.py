@@ -33,10 +33,11 @@ def constrained(arm, camera, objective, depth_m):
     return Servo(arm, camera, objective, depth_m=depth_m)
 
 
-def observe(points_px, found=None, time=0.0):
+def observe(points_px, found=None, time=0.0, covariance_px=None):
     m = len(points_px)
     found = np.ones(m, bool) if found is None else found
-    view = ImagePoints("wrist", time, points_px, np.zeros((m, 2, 2)), found, ("",) * m)
+    covariance_px = np.zeros((m, 2, 2)) if covariance_px is None else covariance_px
+    view = ImagePoints("wrist", time, points_px, covariance_px, found, ("",) * m)
     return Observation(time, (view,))
 
 
@@ -111,3 +112,41 @@ def test_the_sweep_inverts_for_any_number_of_joints(n):
     A = rng.normal(size=(n, n + 2))
     H = A @ A.T + 1e-3 * np.eye(n)
     np.testing.assert_allclose(invert_spd_any(H)[0] @ H, np.eye(n), atol=1e-8)
+
+
+def test_a_point_that_is_known_vaguely_hardly_counts_and_one_on_an_edge_counts_across_it(scene):
+    arm, camera, truth, q = scene
+    law = plain(arm, camera, ImageBased(gain=2.0, interaction="desired"), truth.depth_m)
+    desired = truth.points_px + [15.0, -10.0]
+    wrong = truth.points_px.copy()
+    wrong[2, 0] += 30.0  # as far as its deviation lets it be
+
+    def rates(points_px, covariance_px=None, found=None):
+        seen = observe(points_px, found, covariance_px=covariance_px)
+        return law.command(seen, Reference(0.0, desired), still(q)).velocity
+
+    right = rates(truth.points_px)
+    vague, edge = np.zeros((2, 4, 2, 2))
+    vague[2] = 20.0**2 * np.eye(2)
+    edge[2] = np.diag([20.0**2, 0.01**2])
+    off = np.linalg.norm(rates(wrong) - right)
+    assert off > 0.2 * np.linalg.norm(right)  # nothing is known of how well it is known
+    for covariance in (vague, edge):
+        assert np.linalg.norm(rates(wrong, covariance) - right) < 0.05 * off
+    wrong = truth.points_px + [[0, 0], [0, 0], [0, 30.0], [0, 0]]
+    assert np.linalg.norm(rates(wrong, edge) - right) > 0.5 * np.linalg.norm(rates(wrong) - right)
+
+
+def test_points_that_are_known_equally_well_count_equally(scene):
+    arm, camera, truth, q = scene
+    law = plain(arm, camera, ImageBased(gain=2.0), truth.depth_m)
+    desired = truth.points_px + [[15.0, -10.0], [3.0, 5.0], [0.0, 0.0], [-4.0, 1.0]]
+    answers = [
+        law.command(
+            observe(truth.points_px, covariance_px=np.tile(C, (4, 1, 1))),
+            Reference(0.0, desired),
+            still(q),
+        ).velocity
+        for C in (np.zeros((2, 2)), 0.1 * np.eye(2), 25.0 * np.eye(2))
+    ]
+    np.testing.assert_allclose(answers[1:], [answers[0]] * 2, rtol=1e-9)

@@ -113,7 +113,7 @@ def test_a_displacement_is_found_with_a_covariance_that_covers_it():
         px = CAMERA.project(points_in(T, points)) + 0.1 * rng.normal(size=(30, 2))
         normalized = CAMERA.normalize(px)
         covariance = np.tile((0.1 / 600) ** 2 * np.eye(2), (30, 1, 1))
-        found = fit_displacement(normalized, covariance, points)
+        found = fit_displacement(normalized, covariance, points, np.zeros(30))
         error = pose_difference(found.T_goal_camera, T)
         squares.append(error @ np.linalg.solve(found.covariance, error))
         assert np.linalg.norm(error[:3]) < 1e-3
@@ -127,6 +127,25 @@ def test_points_that_disagree_widen_the_confidence_region():
     regions = []
     for noise in (0.1, 1.0):
         px = CAMERA.project(points) + noise * rng.normal(size=(30, 2))
-        found = fit_displacement(CAMERA.normalize(px), covariance, points)
+        found = fit_displacement(CAMERA.normalize(px), covariance, points, np.zeros(30))
         regions.append(found.at_most()[0])
     assert regions[1] > 3.0 * regions[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_depths_that_may_be_off_widen_the_confidence_region_away_from_the_goal_alone(seed):
+    rng = np.random.default_rng([8, seed])
+    points = rng.uniform(-0.1, 0.1, (40, 3)) * [1, 1, 0.5] + [0, 0, 0.4]
+    believed = points * (0.4 / points[:, 2:])  # at one depth
+    relief = np.full(40, np.std(points[:, 2]) / 0.4)
+    covariance = np.tile((0.03 / 600) ** 2 * np.eye(2), (40, 1, 1))
+    doubt_m = []
+    for away_m in (0.006, 0.0):
+        T = se3(np.eye(3), away_m * np.array([0.8, -0.6, 0.0]))
+        px = CAMERA.project(points_in(T, points)) + 0.03 * rng.normal(size=(40, 2))
+        found = fit_displacement(CAMERA.normalize(px), covariance, believed, relief)
+        assert found.agrees.sum() > 36
+        error = pose_difference(found.T_goal_camera, T)
+        assert error @ np.linalg.solve(found.covariance, error) < 22.5  # one in a thousand
+        doubt_m.append(found.at_most()[0] - found.distance_m)
+    assert doubt_m[1] < 0.75 * doubt_m[0]

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from vergence.camera import Camera
-from vergence.estimation.goal_fit import GoalFit
+from vergence.estimation.goal_fit import GoalFit, points_in
+from vergence.geometry import se3, so3_exp
 from vergence.planning.approach import GoalImage
 from vergence.planning.approach.arrival import GoalPoints
+from vergence.planning.approach.point_depths import PointDepths
 from vergence.planning.approach.points import choose_points, depth_between
 from vergence.planning.approach.recognition import confirm
 from vergence.vision.matching import Sift
@@ -66,7 +68,7 @@ def test_at_the_goal_only_points_whose_places_are_known_well_are_followed():
     v, u = np.indices((200, 260))
     covered[140:340, 200:460] = np.where((u + 2 * v) // 12 % 2, 60, 170)
     points = GoalPoints(GoalImage.of(covered, CAMERA, Sift()), CORNERS)
-    tracks = points.track(np.roll(scene, (1, 2), (0, 1)), 0.0)
+    tracks = points.track(np.roll(scene, (1, 2), (0, 1)), 0.0, np.eye(4))
     assert 12 < tracks.found.sum() < 40
     off = tracks.points_px - points.points_px - (2.0, 1.0)
     assert np.abs(off[tracks.found]).max() < 0.1
@@ -85,6 +87,38 @@ def test_errors_of_depths_do_not_make_the_place_seem_known_better(seed):
         known = rays * 0.4 * np.exp(error * rng.normal(size=16))[:, None]
         fit = GoalFit(np.eye(4), np.eye(6), known, np.ones(16, np.bool_), 0.0, 1)
         points.learn(fit)
-        assert points.track(noisy, 0.0) is not None
+        assert points.track(noisy, 0.0, np.eye(4)) is not None
         sure_m.append(points.displacement.at_most()[0])
     assert sure_m[1] > 0.8 * sure_m[0]
+
+
+def test_depths_follow_from_a_few_millimetres_of_the_cameras_own_motion():
+    rng = np.random.default_rng(9)
+    rays = np.column_stack((rng.uniform(-0.4, 0.4, (30, 2)), np.ones(30)))
+    true_m = 0.3 + rng.uniform(-0.05, 0.05, 30)
+    points, T_goal = rays * true_m[:, None], np.eye(4)
+    off = T_goal.copy()
+    off[:3, 3] = [1e-3, -5e-4, 5e-4]  # what is believed of the goal
+    depths = PointDepths(rays[:, :2], off, 0.31, 0.12)
+    depth_m, share = depths.at_goal()
+    np.testing.assert_allclose(depth_m, 0.31)
+    assert share.min() > 0.1
+    deviation, found = np.full(30, 0.05 / 600), np.arange(30) != 7
+    for step in range(8):
+        T = se3(so3_exp(0.01 * rng.normal(size=3)), 1e-3 * np.array([1.5 * step, -step, 1.0]))
+        seen = points_in(T, points)
+        noisy = seen[:, :2] / seen[:, 2:] + deviation[:, None] * rng.normal(size=(30, 2))
+        depths.add(T, noisy, deviation, found)
+    depth_m, share = depths.at_goal()
+    error = np.abs(depth_m - true_m)[found]
+    assert error.max() < 0.02 * 0.3
+    assert (error < 4.0 * (share * depth_m)[found] + 1e-3).all()  # and the goal's own error
+    assert share[7] > 0.1  # nothing was learnt of what was not found
+
+
+def test_images_from_one_place_tell_no_depth_however_many():
+    rays = np.column_stack((np.linspace(-0.3, 0.3, 10), np.zeros(10), np.ones(10)))
+    depths = PointDepths(rays[:, :2], np.eye(4), 0.3, 0.1)
+    for _ in range(50):
+        depths.add(np.eye(4), rays[:, :2], np.full(10, 1e-5), np.ones(10, bool))
+    assert depths.at_goal()[1].min() > 0.09

@@ -7,6 +7,7 @@ import numpy as np
 
 from vergence.assembly.build_law import build_law
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.own_matcher import OwnMatcher
 from vergence.assembly.own_parts import planned_path
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
@@ -95,8 +96,9 @@ def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) 
         margin_joint=task.margin_joint,
         camera_speed_m_s=task.camera_speed_m_s,
     )
+    matcher = OwnMatcher(task.matcher, str(context.cell.path))
     return Approach(
-        GoalImage.of(taken.image, camera, task.matcher, taken.shown),
+        GoalImage.of(taken.image, camera, matcher, taken.shown),
         task.camera,
         task.arm,
         context.arm_to_camera(task.camera),

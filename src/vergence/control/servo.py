@@ -20,6 +20,7 @@ from vergence.control.objectives import (
     OptimalTracking,
     TrackingSetup,
 )
+from vergence.control.point_weights import point_weights
 from vergence.control.solvers import (
     Obstacles,
     Problem,
@@ -298,6 +299,7 @@ class Servo:
             T_camera_target=reference.T_camera_target,
             time=joints.time,
             depth_share=share,
+            weights=point_weights(view.covariance_px[found]),
             **self._pose(name, joints.position),
         )
 

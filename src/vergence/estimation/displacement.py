@@ -39,14 +39,18 @@ class Displacement(NamedTuple):
 
 
 def fit_displacement(
-    points: FloatArray, covariance: FloatArray, points_goal: FloatArray
+    points: FloatArray, covariance: FloatArray, points_goal: FloatArray, relief: FloatArray
 ) -> Displacement | None:
     """Fit the pose of a camera to points of the photograph that it sees again.
+
+    What the depths are off moves a point along the flow of the camera's translation, so it matters
+    less and less the nearer the camera is to its goal.
 
     Args:
         points: where it sees them, (K, 2), normalized coordinates.
         covariance: of these, (K, 2, 2).
         points_goal: the points in the frame of the photograph, (K, 3), m.
+        relief: standard deviations of their depths, shares of these, (K,).
 
     Returns:
         The pose, its covariance by what the points leave unexplained if that is more than stated;
@@ -54,13 +58,12 @@ def fit_displacement(
     """
     if len(points) < 4:
         return None
-    root = np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1)
     R, t = np.eye(3), np.zeros(3)  # X_camera = R X_goal + t
     for _ in range(_ITERATIONS):
         X = points_goal @ R.T + t
         if X[:, 2].min() <= 0.0:
             return None
-        r, J = _residuals(X, points, root)
+        r, J = _residuals(X, points, _root(covariance, X, relief[:, None] * t))
         square = np.sum(r**2, axis=1)
         weight = 1.0 / (1.0 + square / _DOUBTFUL**2)
         A = np.einsum("k,kai,kaj->ij", weight, J, J)
@@ -78,6 +81,15 @@ def fit_displacement(
     back[:3, :3] = back[3:, 3:] = -R.T
     agrees: BoolArray = square < (2.0 * _DOUBTFUL) ** 2 * scale
     return Displacement(se3(R.T.copy(), -R.T @ t), back @ C @ back.T, agrees)
+
+
+def _root(covariance: FloatArray, X: FloatArray, t: FloatArray) -> FloatArray:
+    """Return what whitens residuals, (K, 2, 2), if a translation t (K, 3) may move each point."""
+    z = X[:, 2:]
+    flow = (t[:, :2] - X[:, :2] / z * t[:, 2:]) / z
+    doubt = covariance + flow[:, :, None] * flow[:, None, :]
+    root: FloatArray = np.linalg.cholesky(np.linalg.inv(doubt)).transpose(0, 2, 1)
+    return root
 
 
 def _residuals(

@@ -24,6 +24,7 @@ class ImageBased:
 
     L is taken at the feature as it is, as it should be, or as the mean of both
     [Chaumette2006] section 5. The mean alone brings a camera through half a turn about its axis.
+    Points count by how well their places are known; any other feature is of all points alike.
     """
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
@@ -45,6 +46,9 @@ class ImageBased:
                 lambda: interaction_matrix_points(desired, desired_depth),
             )
             rows = change.ravel()
+            if state.weights is not None:
+                rows = (state.weights @ change[:, :, None]).ravel()
+                L = (state.weights @ L.reshape(-1, 2, 6)).reshape(-1, 6)
         else:
             now = self.feature(state.points, state.depth_m)
             goal = self.feature(desired, desired_depth)

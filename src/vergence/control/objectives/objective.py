@@ -50,6 +50,7 @@ class CameraState:
         T_camera_target: desired pose of the target, (4, 4); None where none is given.
         time: now, s.
         depth_share: largest standard deviation of a depth, a share of it; NaN if unknown.
+        weights: roots (M, 2, 2) of what the rows of each feature weigh; all alike if None.
     """
 
     mounting: CameraMounting | None
@@ -69,6 +70,7 @@ class CameraState:
     T_camera_target: FloatArray | None = None
     time: float = 0.0
     depth_share: float = float("nan")
+    weights: FloatArray | None = None
 
     @property
     def camera(self) -> Camera:

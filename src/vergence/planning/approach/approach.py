@@ -143,7 +143,7 @@ class Approach:
         assert frame.image is not None
         assert self._tracker is not None
         if self._closing.begun:
-            tracks = self._closing.tracks(frame)
+            tracks = self._closing.tracks(frame, self._search.camera_pose(frame))
             if tracks is not None:
                 return tracks
             self._tell(frame.time, "left the goal", "the photograph's points are lost")

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from vergence.arrays import FloatArray, ImageArray, IntArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.estimation.displacement import Displacement, fit_displacement
 from vergence.estimation.goal_fit import GoalFit, points_in
 from vergence.planning.approach.goal import GoalImage
-from vergence.planning.approach.points import depth_between
+from vergence.planning.approach.point_depths import PointDepths
 from vergence.signals import Reference
 from vergence.vision import SsdTracker, pick_features
 from vergence.vision.tracks import Tracks
@@ -17,6 +17,8 @@ _APART_PX = 16.0
 _BORDER_PX = 40.0
 _VAGUE_PX = 0.5  # stated deviation from which a point tells nothing this close to the goal
 _FLOOR_PX = 0.03  # what a measured place may be off beside its stated deviation
+_ARM_PX = 0.15  # what a point may be off by where the joints say that the camera is
+_LEAST_RELIEF, _MOST_RELIEF = 0.03, 0.3  # deviation of the points' depths, a share of them
 _REST_S, _REST = 0.4, 0.03  # in which the camera must not move more than this share of a tolerance
 
 
@@ -33,13 +35,22 @@ class GoalPoints:
         self.points_px = _picked(goal, star_px)
         self._tracker = SsdTracker(goal.image, self.points_px)
         self._depth_m = np.ones(len(self.points_px))
+        self._relief = np.zeros(len(self.points_px))  # deviations of the depths, shares of them
+        self._depths: PointDepths | None = None  # known once a fit is
         self._seen: list[tuple[float, Displacement]] = []
 
     def learn(self, fit: GoalFit) -> None:
-        """Take the depths of the points from those of a fit."""
-        known = fit.points_goal
+        """Take pose and distance of the goal from a fit; how deep each point is, motion will tell.
+
+        The depths that a fit gives single points pass for relief where they are wrong, and relief
+        tells a motion aside from a turn.
+        """
+        depth_m = fit.points_goal[:, 2]
+        middle = float(np.median(depth_m))
+        share = float(np.clip(np.std(depth_m) / middle, _LEAST_RELIEF, _MOST_RELIEF))
         points = self.goal.camera.normalize(self.points_px)
-        self._depth_m = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
+        self._depths = PointDepths(points, fit.T_world_goal, middle, share)
+        self._depth_m, self._relief = self._depths.at_goal()
 
     def shift_px(self, T_goal_camera: FloatArray) -> float:
         """Return how far the points are from their places, from a pose of the camera, median."""
@@ -50,13 +61,18 @@ class GoalPoints:
         return float(np.median(np.linalg.norm(shift, axis=1)))
 
     def track(
-        self, image: ImageArray, time: float, T_goal_camera: FloatArray | None = None
+        self,
+        image: ImageArray,
+        time: float,
+        T_world_camera: FloatArray,
+        T_goal_camera: FloatArray | None = None,
     ) -> Tracks | None:
         """Measure the points in an image; None if too few are found.
 
         Args:
             image: grey, (height, width).
             time: of it, s.
+            T_world_camera: where it was taken, (4, 4).
             T_goal_camera: where the camera is thought to be; where it was last if None.
         """
         predicted = None
@@ -72,20 +88,30 @@ class GoalPoints:
         if tracks.found.sum() < max(_FEWEST, len(tracks.found) // 3):
             return None
         found, camera = tracks.found, self.goal.camera
-        points = camera.normalize(tracks.points_px[found])
+        points = camera.normalize(tracks.points_px)
         covariance = camera.normalize_covariance(
-            tracks.covariance_px[found] + _FLOOR_PX**2 * np.eye(2), points
+            tracks.covariance_px + _FLOOR_PX**2 * np.eye(2), points
         )
-        # At one depth: errors of single depths would pass for relief, which tells a motion aside
-        # from a turn, and what is left would seem to be known better than it is.
-        flat = self._points_goal(np.full(len(found), np.median(self._depth_m)))
-        displacement = fit_displacement(points, covariance, flat[found])
+        self._learn_depths(T_world_camera, points, found)
+        goal = self._points_goal(self._depth_m)
+        displacement = fit_displacement(
+            points[found], covariance[found], goal[found], self._relief[found]
+        )
         if displacement is None:
             return None
         at_odds = np.flatnonzero(found)[~displacement.agrees]
         tracks = _without(tracks, at_odds, "disagrees with the other points")
         self._seen = [(t, d) for t, d in self._seen if t >= time - _REST_S] + [(time, displacement)]
         return tracks
+
+    def _learn_depths(
+        self, T_world_camera: FloatArray, points: FloatArray, found: BoolArray
+    ) -> None:
+        if self._depths is None:
+            return
+        deviation = np.full(len(points), _ARM_PX / min(self.goal.camera.focal_px))
+        self._depths.add(T_world_camera, points, deviation, found)
+        self._depth_m, self._relief = self._depths.at_goal()
 
     @property
     def displacement(self) -> Displacement | None:
@@ -102,12 +128,8 @@ class GoalPoints:
         return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
 
     def reference(self, time: float) -> Reference:
-        """Return the points as the photograph shows them, at one depth, as they are judged.
-
-        With the errors of single depths for relief the law can drive the camera away, slowly, along
-        a motion aside with a turn against it that hardly changes the image.
-        """
-        depth_m = np.full(len(self.points_px), np.median(self._depth_m))
+        """Return the points as the photograph shows them, as deep as they are judged."""
+        depth_m = self._depth_m
         return Reference(
             time,
             self.points_px,

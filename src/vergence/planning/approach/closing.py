@@ -49,17 +49,17 @@ class Closing:
         T_goal_camera = se3_inverse(fit.T_world_goal) @ T_world_camera
         if self.points.shift_px(T_goal_camera) > NEAR_PX:
             return ""
-        tracks = self.points.track(frame.image, frame.time, T_goal_camera)
+        tracks = self.points.track(frame.image, frame.time, T_world_camera, T_goal_camera)
         if tracks is None:
             return ""
         self.begun = True
         return f"{np.count_nonzero(tracks.found)} of {len(tracks.found)}"
 
-    def tracks(self, frame: Frame) -> Tracks | None:
+    def tracks(self, frame: Frame, T_world_camera: FloatArray) -> Tracks | None:
         """Return the points in an image, as far as they are followed; None where they are lost."""
         assert self.points is not None
         assert frame.image is not None
-        tracks = self.points.track(frame.image, frame.time)
+        tracks = self.points.track(frame.image, frame.time, T_world_camera)
         self.begun = tracks is not None
         return tracks
 

@@ -8,7 +8,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.vision.matching.image_faults import image_fault
-from vergence.vision.matching.matcher import Matcher, Matches
+from vergence.vision.matching.matcher import Matcher, Matches, finer_of
 from vergence.vision.two_view import (
     TwoView,
     TwoViewFailure,
@@ -56,8 +56,8 @@ def compare_images(
     found = _motion_of(matcher.match(matcher.describe(image), desired), camera)
     if isinstance(found, Compared):
         return found
-    if matcher.finer is not None:
-        return compare_images(image, image_star, camera, matcher.finer)
+    if (finer := finer_of(matcher)) is not None:
+        return compare_images(image, image_star, camera, finer)
     return _explained(found, image, image_star, camera, matcher)
 
 

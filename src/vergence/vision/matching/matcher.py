@@ -36,7 +36,11 @@ class Matcher(Protocol):
         """Match two images by their descriptions."""
         ...
 
-    @property
-    def finer(self) -> "Matcher | None":
-        """A slower matcher that finds more, to be asked where this one finds too little."""
-        ...
+
+def finer_of(matcher: Matcher) -> Matcher | None:
+    """Return what is asked where a matcher finds too little: its attribute `finer`, if it has one.
+
+    Such as a slower one that finds more.
+    """
+    finer: Matcher | None = getattr(matcher, "finer", None)
+    return finer

@@ -1,26 +1,18 @@
 """Lowe's features: recognised however the camera was turned, and over a change of scale."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.arrays import BoolArray, ImageArray
 from vergence.errors import ShapeError
 from vergence.parts import knob, part
 from vergence.vision.image import grey_image
+from vergence.vision.matching.image_features import ImageFeatures, nearest_features, no_features
 from vergence.vision.matching.matcher import Matches
 
 _ROWS_PX = 480  # an image with more is searched at a smaller size
-_NOTHING = np.zeros((0, 2))
-
-
-class ImageFeatures(NamedTuple):
-    """The features of one image."""
-
-    points_px: FloatArray  # (N, 2)
-    descriptors: np.ndarray  # (N, D) float32
-    reason: str = ""  # why there are none
 
 
 @part("matcher", "sift")
@@ -58,7 +50,7 @@ class Sift:
 
         grey, reason = grey_image(image)
         if grey is None:
-            return ImageFeatures(_NOTHING, np.zeros((0, 128), np.float32), reason)
+            return no_features(reason)
         if mask is not None and np.shape(mask) != grey.shape:
             raise ShapeError("mask", np.shape(mask), grey.shape)
         size = self.size * min(1.0, _ROWS_PX / min(grey.shape))
@@ -75,32 +67,14 @@ class Sift:
         points, descriptors = detector.detectAndCompute(grey, shown)
         if descriptors is None or len(points) < 2:
             reason = "no texture that could be recognised"
-            return ImageFeatures(_NOTHING, np.zeros((0, 128), np.float32), reason)
+            return no_features(reason)
         scale = np.array(image.shape[::-1]) / np.array(grey.shape[::-1])
         centres = np.array([point.pt for point in points], dtype=np.float64)
         return ImageFeatures((centres + 0.5) * scale - 0.5, descriptors)
 
     def match(self, current: ImageFeatures, desired: ImageFeatures) -> Matches:
         """Match two images by their features."""
-        for name, features in (("current", current), ("desired", desired)):
-            if features.reason:
-                return Matches(_NOTHING, _NOTHING, f"the {name} image: {features.reason}")
-        a, b = current.descriptors, desired.descriptors
-        squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * (a @ b.T)
-        rows = np.arange(len(a))
-        best = squares.argmin(axis=1)
-        first = np.maximum(squares[rows, best], 0.0)
-        squares[rows, best] = np.inf
-        second = np.maximum(squares.min(axis=1), 1e-9)
-        squares[rows, best] = first
-        mutual = squares.argmin(axis=0)[best] == rows
-        ratio = np.sqrt(first / second)
-        good = np.flatnonzero(mutual & (ratio < self.distinct))
-        chosen = good[np.argsort(ratio[good], kind="stable")][: self.count]
-        if not len(chosen):
-            reason = "no feature of one image is recognised in the other"
-            return Matches(_NOTHING, _NOTHING, reason)
-        return Matches(current.points_px[chosen], desired.points_px[best[chosen]], "")
+        return nearest_features(current, desired, self.distinct, self.count)
 
 
 def match_features(

@@ -1,0 +1,24 @@
+"""How much each point of an image counts, by how well its place is known."""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+
+_SURE_PX = 0.5  # standard deviation up to which a point counts (nearly) fully
+
+
+def point_weights(covariance_px: FloatArray) -> FloatArray:
+    """Return roots R (M, 2, 2) of what rows of points weigh: Rᵀ R = σ² (σ² I + C)⁻¹, the best 1.
+
+    Points of equal covariance C weigh the same, 1, whatever it is. One that lies on an edge weighs
+    across it and not along it.
+
+    Args:
+        covariance_px: C, (M, 2, 2), px².
+    """
+    if not len(covariance_px):
+        return np.zeros((0, 2, 2))
+    weight = np.linalg.inv(np.eye(2) + covariance_px / _SURE_PX**2)
+    weight /= np.linalg.eigvalsh(weight).max()
+    roots: FloatArray = np.linalg.cholesky(weight).transpose(0, 2, 1)
+    return roots
