@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 RENDERS := $(VENV)/.renders
+KERNELS := $(VENV)/.kernels
 
 # Drivers whose robots' packages are tried, each in an environment of its own.
 DRIVERS := franka gige realsense ros2 so101 ur
@@ -24,7 +25,7 @@ help:
 	@echo "make fuzz     try untrusted input by the ten thousand (in make test: by the hundred)"
 	@echo "make test-drivers  test the drivers of real robots with the robots' own packages"
 	@echo "make soak     run the loop at 500 Hz for an hour (MINUTES=5 for less), watch its time and memory"
-	@echo "make kernels  compile now what the first runs would compile"
+	@echo "make kernels  compile now what first runs of all kinds of cells would compile"
 	@echo "make wheel    build the wheel, with compiled kernels in it, and the source archive into dist/"
 	@echo "make test-wheel  build the wheel, install it into a bare environment and run a cell from it"
 	@echo "make docs     build the documentation into docs/_build; a warning is an error"
@@ -33,10 +34,11 @@ help:
 	@echo "make format   format the code and apply the safe fixes"
 	@echo "make bench    run the benchmarks, peers beside us"
 	@echo "make peers    build and install what the benchmarks compare us with (ViSP, Python packages)"
-	@echo "make setup    only set up: the virtual environment and the renderer"
+	@echo "make setup    only set up: the virtual environment, the renderer, the first kernels"
 	@echo "make clean    remove everything that was built, the virtual environment too"
 
-setup: $(INSTALLED) $(RENDERS)
+# CI compiles its kernels once, for the wheel.
+setup: $(INSTALLED) $(RENDERS) $(if $(CI),,$(KERNELS))
 
 $(INSTALLED): pyproject.toml constraints.txt scripts/make-venv
 	@scripts/make-venv $(VENV)
@@ -44,6 +46,10 @@ $(INSTALLED): pyproject.toml constraints.txt scripts/make-venv
 
 $(RENDERS): $(INSTALLED) scripts/ensure-rendering
 	@scripts/ensure-rendering $(BIN)/python
+	@touch $@
+
+$(KERNELS): $(RENDERS) scripts/build-kernels
+	@scripts/build-kernels --first $(BIN)/python
 	@touch $@
 
 test-images:

@@ -46,8 +46,10 @@ def track_points(
     """
     frames = open_footage(source, rate_hz, topic).frames()
     first = next(frames)
+    image = Frame(_CAMERA, first.time, first.image, {}).image  # read-only, as in every loop
+    assert image is not None
     if points_px is None:
-        picked = pick_features(first.image, count)
+        picked = pick_features(image, count)
         if not picked:
             raise InputError(first.name, "", picked.reason, "an image with texture, or points_px")
         start = picked.points_px
@@ -55,7 +57,7 @@ def track_points(
         start = as_floats(points_px, (None, 2), "points_px")
     part = load_part("tracker", tracker, Place("track_points", "tracker", None), "ssd")
     with asking(part, "track_points", "tracker"):
-        tracked = TrackedPoints(_CAMERA, part.start(first.image, start), len(start))
+        tracked = TrackedPoints(_CAMERA, part.start(image, start), len(start))
     for frame in chain((first,), frames):
         observation = tracked.observe((Frame(_CAMERA, frame.time, frame.image, {}),))
         assert observation is not None
