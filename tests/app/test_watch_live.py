@@ -5,10 +5,14 @@ from pathlib import Path
 import pytest
 from steered import NoScene, Steered, wait
 
-from vergence.app.watch.commands import Pause, Reset, TrackPoints
+from vergence.app.watch.commands import Pause, Reset, TrackPoints, TurnKnob
 from vergence.app.watch.law_editor import LawEditor
 from vergence.app.watch.live import Live
+from vergence.assembly import LawContext
+from vergence.assembly.started_driver import StartedDriver
+from vergence.errors import InputError
 from vergence.signals import OutcomeKind
+from vergence.simulation import SimulatedDriver
 
 SMALL = {
     "cameras.wrist.resolution": "[320, 240]",
@@ -47,3 +51,74 @@ def test_points_that_cannot_be_tracked_are_refused_and_a_reset_takes_up_the_cell
     assert page.refused == []
     assert run.outcome.kind is OutcomeKind.STOPPED
     assert run.cameras["wrist"].points_px.shape[1] == 1
+
+
+TRACK = 'kind = "track", arm = "puma", camera = "wrist"'
+TASKS = SMALL | {
+    "law": '{ kind = "image_based" }',
+    "target.features": "[[0.05, 0.05, 0], [-0.05, 0.05, 0], [-0.05, -0.05, 0], [0.05, -0.05, 0]]",
+    "law.gain": "0.5",
+    "laws": '{ second = { kind = "image_based", gain = 1.0 } }',
+    "tasks": f"""[
+        {{ {TRACK}, until = {{ kind = "time", time_s = 0.2 }} }},
+        {{ kind = "advance", arm = "puma", camera = "wrist", distance_m = 0.002 }},
+        {{ {TRACK}, law = "second", until = {{ kind = "time", time_s = 0.2 }} }},
+        {{ {TRACK} }},
+    ]""",
+}
+
+
+def test_the_law_of_the_task_that_runs_is_changed_and_tasks_that_share_it_share_the_change() -> (
+    None
+):
+    editor = LawEditor("puma560", TASKS, None)
+    driver = SimulatedDriver(editor.cell, images=False)
+    contexts = [
+        LawContext.of(stage, StartedDriver(driver, ("wrist",))) for stage in editor.cell.stages
+    ]
+    begun, changed = editor.cell, {}
+    for number, gain in ((0, 0.25), (2, 2.0)):
+        editor.begin_task(number)
+        points = {"wrist": driver.first_frame("wrist").truth.points_px}
+        contexts[number] = contexts[number].with_points(points)
+        editor.turn("gain", gain, contexts[number])
+        changed[number] = editor.as_json()["settings"]
+    assert changed == {0: ["law.gain=0.25"], 2: ["law.gain=0.25", "laws.second.gain=2.0"]}
+    gains = [stage.law.objective.gain for stage in editor.cell.stages]
+    assert gains == [0.25, 0.25, 2.0, 0.25]
+    editor.begin_task(3)
+    assert editor.law_after(begun, contexts[0]) is not None
+    assert editor.law_after(editor.cell, contexts[0]) is None
+    editor.choose("second", contexts[0])  # what another task goes by
+    assert editor.as_json()["settings"][0] == "laws.second.gain=2.0"
+    editor.begin_task(1)
+    assert not editor.as_json()["choices"]
+    with pytest.raises(InputError, match="goes by no law"):
+        editor.turn("gain", 1.0, contexts[1])
+    driver.close()
+
+
+def test_a_number_turned_in_one_task_acts_in_a_later_one_by_the_same_law(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vergence.app.watch.live.Scene", NoScene)
+    live = Live(
+        LawEditor("puma560", TASKS, None),
+        False, tmp_path / "run", 0,
+    )  # fmt: skip
+    page, changes = Steered(live), list[tuple[int, str]]()
+    monkeypatch.setattr(live, "_say", lambda name, text: changes.append((live._task, text)))
+
+    def steps() -> None:
+        wait(lambda: live._loop is not None)
+        page.ask(TurnKnob(do="knob", key="gain", value=0.125))
+        wait(lambda: len(changes) == 2)
+
+    def end() -> None:
+        live._again = False
+        live._loop.stop()
+
+    page.run(steps, end)
+    assert page.refused == []
+    assert changes == [(0, "law.gain=0.125"), (3, "law.gain=0.125")]
+    assert live._loop is None

@@ -16,6 +16,7 @@ from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.cell.tasks import require_one_task
+from vergence.control import ServoSettings
 from vergence.errors import NOTHING, InputError
 from vergence.planning.approach import (
     Approach,
@@ -56,12 +57,19 @@ def photograph_parts(
         return Outcome(OutcomeKind.INFEASIBLE, reason, 0.0)
     seen = approach.recognition
     assert seen is not None
-    # The points followed change on the way, so no motion of theirs can be told from image to image.
-    cell = context.cell
-    cell = cell.model_copy(update={"law": replace(cell.law, feed_forward=False)})
-    context = replace(context, cell=cell, points_on_anything=True)
+    context = replace(context, cell=without_target_motion(context.cell), points_on_anything=True)
     context = context.with_points({task.camera: seen.points_px})
     return Parts(driver, approach, approach, build_law(context), context)
+
+
+def without_target_motion(cell: Cell) -> Cell:
+    """Return a cell whose law feeds no motion of the target forward.
+
+    The points followed change on the way, so no motion of theirs can be told from image to image.
+    """
+    if not isinstance(cell.law, ServoSettings):
+        return cell
+    return cell.model_copy(update={"law": replace(cell.law, feed_forward=False)})
 
 
 def require_photograph(context: LawContext, images: bool) -> None:

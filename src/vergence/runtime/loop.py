@@ -127,6 +127,11 @@ class Loop:
         """End the run within this tick, as Ctrl-C does."""
         self._interrupt.asked = True
 
+    @property
+    def law(self) -> Law:
+        """What it goes by now."""
+        return self._law
+
     def replace_law(self, law: Law) -> None:
         """Go on with another law from the next image.
 

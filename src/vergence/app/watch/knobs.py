@@ -62,11 +62,6 @@ def knobs(law: Any) -> list[dict[str, Any]]:
     return found
 
 
-def turned(key: str, value: Any) -> dict[str, str]:
-    """Return the setting of a cell file, key and TOML, that a changed knob stands for."""
-    return {f"law.{key}": json.dumps(value)}
-
-
 def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
     """Yield the knobs of a part's fields."""
     for name, about in type(part).__pydantic_fields__.items():

@@ -1,21 +1,36 @@
-"""Changes the law of a cell while the cell runs, and what it tracks."""
+"""Changes the laws of a cell while the cell runs, and what it tracks."""
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
-from vergence.app.watch.knobs import knobs, law_choices, turned
+from vergence.app.watch.knobs import knobs, law_choices
 from vergence.assembly import LawContext, build_law, with_points
+from vergence.assembly.photograph import is_by_photograph, without_target_motion
 from vergence.cell import Cell, load_cell
-from vergence.cell.tasks import require_one_task
 from vergence.cell.toml_text import setting
 from vergence.control import Law
 from vergence.errors import InputError, nearest
 
+_BY_LAW = ("track", "reach", "follow")  # kinds of task that go by the law of the cell file
+
+
+@dataclass
+class _Edited:
+    """A law of the cell file, `[law]` or one of `[laws]`, as the page has it."""
+
+    choices: dict[str, str]  # names, and the TOML that asks for each
+    choice: str
+    own: dict[str, Any]  # the numbers that the chosen law has by itself
+
 
 class LawEditor:
-    """Keeps a cell with what was changed of its law; every change is a setting of the cell file.
+    """Keeps a cell with what was changed of its laws; every change is a setting of the cell file.
+
+    Of a cell with several tasks the law of the one that runs is changed. Tasks that share a law
+    share its changes.
 
     Args:
         source: name or path of the cell.
@@ -29,6 +44,29 @@ class LawEditor:
     def __init__(self, source: str, settings: Mapping[str, str], seed: int | None) -> None:
         self._own_task = load_cell(source, settings, seed)
         self._start_from(self._own_task)
+
+    @property
+    def stage(self) -> Cell:
+        """The cell with the task alone whose law is changed."""
+        return self.cell.stages[self._number]
+
+    def begin_task(self, number: int) -> None:
+        """Change the law of another of the cell's tasks from now on."""
+        self._number = number
+        if self._at not in self._edited:
+            choices = law_choices(self.stage)
+            self._edited[self._at] = _Edited(choices, next(iter(choices)), _values(self.stage))
+
+    def law_after(self, cell: Cell, context: LawContext) -> Law | None:
+        """Return the law of the task as it is now; None if it is as another cell has it.
+
+        Args:
+            cell: as it was when the run began.
+            context: of the task.
+        """
+        if not self._goes_by_law or cell.stages[self._number].law == self.stage.law:
+            return None
+        return build_law(replace(context, cell=_as_assembled(self.stage)))
 
     def track(self, points_px: Sequence[tuple[float, float]]) -> None:
         """Make it the task to keep points of an image where they are, by a law that can.
@@ -50,13 +88,15 @@ class LawEditor:
             InputError: if there is no such law, or it does not suit the cell; the law stays as it
                 was.
         """
-        if name not in self._choices:
-            raise InputError("message", "name", name, nearest(name, self._choices))
-        changed = {"law": self._choices[name]}
-        if name == next(iter(self._choices)):
-            changed = {}
+        self._require_law("name", name)
+        edited = self._edited[self._at]
+        if name not in edited.choices:
+            raise InputError("message", "name", name, nearest(name, edited.choices))
+        changed = {key: text for key, text in self._changed.items() if not self._is_here(key)}
+        if name != next(iter(edited.choices)):
+            changed[self._at] = edited.choices[name]
         law = self._change(changed, context)
-        self._choice, self._own = name, _values(self.cell)
+        edited.choice, edited.own = name, _values(self.stage)
         return law
 
     def turn(self, key: str, value: Any, context: LawContext) -> Law:
@@ -66,43 +106,71 @@ class LawEditor:
             InputError: if there is no such number, or the value is not allowed; the law stays as
                 it was.
         """
-        keys = [knob["key"] for knob in knobs(self.cell.law)]
+        self._require_law("key", key)
+        keys = [knob["key"] for knob in knobs(self.stage.law)]
         if key not in keys:
             raise InputError("message", "key", key, nearest(key, keys))
-        changed = self._changed | turned(key, value)
-        if key in self._own and value == self._own[key]:
-            del changed[f"law.{key}"]
+        own, at = self._edited[self._at].own, f"{self._at}.{key}"
+        changed = self._changed | {at: json.dumps(value)}
+        if key in own and value == own[key]:
+            del changed[at]
         return self._change(changed, context)
 
     def as_json(self) -> dict[str, Any]:
         """Return what the page shows."""
+        settings = [f"{key}={value}" for key, value in self._changed.items()]
+        if not self._goes_by_law:
+            return {"choices": [], "choice": "", "knobs": [], "settings": settings}
+        edited = self._edited[self._at]
         return {
-            "choices": list(self._choices),
-            "choice": self._choice,
+            "choices": list(edited.choices),
+            "choice": edited.choice,
             "knobs": [
-                {**knob, "own": self._own.get(knob["key"], knob["value"])}
-                for knob in knobs(self.cell.law)
+                {**knob, "own": edited.own.get(knob["key"], knob["value"])}
+                for knob in knobs(self.stage.law)
             ],
-            "settings": [f"{key}={value}" for key, value in self._changed.items()],
+            "settings": settings,
         }
+
+    @property
+    def _at(self) -> str:
+        """Where the law of the task stands in the cell file."""
+        tasks = self._base.tasks
+        name = tasks[self._number].law if tasks else None
+        return "law" if name is None else f"laws.{name}"
+
+    @property
+    def _goes_by_law(self) -> bool:
+        return self.stage.task.kind in _BY_LAW
+
+    def _is_here(self, key: str) -> bool:
+        return key == self._at or key.startswith(f"{self._at}.")
+
+    def _require_law(self, key: str, given: str) -> None:
+        if not self._goes_by_law:
+            allowed = f"nothing while the task {self.stage.task.called} runs: it goes by no law"
+            raise InputError("message", key, given, allowed)
 
     def _start_from(self, cell: Cell) -> None:
         self.cell = self._base = cell
         self._changed = dict[str, str]()
-        self._choices = law_choices(cell)
-        self._choice = next(iter(self._choices))
-        self._own = _values(cell)  # the numbers that the chosen law has by itself
+        self._edited = dict[str, _Edited]()  # by where they stand
+        self.begin_task(0)
 
     def _change(self, changed: dict[str, str], context: LawContext) -> Law:
-        require_one_task(self._base, "one [task] for laws that are changed on the page")
         cell = self._base
         for key, text in changed.items():
             names, value = setting(key, text)
             cell = cell.replace(**reduce(lambda table, name: {name: table}, reversed(names), value))
-        law = build_law(replace(context, cell=cell))
+        law = build_law(replace(context, cell=_as_assembled(cell.stages[self._number])))
         self.cell, self._changed = cell, changed
         return law
 
 
-def _values(cell: Cell) -> dict[str, Any]:
-    return {knob["key"]: knob["value"] for knob in knobs(cell.law)}
+def _as_assembled(stage: Cell) -> Cell:
+    """Return a cell with its law as it is on the way to a photograph, if it goes to one."""
+    return without_target_motion(stage) if is_by_photograph(stage) else stage
+
+
+def _values(stage: Cell) -> dict[str, Any]:
+    return {knob["key"]: knob["value"] for knob in knobs(stage.law)}

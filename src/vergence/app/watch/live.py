@@ -69,7 +69,11 @@ class Live:
         self._driver = WatchedDriver(editor.cell, images)
         self._corners = target_corners(self._driver.world)
         self._loop: Loop | None = None
-        self._context: LawContext | None = None  # of the last run
+        self._context: LawContext | None = None  # of the task that runs, or ran last
+        self._begun_with = editor.cell  # what the run was begun with
+        self._task = 0  # its number
+        self._law: Law | None = None  # what it goes by
+        self._is_new = False  # whether the task has just begun
         self._recorder = Recorder(out, image_every)
         self._runs, self._again = 0, True
         self._newest = NewestFrames()
@@ -114,7 +118,9 @@ class Live:
         self._driver.close()
 
     def _run_once(self) -> Run:
-        cell = self._editor.cell
+        cell = self._begun_with = self._editor.cell
+        self._task = 0
+        self._editor.begin_task(0)
         about = {
             "mode": "live",
             "scene": True,
@@ -143,8 +149,11 @@ class Live:
             self._driver.between = None
 
     def _attend(self, loop: Loop, parts: Parts) -> None:
-        self._context = parts.context
+        self._context, self._law = parts.context, parts.law
         if self._loop is loop:  # another task of the same run
+            self._task += 1
+            self._editor.begin_task(self._task)
+            self._is_new = True
             return
         self._loop = loop
         self.view_state.status(preparing=False)
@@ -174,6 +183,9 @@ class Live:
     def _between(self, time: float) -> None:
         """Show the world; wait for the clock; do what was asked."""
         self._show()
+        if self._is_new:
+            self._is_new = False
+            self._take_changes()
         while not self._stopping and (delay := self._pace.delay(time)) != 0.0:
             self._tell()
             self._inbox.obey(self._do, timeout_s=min(delay or _LOOK_UP_S, _LOOK_UP_S))
@@ -289,14 +301,27 @@ class Live:
 
     @property
     def _law_context(self) -> LawContext:
-        cell = self._editor.cell
-        return self._context or LawContext.of(cell, StartedDriver(self._driver, cell.watched))
+        stage = self._editor.stage
+        return self._context or LawContext.of(stage, StartedDriver(self._driver, stage.watched))
 
     def _replace_law(self, law: Law) -> None:
-        if self._loop is not None:
+        # Between two tasks the arm comes to rest by a law of its own.
+        if self._loop is not None and self._loop.law is self._law:
             self._loop.replace_law(law)
+            self._law = law
         changes = self._editor.as_json()["settings"]
         self._say("law changed", ", ".join(changes) or "back to the cell's own")
+
+    def _take_changes(self) -> None:
+        """Let a task that has just begun go by what was changed of its law since the run began."""
+        assert self._context is not None
+        try:
+            law = self._editor.law_after(self._begun_with, self._context)
+        except InputError as error:
+            self._say("law not changed", str(error))
+            return
+        if law is not None:
+            self._replace_law(law)
 
     def _move_target(self, command: Command) -> None:
         match command:

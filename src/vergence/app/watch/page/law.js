@@ -33,7 +33,7 @@ export class Law {
 
   /** @param {LawStatus} [law] */
   status(law) {
-    this.section.hidden = !law;
+    this.section.hidden = !law?.choices.length; // a task may go by no law
     if (!law) return;
     const text = JSON.stringify(law);
     if (text === this.text) return;
