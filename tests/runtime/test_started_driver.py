@@ -54,6 +54,26 @@ def test_a_robots_run_does_not_begin_with_joints_from_before_its_preparation(
     assert all(frame.time >= first.time for frame in first.frames)
 
 
+class SlowlyOpened(Robot):
+    """A robot whose cameras took long to open: its first joints are from before that."""
+
+    def read(self) -> Sample:
+        if self._time == 0.0 and self._exposed < 0.0:
+            self._begun -= 0.8
+            self._exposed = 0.8
+            return Sample(0.0, self._joints, (Frame("wrist", 0.8, self._image, {}),), {})
+        return super().read()
+
+
+def test_what_a_run_begins_with_is_not_newer_than_its_joints(simulated: SimulatedDriver) -> None:
+    started = StartedDriver(SlowlyOpened(simulated), ("wrist",))
+    simulated.close()
+    assert started.frames["wrist"].time <= 0.0
+    first = started.read()
+    assert first.time >= 0.8
+    assert all(frame.time <= first.time for frame in first.frames)
+
+
 class Simulator(Robot):
     """A user's own simulator, whose time passes in `step` only."""
 

@@ -10,6 +10,8 @@ from vergence.runtime import Driver, DriverWrapper
 from vergence.signals import Frame, JointState, Sample
 
 _TIMEOUT_S = 5.0  # for a first image
+_BEHIND_S = 10.0  # by which a driver may be behind, at most
+_LEVEL_STEPS = 3  # in a row that gain no time, after which it is not
 
 
 class StartedDriver(DriverWrapper):
@@ -44,7 +46,7 @@ class StartedDriver(DriverWrapper):
         super().__init__(driver)
         given = frames or {}
         first: dict[str, Frame] = dict(given)
-        sample = driver.read()
+        sample = self._now(driver.read())
         for _ in range(int(_TIMEOUT_S * driver.inner_rate_hz)):
             first |= {f.camera: f for f in sample.frames if f.camera not in given}
             if all(name in first for name in cameras):
@@ -55,7 +57,7 @@ class StartedDriver(DriverWrapper):
         self._sample = sample  # the newest
         self.start = self.joints
         self.frames = {name: _since(sample.time, frame) for name, frame in first.items()}
-        self._waited_until, self._read_at = sample.time, monotonic()
+        self._waited_until = sample.time
         self._begin: float | None = None
 
     def worker(self) -> Worker:
@@ -78,7 +80,9 @@ class StartedDriver(DriverWrapper):
 
     def read(self) -> Sample:
         """Return joints now and the images that arrived since the last call."""
-        sample = self.driver.read() if self._begin is not None else self._first()
+        sample = self.driver.read()
+        if self._begin is None:
+            sample = self._now(sample)
         self._sample = sample
         if self._begin is None:
             self._begin = sample.time
@@ -92,23 +96,25 @@ class StartedDriver(DriverWrapper):
         of_run = (frame for frame in sample.frames if not frame.time < self._begin)
         return replace(sample, frames=tuple(sorted(of_run, key=lambda frame: frame.time)))
 
-    def _first(self) -> Sample:
-        """Return a sample of now, with all images since the last one.
+    def _now(self, sample: Sample) -> Sample:
+        """Return a sample of now, with all images since a given one.
 
-        Joints are those of the last step, which is as old as it took to assemble the loop. A run
-        that began with them would miss that time, and its images, in its second tick.
+        Joints are those of the last step, which is as old as it took to open cameras or to assemble
+        the loop. A run that began with them would miss that time, and its images, in its second
+        tick. While steps catch up, the driver's time runs faster than this computer's.
         """
-        sample = self.driver.read()
         if self.sim_time:
             return sample
-        now = self._waited_until + monotonic() - self._read_at
-        period_s, frames = 1.0 / self.driver.inner_rate_hz, sample.frames
-        for _ in range(int((now - sample.time) / period_s)):
-            if sample.time > now - 2.0 * period_s:
-                break
+        rate_hz, frames, level = self.driver.inner_rate_hz, sample.frames, 0
+        for _ in range(int(_BEHIND_S * rate_hz)):
+            begun, before = monotonic(), sample.time
             self.driver.step({})
             sample = self.driver.read()
             frames += sample.frames
+            gained_s = sample.time - before - (monotonic() - begun)
+            level = level + 1 if gained_s < 0.5 / rate_hz else 0
+            if level == _LEVEL_STEPS:
+                break
         return replace(sample, frames=frames)
 
 
