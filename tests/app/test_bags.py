@@ -275,8 +275,8 @@ class TestRefused:
     ) -> None:
         for words in (("calibrate", tmp_path), ("watch", tmp_path)):
             assert command(*words, "--topic", "/a", monkeypatch=monkeypatch) == 2
-            assert "it with a ROS 2 bag" in capsys.readouterr().err
-        with pytest.raises(InputError, match="it with a ROS 2 bag"):
+            assert "only with a ROS 2 bag" in capsys.readouterr().err
+        with pytest.raises(InputError, match="only with a ROS 2 bag"):
             open_footage(tmp_path, topic="/a")
 
 

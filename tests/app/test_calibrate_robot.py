@@ -87,14 +87,20 @@ def test_the_mounting_comes_from_the_stops_of_a_robot_that_is_moved_by_hand(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--driver", "mine"), "--driver: given mine; allowed: it with --cell CELL"),
+        (("--driver", "mine"), "--driver: given mine; allowed: only together with --cell CELL"),
         (("--driver", "mine", "--cell", "ur5"), "--board"),
         (("--driver", "mine", "--cell", "ur5", "photos"), "given several of them"),
-        (("--move", "photos"), "--move: given True; allowed: it with --driver NAME --cell CELL"),
-        (("--yes", "photos"), "--yes: given True; allowed: it with --move"),
-        (("--write", "photos"), "it with --latency CELL or --mounting CELL"),
-        (("--mounting", "ur5"), "--mounting: given ur5; allowed: it with --driver NAME[:ADDRESS]"),
-        (("--mounting", "ur5", "--latency", "ur5"), "--mounting: given ur5; allowed: it without"),
+        (
+            ("--move", "photos"),
+            "--move: given True; allowed: only together with --driver NAME --cell CELL",
+        ),
+        (("--yes", "photos"), "--yes: given True; allowed: only together with --move"),
+        (("--write", "photos"), "only together with --latency CELL or --mounting CELL"),
+        (
+            ("--mounting", "ur5"),
+            "--mounting: given ur5; allowed: only together with --driver NAME[:ADDRESS]",
+        ),
+        (("--mounting", "ur5", "--latency", "ur5"), "--mounting: given ur5; allowed: only without"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(

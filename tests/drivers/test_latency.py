@@ -90,7 +90,9 @@ def test_the_command_says_what_to_set(
     assert "stamp_latency_s = { wrist = 0.0" in said
     assert latency(CalibrateOptions(latency="ur5", driver="socket:localhost:9", as_json=True)) == 0
     assert abs(json.loads(capsys.readouterr().out)["camera"]["seconds"] - 0.05) < 0.003
-    with pytest.raises(InputError, match="--latency: given ur5; allowed: it with --driver"):
+    with pytest.raises(
+        InputError, match="--latency: given ur5; allowed: only together with --driver"
+    ):
         latency(CalibrateOptions(latency="ur5"))
     with pytest.raises(InputError, match=r"(?s)given a cell that ships .*servo_lag_s = 0\."):
         latency(CalibrateOptions(latency="ur5", driver="socket:localhost:9", write=True))

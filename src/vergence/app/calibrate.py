@@ -108,7 +108,7 @@ def _require_one_source(options: "CalibrateOptions") -> None:
         allowed = "a folder of images, a ROS 2 bag, --synthetic CELL, or --driver NAME --cell CELL"
         raise InputError("vergence calibrate", "", given, allowed)
     if options.driver and not options.cell:
-        allowed = "it with --cell CELL, or with --latency CELL or --mounting CELL"
+        allowed = "only together with --cell CELL, or with --latency CELL or --mounting CELL"
         raise InputError("vergence calibrate", "--driver", options.driver, allowed)
     bag = options.images is not None and is_bag(options.images)
     for key, given_too, fits in (
@@ -117,15 +117,15 @@ def _require_one_source(options: "CalibrateOptions") -> None:
         ("--cell", options.cell, bag or options.driver is not None),
     ):
         if given_too and not fits:
-            raise InputError("vergence calibrate", key, given_too, "it with a ROS 2 bag")
+            raise InputError("vergence calibrate", key, given_too, "only with a ROS 2 bag")
     if options.joints and not options.cell:
         allowed = "--cell too: the cell whose arm has these joints"
         raise InputError("vergence calibrate", "--joints", options.joints, allowed)
     if options.move and options.driver is None:
-        allowed = "it with --driver NAME --cell CELL"
+        allowed = "only together with --driver NAME --cell CELL"
         raise InputError("vergence calibrate", "--move", True, allowed)
     if options.yes and not options.move:
-        raise InputError("vergence calibrate", "--yes", True, "it with --move")
+        raise InputError("vergence calibrate", "--yes", True, "only together with --move")
     if options.projected and options.synthetic is None:
         raise InputError("vergence calibrate", "--projected", True, "with --synthetic CELL")
     if options.watch and options.synthetic is None and options.driver is None:

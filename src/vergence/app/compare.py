@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from vergence.experiments import CellSource, Comparison, Score
 
 _REMARK = (
-    "Every law has the same random {drawn}, with the target in view at first, and aims at the same "
-    "view of it; on exact projections, under the cell's rate and acceleration limits; {motion}."
+    "All laws have the same random {drawn}, with the target in view at the start, and the same "
+    "goal. Features are exact projections; the cell's rate and acceleration limits apply; {motion}."
 )
 
 
@@ -95,9 +95,9 @@ def _write_page(
             "Where each fails" if failing else "Starts",
             markup.figure(
                 starts_figure(found.runs, (middle[0], middle[1]), size),
-                "Each mark is a start, its colour how the run from there ended; the line leads to "
+                "Each mark is a start; its colour shows how the run ended, and the line leads to "
                 "where it ended. Left: camera position from above; right: centre of the features "
-                "in the image, with a cross where it should be.",
+                "in the image, with a cross at its goal.",
             ),
         ),
         markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),

@@ -30,7 +30,7 @@ def goal(options: "GoalOptions") -> int:
         raise InputError("--out", "", options.out, "a file name that ends in .png or .jpg")
     cell = load_cell(options.cell, overrides(options.settings))
     if options.driver is not None and options.at is not None:
-        raise InputError("--at", "", options.at, "nothing with --driver: move the robot there")
+        raise InputError("--at", "", options.at, "only without --driver: move the robot there")
     driver = open_driver(cell, options.driver) if options.driver else SimulatedDriver(cell)
     try:
         frame = _frame(cell, driver, options.at)

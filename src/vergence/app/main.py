@@ -42,18 +42,18 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 
-_NEXT = """vergence servoes robot arms by what their cameras see.
+_NEXT = """vergence controls robot arms with their cameras.
 
-  vergence run puma560                    an arm follows a moving board; ends with a report to open
-  vergence watch puma560                  the same in your browser, as it happens
+  vergence run puma560                    an arm follows a moving board; writes a report
+  vergence watch puma560                  the same, live in your browser
   vergence run puma560 --no-images        without images, much faster
-  vergence cells                          the built-in cells, and what each shows
-  vergence new ARM.urdf --body LAST_LINK  a first cell for an arm of yours
+  vergence cells                          list the built-in cells
+  vergence new ARM.urdf --body LAST_LINK  write a first cell for your own arm
   vergence compare panda                  several laws from the same random starts
   vergence reproduce nelson1995 --quick   a paper's experiments, checked
 
   vergence --help                         all commands; each has --help with an example
-  vergence --install-completion           names at the press of Tab
+  vergence --install-completion           complete names with Tab
 """
 
 
@@ -88,13 +88,13 @@ def start(
     if context.invoked_subcommand is None:
         say(_NEXT.rstrip())
     elif reason := use_prebuilt_kernels():
-        warn(f"vergence: {reason}. What runs for the first time is compiled: a minute or two.")
+        warn(f"vergence: {reason}. They are compiled on first use, which takes a minute or two.")
 
 
 @app.command(epilog="Example: vergence run puma560 --seed 4 --set duration_s=10")
 @takes(RunOptions)
 def run(options: RunOptions) -> int:
-    """Run a work cell: progress, a summary, and a folder with recording and report."""
+    """Run a work cell: print a summary, and write a folder with a recording and a report."""
     from vergence.app.run import run as command
 
     return command(options)
@@ -107,7 +107,7 @@ def report(
     run: Annotated[
         Path,
         typer.Argument(
-            help="A run folder, or a recording; a run that was cut off will do.",
+            help="A run folder or a recording; it may be incomplete.",
             autocompletion=names.recordings,
         ),
     ],
@@ -123,7 +123,7 @@ def report(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make the report of a recording again, or one page of two recordings side by side."""
+    """Write the report of a recording again, or a page that compares two recordings."""
     find_recording(run)
     if other is None:
         from vergence.app.report import page_at, write_report
@@ -146,7 +146,7 @@ def export(
         typer.Argument(help="A run folder, or its recording.", autocompletion=names.recordings),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="The bag's folder, instead of bag beside the recording.")
+        Path | None, typer.Option(help="Folder of the bag. Default: bag, beside the recording.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -188,7 +188,7 @@ def reproduce(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Repeat a paper's experiments: figures, and a table of what it says and what we measure."""
+    """Repeat a paper's experiments, with figures and a table of its claims and our results."""
     from vergence.app.reproduce import reproduce as command
 
     raise typer.Exit(command(paper, quick, seed, out, as_json))
@@ -199,7 +199,7 @@ def reproduce(
 )
 @takes(TrackOptions)
 def track(options: TrackOptions) -> int:
-    """Follow a known object through footage: poses, covariances, an overlay film."""
+    """Track a known object in recorded images: poses, covariances, an overlay film."""
     from vergence.app.track import track as command
 
     return command(options)
@@ -208,7 +208,7 @@ def track(options: TrackOptions) -> int:
 @app.command(epilog="Example: vergence new my_robot.urdf --body tool0")
 @takes(NewOptions)
 def new(options: NewOptions) -> int:
-    """Write a first cell for an arm of yours: start, camera and target are found."""
+    """Write a first cell for your own arm, with a suitable start, camera and target."""
     from vergence.app.new import new as command
 
     return command(options)
@@ -217,7 +217,7 @@ def new(options: NewOptions) -> int:
 @app.command(epilog="Example: vergence watch puma560    or vergence watch runs/NAME-TIME")
 @takes(WatchOptions)
 def watch(options: WatchOptions) -> int:
-    """Watch a cell run, or a recording, in the browser: turn its knobs, drag its target."""
+    """Show a running cell or a recording in the browser: change settings, drag the target."""
     from vergence.app.watch import watch as command
 
     return command(options)
@@ -226,7 +226,7 @@ def watch(options: WatchOptions) -> int:
 @app.command(epilog="Example: vergence compare panda --laws image_based,constrained --starts 40")
 @takes(CompareOptions)
 def compare(options: CompareOptions) -> int:
-    """Run several laws from the same random draws: one table, and where each fails."""
+    """Run several laws from the same random starts, and show where each of them fails."""
     find_cell(options.cell)  # a mistake is told before all is loaded
     from vergence.app.compare import compare as command
 
@@ -236,7 +236,7 @@ def compare(options: CompareOptions) -> int:
 @app.command(name="map", epilog="Example: vergence map puma560 --over headings --speeds 0.1,0.2")
 @takes(MapOptions)
 def map_region(options: MapOptions) -> int:
-    """Map where a cell's law works: how far it follows the target, and what ends it."""
+    """Map where a cell's law works: how far it follows the target, and how it fails."""
     find_cell(options.cell)  # a mistake is told before all is loaded
     from vergence.app.map_region import map_region as command
 
@@ -248,15 +248,15 @@ def map_region(options: MapOptions) -> int:
 )
 @takes(CalibrateOptions)
 def calibrate(options: CalibrateOptions) -> int:
-    """Find a camera's lens, and where it is mounted, from images of a board.
+    """Estimate a camera's lens and mounting from images of a board.
 
-    Images alone give the lens. With the arm's pose at each image, lens and mounting are
-    refined together. With --driver and --cell they come from a robot that you move from stop to
-    stop. With --latency an arm swings one joint by 2°, and the delay of the camera's
-    images comes from their motion. With --mounting the robot says where its cameras are.
+    Images alone determine the lens. With the arm's pose for each image, lens and mounting are
+    refined together. With --driver and --cell, images and poses are taken from a robot that you
+    move from stop to stop. With --latency, an arm swings one joint by 2° and the delay of the
+    camera's images is measured. With --mounting, the robot reports where its cameras are.
     """
     if options.mounting is not None and options.latency is not None:
-        raise InputError("calibrate", "--mounting", options.mounting, "it without --latency")
+        raise InputError("calibrate", "--mounting", options.mounting, "only without --latency")
     if options.latency is not None:
         from vergence.app.latency import latency as measure
 
@@ -266,10 +266,10 @@ def calibrate(options: CalibrateOptions) -> int:
 
         return mounting(options)
     if options.write:
-        allowed = "it with --latency CELL or --mounting CELL"
+        allowed = "only together with --latency CELL or --mounting CELL"
         raise InputError("calibrate", "--write", True, allowed)
     if options.settings and not options.driver:
-        raise InputError("calibrate", "--set", options.settings, "it with --driver NAME")
+        raise InputError("calibrate", "--set", options.settings, "only together with --driver NAME")
     from vergence.app.calibrate import calibrate as command
 
     return command(options)
@@ -278,9 +278,9 @@ def calibrate(options: CalibrateOptions) -> int:
 @app.command(epilog="Example: vergence check my_cell.toml --driver ur:192.168.1.10")
 @takes(CheckOptions)
 def check(options: CheckOptions) -> int:
-    """Bring up a robot: check clocks, joints and images, then move each joint slowly to and fro.
+    """Check a real robot before its first run: clocks and images, then a move of each joint.
 
-    The arm moves at a tenth of its limits. No joint moves before everything at rest holds.
+    The arm moves at a tenth of its limits, and only after all checks at rest have passed.
     """
     from vergence.app.bring_up import check as command
 
@@ -290,7 +290,7 @@ def check(options: CheckOptions) -> int:
 @app.command(epilog="Example: vergence goal ur5 --at 0,-100,100,-90,-90,30 --out goal.png")
 @takes(GoalOptions)
 def goal(options: GoalOptions) -> int:
-    """Take a photograph to go back to: the image, its camera file and the joints beside it."""
+    """Take a photograph as a goal: an image, with its camera file and the joints beside it."""
     from vergence.app.goal import goal as command
 
     return command(options)
@@ -308,11 +308,11 @@ def bench(
     ] = None,
     compare_with: Annotated[
         Path | None,
-        typer.Option("--compare", metavar="FILE", help="Put an earlier run's --json beside it."),
+        typer.Option("--compare", metavar="FILE", help="Earlier output of --json to compare with."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run the benchmarks, peers beside us."""
+    """Run the benchmarks, together with those of other libraries."""
     from vergence.app.bench import bench as command
 
     raise typer.Exit(command(chosen or (), as_json, compare_with))
@@ -320,7 +320,7 @@ def bench(
 
 @app.command(epilog="Example: vergence cells")
 def cells(as_json: Json = False) -> None:
-    """List the built-in cells, each with what it shows."""
+    """List the built-in cells with a description of each."""
     described = {name: cell_description(name) for name in names.cells()}
     if as_json:
         emit({"command": "cells", "cells": names.cells(), "descriptions": described})

@@ -140,8 +140,8 @@ def _image(
 
     if region.over == "headings":
         caption = (
-            "How far the target came in each direction, in m, before what the colour says, for "
-            "each speed."
+            "Distance in m that the target moved in each direction, for each speed; the colour "
+            "shows how the run ended."
         )
         return headings_figure(results), caption, "{law}, {heading_deg:g}° at {speed_m_s:g} m/s"
     bases = {
@@ -152,7 +152,7 @@ def _image(
         for name, arm in cell.arms.items()
     }
     caption = (
-        f"The target goes from the cross to each place at {region.speeds_m_s[0]:g} m/s. A full "
-        "square: it arrived; a smaller one: the share of the way it had made when the run ended."
+        f"The target moves from the cross to each place at {region.speeds_m_s[0]:g} m/s. A full "
+        "square: it arrived; a smaller one: the part of the path covered when the run ended."
     )
     return places_figure(results, bases), caption, "{law}, to ({x_m:.2f}, {y_m:.2f}) m"

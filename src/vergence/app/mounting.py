@@ -24,7 +24,9 @@ def mounting(options: "CalibrateOptions") -> int:
 
     name, driver = str(options.mounting), options.driver
     if driver is None:
-        raise InputError("calibrate", "--mounting", name, "it with --driver NAME[:ADDRESS]")
+        raise InputError(
+            "calibrate", "--mounting", name, "only together with --driver NAME[:ADDRESS]"
+        )
     cell = load_cell(name, overrides(options.settings))
     check_driver(cell, driver)
     opened = open_driver(cell, driver, mounted_as_told=False)

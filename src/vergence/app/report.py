@@ -126,7 +126,9 @@ def _summary(run: Run) -> str:
         tables.append(markup.table(f"Camera {name}", camera_rows(camera)))
     for name, arm in run.arms.items():
         tables.append(markup.table(f"Arm {name}", arm_rows(run.info.arms[name], arm)))
-        tables.append(markup.table(f"What shaped the motion of {name}", constraint_rows(arm)))
+        tables.append(
+            markup.table(f"Limits that shaped the motion of {name}", constraint_rows(arm))
+        )
     return markup.section("Summary", markup.cards(tables))
 
 
@@ -150,7 +152,7 @@ def _camera(run: Run, name: str) -> str:
             pose_error_chart(trace),
             "True distance of the target from its desired pose in this camera.",
         ),
-        _chart(run, camera_chart(trace), "How the camera moved since the first image."),
+        _chart(run, camera_chart(trace), "Motion of the camera since the first image."),
     )
 
 
@@ -184,11 +186,11 @@ def _target(run: Run) -> str:
     moved = target_chart(trace, run.target)
     return markup.section(
         "Target",
-        _chart(run, moved, "How the target moved since the first image."),
+        _chart(run, moved, "Motion of the target since the first image."),
         _chart(
             run,
             estimate_chart(trace, run.target),
-            "How far the filter's target is from the true one.",
+            "Error of the target's pose, as estimated by the filter.",
         ),
     )
 
@@ -210,7 +212,7 @@ def _arm(run: Run, name: str) -> str:
         _chart(
             run,
             twist_chart(trace),
-            f"Twist of {camera} that the law asked for; z is the optical axis.",
+            f"Twist of {camera} commanded by the law; z is the optical axis.",
         ),
         _chart(
             run,
@@ -220,13 +222,12 @@ def _arm(run: Run, name: str) -> str:
         _chart(
             run,
             clearance_chart(trace),
-            "Least distance of the arm from what it must not touch; nothing is drawn where nothing "
-            "is near.",
+            "Smallest distance between the arm and itself or obstacles; gaps: nothing is near.",
         ),
         _chart(
             run,
             measures_chart(trace),
-            "How far the arm is from singularities and joint limits, [Nelson1995] eqs. (26), (27).",
+            "Distance from singularities and joint limits, [Nelson1995] eqs. (26), (27).",
         ),
     )
 
@@ -256,7 +257,11 @@ def _footer(run: Run, signals: str) -> str:
     numbers = f"The numbers of every tick are in {escape(signals)} beside this page."
     if not isinstance(run, Recording):
         return f"<footer>{numbers} Made by vergence {escape(version('vergence'))}.</footer>"
-    cut = "" if run.complete else "The recording was cut off; this is what had been written. "
+    cut = (
+        ""
+        if run.complete
+        else "The recording is incomplete; this page shows what had been written. "
+    )
     if run.skipped:
         messages = "message" if run.skipped == 1 else "messages"
         cut += f"{run.skipped} {messages} could not be read. "

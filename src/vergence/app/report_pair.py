@@ -145,13 +145,13 @@ def _camera(runs: Runs, name: str) -> str:
         for label, run in runs.items()
     ]
     traces = {label: run.cameras[name] for label, run in runs.items()}
-    chart = markup.chart(errors_chart(traces), "How well the points were followed.")
+    chart = markup.chart(errors_chart(traces), "Feature error over time.")
     return markup.section(f"Camera {name}", markup.beside(*films), chart)
 
 
 def _arm(runs: Runs, name: str) -> str:
     arms = {label: (run.info.arms[name], run.arms[name]) for label, run in runs.items()}
-    caption = "How near the arm came to its limits and to singularities."
+    caption = "Distance of the arm from its limits and from singularities."
     return markup.section(f"Arm {name}", markup.chart(arms_chart(arms), caption))
 
 

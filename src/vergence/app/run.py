@@ -40,7 +40,7 @@ def _loaded(options: "RunOptions") -> "Cell":
 
     cell = load_cell(options.cell, overrides(options.settings), options.seed)
     if options.goal is not None and options.points is not None:
-        allowed = "nothing with --goal: one task at a time"
+        allowed = "only without --goal: one task at a time"
         raise InputError("--points", "", options.points, allowed)
     if options.goal is not None:
         from vergence.assembly import with_goal

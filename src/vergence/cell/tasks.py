@@ -71,7 +71,7 @@ def check_sequence(cell: "Cell") -> None:
         raise InputError(str(cell.path), key, given, allowed)
 
     if not cell.tasks and cell.task.law is not None:
-        refuse("task.law", cell.task.law, "nothing: the law of a single task is [law]")
+        refuse("task.law", cell.task.law, "only in [[tasks]]: the law of a single [task] is [law]")
     first, last = cell.task, len(cell.tasks) - 1
     for number, task in enumerate(cell.tasks):
         at = f"tasks.{number}"

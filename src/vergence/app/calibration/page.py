@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from vergence.app.calibrate import Calibration
 
 _ASSUMES = (
-    "Deviations follow from the normal equations. They assume that errors of corners are "
-    "independent and as large as the residuals, that the board is flat, and as large as said "
-    "within the deviation of its size, and that the lens follows the model; where arm poses are "
-    "used, also that their errors are independent from image to image. “Leaving out” is the "
-    "deviation seen when each image in turn is left out; where it is much larger, an assumption "
-    "does not hold."
+    "Deviations are standard deviations from the normal equations. They assume that the errors of "
+    "corners are independent and as large as the residuals, that the board is flat and has the "
+    "given size within its deviation, and that the lens follows the model; if arm poses are used, "
+    "also that their errors are independent between images. “Leaving out” is the deviation "
+    "estimated by leaving out each image in turn; if it is much larger, an assumption does not "
+    "hold."
 )
 
 
@@ -81,8 +81,15 @@ def _numbers(found: "Calibration") -> list[str]:
     covered = coverage(lens.sightings, found.data.width, found.data.height)
     rows = [
         Row("images", str(len(lens.sightings)), "", "with the board, kept"),
-        Row("residual", f"{lens.rms_px:.3f}", "px", "root mean square, each image's pose free"),
-        Row("left out", f"{lens.left_out_px.mean():.3f}", "px", "an image under the others' lens"),
+        Row(
+            "residual", f"{lens.rms_px:.3f}", "px", "root mean square, image poses estimated freely"
+        ),
+        Row(
+            "left out",
+            f"{lens.left_out_px.mean():.3f}",
+            "px",
+            "an image, with the lens of all others",
+        ),
         Row("coverage", f"{100 * covered:.0f}", "%", "of 8 × 6 fields with a corner"),
     ]
     cards = [markup.table("Lens", rows)]

@@ -55,7 +55,7 @@ def estimate_chart(trace: CameraTrace, estimate: TargetTrace | None) -> Chart | 
                 f"estimated target from the true one: {title}",
                 (
                     Curve("error", estimate.time, error),
-                    Curve("1 σ, as the filter believes", estimate.time, spread, 1, "dashed"),
+                    Curve("1 σ, as stated by the filter", estimate.time, spread, 1, "dashed"),
                 ),
                 low=0.0,
             )

@@ -17,14 +17,14 @@ class CalibrateOptions:
     images: Annotated[
         Path | None,
         typer.Argument(
-            help="A folder of images, or a ROS 2 bag; board.toml and poses.csv may lie in it."
+            help="A folder of images, which may contain board.toml and poses.csv, or a ROS 2 bag."
         ),
     ] = None
     board: Annotated[
         str | None,
         typer.Option(
             metavar="CxR",
-            help="Size of the board: inner corners (or circles) per row x rows, as 11x8.",
+            help="Size of the board, such as 11x8: inner corners (or circles) per row x rows.",
         ),
     ] = None
     square_mm: Annotated[
@@ -40,7 +40,7 @@ class CalibrateOptions:
     pattern: Annotated[
         str | None,
         typer.Option(
-            help="Pattern: squares (the default), circles, or asymmetric_circles (as 4x11)."
+            help="Pattern: squares (the default), circles, or asymmetric_circles (such as 4x11)."
         ),
     ] = None
     square_deviation: Annotated[
@@ -48,7 +48,7 @@ class CalibrateOptions:
         typer.Option(
             "--square-deviation",
             metavar="PERCENT",
-            help="Standard deviation of the side of a square, in percent: how well it was "
+            help="Standard deviation of the size of a square, in percent: how accurately it was "
             "measured.",
         ),
     ] = 0.5
@@ -66,7 +66,7 @@ class CalibrateOptions:
         str | None,
         typer.Option(
             metavar="CELL",
-            help="Cell of the arm, for a bag or --driver; its poses are those of its stops.",
+            help="Cell of the arm, for a bag or --driver; poses are taken where the arm stops.",
             autocompletion=names.cells,
         ),
     ] = None
@@ -97,7 +97,9 @@ class CalibrateOptions:
             metavar="CELL", help="Render the images in this cell.", autocompletion=names.cells
         ),
     ] = None
-    watch: Annotated[str | None, typer.Option(help="Camera of the cell that takes them.")] = None
+    watch: Annotated[str | None, typer.Option(help="Camera of the cell that takes the images.")] = (
+        None
+    )
     chessboard: Annotated[
         bool, typer.Option("--chessboard", help="Make a chessboard instead of ChArUco.")
     ] = False
@@ -117,7 +119,7 @@ class CalibrateOptions:
         str | None,
         typer.Option(
             metavar="CELL",
-            help="Measure how late the cell's images and servo are; needs --driver.",
+            help="Measure the delays of the cell's images and servo; needs --driver.",
             autocompletion=names.cells,
         ),
     ] = None
@@ -134,7 +136,7 @@ class CalibrateOptions:
         bool,
         typer.Option("--move", help="Drive the arm to poses that show the board; asks first."),
     ] = False
-    yes: Annotated[bool, typer.Option("--yes", help="Let --move move the arm without asking.")] = (
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before --move moves the arm.")] = (
         False
     )
     write: Annotated[

@@ -19,9 +19,7 @@ class CampaignOptions:
     cell: CellName
     tolerance_px: Annotated[
         float,
-        typer.Option(
-            min=0.0, help="A run has converged if every feature ends within so many pixels."
-        ),
+        typer.Option(min=0.0, help="Largest final feature error of a converged run, in pixels."),
     ] = 2.0
     workers: Annotated[
         int | None,
@@ -35,7 +33,7 @@ class CampaignOptions:
     ] = None
     physics: Annotated[
         bool,
-        typer.Option("--physics", help="Simulate physics too: slower, with servos that lag."),
+        typer.Option("--physics", help="Also simulate physics, with servo lag (slower)."),
     ] = False
     out: Annotated[
         Path | None,
@@ -64,7 +62,7 @@ class CompareOptions(CampaignOptions):
     vary: Annotated[
         str,
         typer.Option(
-            help="What is drawn at random: starts, targets, motions, separated by commas."
+            help="Quantities to draw at random, separated by commas: starts, targets, motions."
         ),
     ] = "starts"
     seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0
@@ -73,12 +71,12 @@ class CompareOptions(CampaignOptions):
         typer.Option(
             min=0.0,
             max=1.0,
-            help="Spread of the draws: of starts, as a share of a joint's range; of targets, as a "
-            "share of their distance.",
+            help="Spread of the draws: for starts, as a fraction of each joint's range; for "
+            "targets, as a fraction of their distance.",
         ),
     ] = 0.2
     speed: Annotated[
-        float, typer.Option(min=0.0, help="Speed of the fastest motion that is drawn, in m/s.")
+        float, typer.Option(min=0.0, help="Highest speed of the random motions, in m/s.")
     ] = 0.1
 
 
@@ -89,7 +87,7 @@ class MapOptions(CampaignOptions):
     over: Annotated[
         str,
         typer.Option(
-            help="What is varied: places (the target goes to points of a square) or headings.",
+            help="What to vary: places (the target moves to points of a square) or headings.",
             autocompletion=names.over,
         ),
     ] = "places"
@@ -98,7 +96,7 @@ class MapOptions(CampaignOptions):
         typer.Option(min=0.0, help="Half the side of the square, or the length of the path, in m."),
     ] = 0.5
     steps: Annotated[
-        int, typer.Option(min=2, help="Number of points along a side, or of directions.")
+        int, typer.Option(min=2, help="Number of points along a side, or number of directions.")
     ] = 11
     speeds: Annotated[
         str,

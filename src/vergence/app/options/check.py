@@ -23,10 +23,13 @@ class CheckOptions:
         ),
     ]
     nudge_deg: Annotated[
-        float, typer.Option(min=0.1, max=20, help="Angle that each joint is turned by.")
+        float, typer.Option(min=0.1, max=20, help="Angle by which to turn each joint, in degrees.")
     ] = 2.0
     nudge_mm: Annotated[
-        float, typer.Option(min=0.1, max=100, help="Distance that each sliding joint is moved by.")
+        float,
+        typer.Option(
+            min=0.1, max=100, help="Distance by which to move each prismatic joint, in mm."
+        ),
     ] = 5.0
     out: Out = None
     settings: Settings = None

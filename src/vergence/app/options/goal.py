@@ -14,19 +14,19 @@ class GoalOptions:
     """Where a photograph is taken, and what is kept with it."""
 
     cell: CellName
-    out: Annotated[Path, typer.Option(help="File of the photograph: .png or .jpg.")] = Path(
-        "goal.png"
-    )
+    out: Annotated[Path, typer.Option(help="Image file to write: .png or .jpg.")] = Path("goal.png")
     at: Annotated[
         str | None,
         typer.Option(
             metavar="DEG,DEG,…",
-            help="Joint positions to take it from, in simulation. Default: the start.",
+            help="Joint positions to photograph from, in simulation. Default: the start.",
         ),
     ] = None
     distance_m: Annotated[
         float | None,
-        typer.Option(help="Distance from camera to object, if you know it roughly.", min=1e-6),
+        typer.Option(
+            help="Approximate distance from camera to object, in metres, if known.", min=1e-6
+        ),
     ] = None
     settings: Settings = None
     driver: Driver = None

@@ -16,7 +16,7 @@ class PlanOptions:
     cell: Annotated[
         str,
         typer.Argument(
-            help="Name of a built-in cell, a cell file or folder, whose task is to reach.",
+            help="Name of a built-in cell, a cell file or folder, with a task of kind reach.",
             autocompletion=names.cells,
         ),
     ]

@@ -28,7 +28,7 @@ class RunOptions:
         Path | None,
         typer.Option(
             metavar="PHOTO",
-            help="Go to where this photograph was taken, by images alone; see `vergence goal`.",
+            help="Move to where this photograph was taken, using images only; see `vergence goal`.",
         ),
     ] = None
     points: Annotated[

@@ -24,7 +24,7 @@ class TrackOptions:
     ]
     camera: Annotated[
         Path | None,
-        typer.Option(help="Camera file with the intrinsics: TOML, JSON or YAML, also ROS's."),
+        typer.Option(help="Camera file with the intrinsics: TOML, JSON or YAML, including ROS's."),
     ] = None
     fx: Annotated[float | None, typer.Option("--fx", help="Focal length along u, in pixels.")] = (
         None
@@ -55,7 +55,7 @@ class TrackOptions:
         float, typer.Option(help="Unpredicted motion to allow for, in pixels per image.")
     ] = 3.0
     share: Annotated[
-        float, typer.Option(help="Share of the edges that has to be found for an image to count.")
+        float, typer.Option(help="Fraction of the edges that must be found for an image to count.")
     ] = 0.5
     overlay: Annotated[
         bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")

@@ -42,14 +42,12 @@ class WatchOptions:
     driver: Driver = None
     host: Annotated[
         str,
-        typer.Option(
-            help="Address to listen on. The default can be reached from this machine only."
-        ),
+        typer.Option(help="Address to listen on. The default is reachable from this machine only."),
     ] = "127.0.0.1"
     port: Annotated[
         int | None,
         typer.Option(
-            min=0, max=65535, help="Port to listen on. Default: 8230, or the next one that is free."
+            min=0, max=65535, help="Port to listen on. Default: 8230, or the next free one."
         ),
     ] = None
     browser: Annotated[

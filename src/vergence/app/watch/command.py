@@ -34,7 +34,7 @@ def watch(options: "WatchOptions") -> int:
 
     bag = is_bag(options.source)
     if options.topic is not None and not bag:
-        raise InputError("watch", "--topic", options.topic, "it with a ROS 2 bag")
+        raise InputError("watch", "--topic", options.topic, "only with a ROS 2 bag")
     recording = Path(options.source) if bag else _recording_in(Path(options.source))
     answer = _watch_cell(options) if recording is None else _watch_recording(options, recording)
     if options.as_json:
@@ -57,7 +57,7 @@ def _watch_recording(options: "WatchOptions", path: Path) -> Mapping[str, object
         ("--driver", options.driver),
     ):
         if given is not None:
-            raise InputError("watch", option, given, "nothing: a recording is only shown")
+            raise InputError("watch", option, given, "only with a cell: a recording is only shown")
     from vergence.app.progress import working
     from vergence.app.watch.replay import Replay
     from vergence.app.watch.server import Server, listen

@@ -235,7 +235,9 @@ class Live:
                 self._forget_points()
                 self._stop()
             case Stop():
-                raise InputError("message", "do", command.do, "it with --driver; pause instead")
+                raise InputError(
+                    "message", "do", command.do, "only together with --driver; pause instead"
+                )
             case TrackPoints():
                 self._track(command)
             case TakeGoal():
