@@ -284,6 +284,20 @@ def test_a_robot_that_is_gone_or_sets_its_clock_is_told_by_name(words: str, said
         driver.close()
 
 
+def test_a_robot_is_started_by_its_service_and_stopped_once_it_is_braked() -> None:
+    with robot(running=False, triggers={"play": True, "halt": True, "stuck": False}) as made:
+        services = {name: f"{made.space}/{name}" for name in ("play", "halt", "stuck")}
+        driver = made.open(start=services["play"], stop=services["halt"])
+        assert made.tell()["called"] == ["play at rest"]
+        Motion(driver).go(0.3, 0.5)
+        driver.close()
+        assert made.tell()["called"] == ["play at rest", "halt at rest"]
+        with pytest.raises(DriverSilent, match=r"service .*/stuck refused: no program"):
+            made.open(start=services["stuck"])
+        with pytest.raises(DriverSilent, match="the service /nothing is not there"):
+            made.open(start="/nothing", connect_s=4.0)
+
+
 def test_outputs_are_topics_that_are_told_in_their_own_type() -> None:
     kinds = {"lamp": "Bool", "vice": "Float64", "gripper": "Float64MultiArray"}
     with robot(outputs=kinds) as made:

@@ -102,6 +102,8 @@ def test_joints_follow_their_set_points(robot: Robot, command: str) -> None:
         ("mode 5", "mode idle, not running: switch it on and release its brakes"),
         ("protective", "reports protective stop: clear it on the teach pendant"),
         ("emergency", "reports robot emergency stop"),
+        ("version 5.9", "runs PolyScope 5.9, and ur_rtde needs 5.10 or newer: update it"),
+        ("version 3.14", "runs PolyScope 3.14, and ur_rtde needs 3.15 or newer"),
     ],
 )
 def test_a_robot_that_would_not_move_is_refused_with_what_to_do(

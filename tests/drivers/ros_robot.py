@@ -19,7 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 TYPES = {
@@ -122,6 +122,9 @@ class Robot:
             node.create_subscription(kinds[kind], f"{space}/{name}", self.output(name), 10)
         for name, well in settings.get("services", {}).items():  # and whether each does as told
             node.create_service(SetBool, f"{space}/{name}", self.service(name, well))
+        for name, well in settings.get("triggers", {}).items():
+            node.create_service(Trigger, f"{space}/{name}", self.triggered(name, well))
+        self.called: list[str] = []  # of these services
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(node)
         threading.Thread(target=self.executor.spin, daemon=True).start()
@@ -157,6 +160,19 @@ class Robot:
         def answer(request: Any, response: Any) -> Any:
             self.outputs[name] = request.data
             response.success, response.message = well, "" if well else "no pressure"
+            return response
+
+        return answer
+
+    def triggered(self, name: str, well: bool) -> Callable[[Any, Any], Any]:
+        def answer(_: Any, response: Any) -> Any:
+            with self.lock:
+                self.called.append(
+                    f"{name} {'at rest' if not any(self.controller.qd) else 'moving'}"
+                )
+            if well:
+                self.running.publish(Bool(data=name == "play"))
+            response.success, response.message = well, "" if well else "no program"
             return response
 
         return answer
@@ -197,7 +213,7 @@ class Robot:
                 c = self.controller
                 told = {"q": c.q, "qd": c.qd, "hardest": c.hardest, "count": c.count}
                 told |= {"twist": c.twist, "frame": c.frame, "wrong": c.wrong}
-                told |= {"outputs": self.outputs}
+                told |= {"outputs": self.outputs, "called": self.called}
                 c.hardest = 0.0
             say(json.dumps(told))
             return

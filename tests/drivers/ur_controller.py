@@ -66,6 +66,7 @@ class Controller:
     def __init__(self, start: list[float]) -> None:
         self.q, self.qd, self.time = list(start), [0.0] * JOINTS, 0.0
         self.mode, self.safety, self.remote, self.slider = 7, 1, True, 1.0
+        self.version = "5.15"
         self.teach = self.frozen = self.running = False
         self.target: list[float] | None = None  # of `servoj`
         self.speed: list[float] | None = None  # of `speedj`
@@ -156,6 +157,8 @@ class Controller:
                 self.safety = 1
             elif name == "mode":
                 self.mode = int(value)
+            elif name == "version":
+                self.version = value
             elif name == "remote":
                 self.remote = value == "on"
             elif name == "slider":
@@ -182,7 +185,7 @@ def dashboard(robot: Controller, client: socket.socket) -> None:
             "get serial number": "20235500001",
             "get robot model": "UR5",
             "programstate": "STOPPED",
-            "polyscopeversion": "URSoftware 5.15.0.126798 (Jan 01 2024)",
+            "polyscopeversion": f"URSoftware {robot.version}.0.126798 (Jan 01 2024)",
             "robotmode": f"Robotmode: {modes[robot.mode]}",
             "safetystatus": f"Safetystatus: {safety[robot.safety]}",
             "is in remote control": str(robot.remote).lower(),

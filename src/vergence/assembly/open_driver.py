@@ -11,6 +11,7 @@ from vergence.drivers import CameraSource, Equipment
 from vergence.drivers.mountings import mountings_of
 from vergence.errors import InputError, VergenceError
 from vergence.loading import Place, load_part, make_part
+from vergence.optional_package import optional_package
 from vergence.registry import find, kinds
 from vergence.runtime import Driver
 from vergence.runtime.hardware import LateStamps
@@ -54,6 +55,8 @@ def check_driver(cell: Cell, named: str) -> None:
     kind, address = split_name(named)
     cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
     settings, place = _settings(cell, kind)
+    if package := getattr(cls, "package", None):
+        optional_package(kind, *package)
     if hasattr(cls, "open"):
         _made(cls, kind, settings | ({"address": address} if address else {}), place)
     _sources(cell)

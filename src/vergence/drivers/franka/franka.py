@@ -1,5 +1,7 @@
 """The settings of a robot of Franka."""
 
+from typing import ClassVar
+
 from vergence.drivers.arm_driver import ArmDriver
 from vergence.drivers.equipment import Equipment
 from vergence.drivers.franka.connection import connect, connect_hand
@@ -14,6 +16,8 @@ _JOINTS = 7
 @part("driver", "franka")
 class Franka:
     """A Panda or FR3 through its real-time interface (FCI): joint velocities, limited in jerk."""
+
+    package: ClassVar[tuple[str, str]] = "franky", "franka"  # a module, and the extra that has it
 
     address: str  # of the robot, such as 172.16.0.2
     rate_hz: float = knob(500.0, "Hz", least=50.0, upto=1000.0)  # of set-points
@@ -37,7 +41,7 @@ class Franka:
         """Connect to the robot; nothing moves before the first set-point."""
         name = equipment.only_arm("franka", _JOINTS)
         equipment.check_sources("franka")
-        franky = optional_package("franka", "franky", "franka")
+        franky = optional_package("franka", *self.package)
         robot = connect(franky, self.address, self.realtime, self.connect_s)
         hand = connect_hand(franky, self.address, self.connect_s) if self.gripper else None
         link = FrankaLink(franky, robot, self, equipment.arms[name], hand)

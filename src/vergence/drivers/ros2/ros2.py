@@ -49,6 +49,8 @@ class Ros2:
         0.0, "s", least=0.0, upto=2.0
     )  # from exposure to an image's stamp
     running: str = ""  # topic of a Bool, false while the robot takes no commands
+    start: str = ""  # service Trigger that is called before a run, such as to play a program
+    stop: str = ""  # service Trigger that is called after it, once the arm is braked
     speed_scale: str = ""  # topic of a Float64, in percent
     twist_frame: str = ""  # of `twist`: TF's name of the cell's camera, the end effector of Servo
     position_gain: float = knob(
@@ -123,6 +125,8 @@ class Ros2:
             "outputs": self.outputs,
             "output_values": self.output_values,
             "running": self.running,
+            "start": self.start,
+            "stop": self.stop,
             "speed_scale": self.speed_scale,
             "twist_frame": self.twist_frame,
             "trajectory_ahead_s": _AHEAD_S,

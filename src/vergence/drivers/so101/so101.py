@@ -1,7 +1,7 @@
 """The settings of an arm of Feetech servos."""
 
 from dataclasses import field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -22,6 +22,11 @@ _Sign = Literal[-1, 1]
 @part("driver", "so101")
 class So101:
     """An SO-100, SO-101 or another arm of STS3215 servos on one serial bus."""
+
+    package: ClassVar[tuple[str, str]] = (
+        "scservo_sdk",
+        "so101",
+    )  # a module, and the extra that has it
 
     address: str = "/dev/ttyACM0"  # the serial port of the servo adapter
     baud: int = knob(1_000_000, "baud", least=9600)  # of the servos
@@ -45,7 +50,7 @@ class So101:
             if given and len(given) != n:
                 allowed = f"{n}, one a joint of {name}"
                 raise InputError(equipment.source, f"driver.{key}", f"{len(given)} values", allowed)
-        sdk = optional_package("so101", "scservo_sdk", "so101")
+        sdk = optional_package("so101", *self.package)
         ids = self.ids or tuple(range(1, n + 1))
         for output, (number, *_) in self.outputs.items():
             if number in ids:

@@ -1,11 +1,13 @@
 """What a controller's dashboard says before anything is connected for real."""
 
+import re
 import socket
 
 from vergence.errors import DriverSilent
 
 _PORT, _TIMEOUT_S = 29999, 2.0
 _GREETING = "universal robots dashboard"
+_OLDEST = {3: 15, 5: 10}  # of PolyScope: the minor version by the major one
 
 
 def check_ready(address: str) -> None:
@@ -51,6 +53,7 @@ class _Dashboard:
 def _check(address: str, dashboard: _Dashboard) -> None:
     if _GREETING not in dashboard.greeting.lower():
         raise DriverSilent(f"what answers at {address}, port {_PORT}, is no UR controller")
+    _check_version(dashboard.ask("PolyscopeVersion"))
     mode = dashboard.ask("robotmode").rpartition(":")[2].strip()
     safety = dashboard.ask("safetystatus").rpartition(":")[2].strip()
     remote = dashboard.ask("is in remote control")
@@ -66,4 +69,17 @@ def _check(address: str, dashboard: _Dashboard) -> None:
         raise DriverSilent(
             "the robot is not in remote control: choose Remote Control at the top right of its "
             "teach pendant"
+        )
+
+
+def _check_version(answer: str) -> None:
+    """Refuse a controller whose software is too old for ur_rtde."""
+    found = re.search(r"(\d+)\.(\d+)", answer)
+    if found is None:
+        return
+    major, minor = map(int, found.groups())
+    if minor < _OLDEST.get(major, 0):
+        raise DriverSilent(
+            f"the controller runs PolyScope {major}.{minor}, and ur_rtde needs "
+            f"{major}.{_OLDEST[major]} or newer: update it"
         )

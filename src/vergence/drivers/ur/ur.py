@@ -3,7 +3,7 @@
 import sys
 from dataclasses import field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import StringConstraints
 
@@ -30,6 +30,8 @@ _CONNECT_S = 30.0  # for its control program to start
 class Ur:
     """A robot of Universal Robots in remote control, through its real-time interface (RTDE)."""
 
+    package: ClassVar[tuple[str, str]] = "rtde_control", "ur"  # a module, and the extra that has it
+
     address: str  # of the controller, such as 192.168.1.10
     command: Literal["speedj", "servoj"] = "speedj"  # joint speeds, or joint positions
     rate_hz: float = knob(500.0, "Hz", least=50.0, upto=500.0)  # 125 for a CB-series controller
@@ -50,7 +52,7 @@ class Ur:
         """Connect to the controller; nothing moves before the first set-point."""
         name = equipment.only_arm("ur", _JOINTS)
         equipment.check_sources("ur")
-        optional_package("ur", "rtde_control", "ur")
+        optional_package("ur", *self.package)
         check_ready(self.address)
         settings = self._settings(name, equipment.arms[name])
         program = BridgeProgram(Path(bridges.__file__).parent, "ur", "ur_rtde", _INSTALL)

@@ -47,6 +47,7 @@ class Bridge:
         if self.reason:
             self._wire.send({"refused": self.reason})
         self._brake()
+        self._topics.stop()
         self._gone.wait(_FAREWELL_S)
 
     def stop(self, *_: Any) -> None:
@@ -111,8 +112,10 @@ def _work(wire: Wire, settings: dict[str, Any], topics_of: "type[Topics]") -> No
     topics = topics_of(settings)
     found = topics.found()
     wire.send(found)
-    if "refused" not in found:
-        settings["rate_hz"] = found["rate_hz"]
-        bridge = Bridge(wire, topics, settings)
-        signal.signal(signal.SIGTERM, bridge.stop)
-        bridge.serve()
+    if "refused" in found:
+        topics.stop()
+        return
+    settings["rate_hz"] = found["rate_hz"]
+    bridge = Bridge(wire, topics, settings)
+    signal.signal(signal.SIGTERM, bridge.stop)
+    bridge.serve()

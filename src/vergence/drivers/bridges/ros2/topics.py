@@ -27,10 +27,12 @@ from .frames import Frames
 from .images import Image, compressed_image, intrinsics, raw_image
 from .joint_states import JointStates
 from .outputs import Outputs
+from .trigger import trigger
 
 _COMPRESSED = "/compressed"
 _NODE = "vergence_"  # and when it started
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a node that is being discovered
+_STOP_S = 2.0  # for the service that stops the robot
 _INFO_S = 1.0  # for which camera info is waited after the first image
 _STOPPED, _RUNNING = "protective stop", "running"
 
@@ -54,6 +56,7 @@ class Topics:
         self._tf: list[Any] = []  # subscriptions
         self._lacking = ""  # what this Python would need besides
         self._runs: bool | None = None
+        self._started = False  # by a service
         self._scale: float | None = None
         self.on_joints: Callable[[Joints, list[Any] | None], None] = lambda *_: None
         self.on_image: Callable[[str, float, str, bytes], None] = lambda *_: None
@@ -75,7 +78,12 @@ class Topics:
 
     def found(self) -> dict[str, Any]:
         """Wait for all topics; return what is there, or in one sentence what is not."""
-        wait, deadline = Event(), monotonic() + self._settings["connect_s"]
+        wait = Event()
+        if (start := self._settings["start"]) and not self.others():
+            if refused := trigger(self._node, start, self._settings["connect_s"]):
+                return {"refused": refused}
+            self._started = True
+        deadline = monotonic() + self._settings["connect_s"]
         while not (barred := self.barred()) and self._missing() and monotonic() < deadline:
             wait.wait(0.02)
         if refused := barred or self._missing():
@@ -93,11 +101,16 @@ class Topics:
         of = {camera: self._frames.between(*frames) for camera, frames in self._mountings.items()}
         return found | {"mountings": of}
 
+    def stop(self) -> None:
+        """Call the service that stops the robot, if there is one and it was started."""
+        if (stop := self._settings["stop"]) and (self._started or not self._settings["start"]):
+            trigger(self._node, stop, _STOP_S)
+
     def barred(self) -> str:
         """Return why the arm may not be moved: others move it, or it does not run."""
         if self._lacking:
             return self._lacking
-        if self._runs is False:
+        if self._runs is False and not self._started:
             running = self._settings["running"]
             return f"the robot says on {running} that it does not run: start it on its pendant"
         return self.others()
@@ -112,6 +125,8 @@ class Topics:
 
     def _missing(self) -> str:
         """Return what the robot does not say."""
+        if self._runs is False:
+            return f"the robot says on {self._settings['running']} that it does not run"
         states, topic = self.joint_states, self._settings["joint_states"]
         waited = f"within {self._settings['connect_s']:g} s"
         if not states.others:
