@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from vergence.camera import Camera
+from vergence.control import ImageBased
 from vergence.estimation.goal_fit import GoalFit, points_in
-from vergence.geometry import se3, so3_exp
+from vergence.features import Points
+from vergence.geometry import se3, se3_exp, so3_exp
 from vergence.planning.approach import GoalImage
 from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.point_depths import PointDepths
@@ -122,3 +124,37 @@ def test_images_from_one_place_tell_no_depth_however_many():
     for _ in range(50):
         depths.add(np.eye(4), rays[:, :2], np.full(10, 1e-5), np.ones(10, bool))
     assert depths.at_goal()[1].min() > 0.09
+
+
+def closed_loop_mm(points, believed):
+    """Drive a camera to where points (K, 3) are seen as at the origin; return how far it is, mm."""
+    law, T = ImageBased(gain=3.0, interaction="mean"), se3(so3_exp(START_RAD), START_M)
+    desired, away = points[:, :2] / points[:, 2:], []
+    for _ in range(90):
+        seen = points_in(T, points)
+        now = seen[:, :2] / seen[:, 2:]
+        depth_m = believed(T, now)
+        T = T @ se3_exp(law.twist(Points(now, depth_m), Points(desired, depth_m)) / 30.0)
+        away.append(1e3 * float(np.linalg.norm(T[:3, 3])))
+    return away
+
+
+START_RAD, START_M = np.array([0.0, 0.01, 0.0]), np.array([0.003, 0.001, 0.0])
+
+
+@pytest.mark.parametrize("bend", [-2.0, 0.0, 2.0])
+def test_the_last_millimetres_are_driven_over_any_relief_as_depths_follow_from_motion(bend):
+    m = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 8), np.linspace(-0.3, 0.3, 5)), -1).reshape(
+        -1, 2
+    )
+    points = np.column_stack((m, np.ones(40))) * 0.27 * (1.0 + bend * (m**2).sum(axis=1))[:, None]
+    middle = float(np.median(points[:, 2]))
+    depths = PointDepths(m, np.eye(4), middle, 0.1)
+
+    def told_by_motion(T, now):
+        depths.add(T, now, np.full(40, 0.15 / 600), np.ones(40, bool))
+        return depths.at_goal()[0]
+
+    assert closed_loop_mm(points, told_by_motion)[-1] < 0.01
+    if bend < 0:  # a scene that is nearer at its borders: at one depth the law drives away
+        assert max(closed_loop_mm(points, lambda T, now: np.full(40, middle))) > 30.0

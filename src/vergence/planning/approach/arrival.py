@@ -28,12 +28,17 @@ class GoalPoints:
     Args:
         goal: the photograph.
         star_px: points recognised, (N, 2); the others are picked among them.
+
+    Attributes:
+        points_px: the points, (K, 2).
+        found: how many were found in the last image.
     """
 
     def __init__(self, goal: GoalImage, star_px: FloatArray) -> None:
         self.goal = goal
         self.points_px = _picked(goal, star_px)
         self._tracker = SsdTracker(goal.image, self.points_px)
+        self.found = 0
         self._depth_m = np.ones(len(self.points_px))
         self._relief = np.zeros(len(self.points_px))  # deviations of the depths, shares of them
         self._depths: PointDepths | None = None  # known once a fit is
@@ -85,7 +90,8 @@ class GoalPoints:
         variance = np.trace(tracks.covariance_px, axis1=1, axis2=2) / 2.0
         vague = np.flatnonzero(tracks.found & (variance > _VAGUE_PX**2))
         tracks = _without(tracks, vague, "its place is not known well enough")
-        if tracks.found.sum() < max(_FEWEST, len(tracks.found) // 3):
+        self.found = int(tracks.found.sum())
+        if self.found < max(_FEWEST, len(tracks.found) // 3):
             return None
         found, camera = tracks.found, self.goal.camera
         points = camera.normalize(tracks.points_px)

@@ -13,6 +13,7 @@ from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
 from vergence.planning.approach.recognition import Recognition, confirm
 from vergence.signals import Frame, Outcome, OutcomeKind
+from vergence.vision.matching import image_fault
 from vergence.vision.tracks import Tracks
 
 NEAR_PX = 32.0  # of the photograph's points from their places, at which they are followed
@@ -36,6 +37,7 @@ class Closing:
         self.points: GoalPoints | None = None
         self.begun = False
         self.scale_deviation = 1.0
+        self._missed = ""  # why they could not be followed, when they were looked for last
 
     def take(self, found: Recognition) -> None:
         """Go on from points recognised anew."""
@@ -51,8 +53,15 @@ class Closing:
             return ""
         tracks = self.points.track(frame.image, frame.time, T_world_camera, T_goal_camera)
         if tracks is None:
+            count = len(self.points.points_px)
+            self._missed = (
+                f"at the end of the path {self.points.found} of {count} points of the goal image "
+                "are found where they should be"
+            )
+            if fault := image_fault(self._goal.image):
+                self._missed += f"; it is {fault}"
             return ""
-        self.begun = True
+        self.begun, self._missed = True, ""
         return f"{np.count_nonzero(tracks.found)} of {len(tracks.found)}"
 
     def tracks(self, frame: Frame, T_world_camera: FloatArray) -> Tracks | None:
@@ -88,7 +97,9 @@ class Closing:
     def unfinished(self, time: float) -> Outcome:
         """Return how the task ends if its time is over."""
         displacement = self.points.displacement if self.points else None
-        reason = "its time is over on the way"
+        reason = (
+            f"its time is over: {self._missed}" if self._missed else "its time is over on the way"
+        )
         if self.begun and displacement is not None:
             reason = f"its time is over at {self.where(displacement)}"
         return Outcome(OutcomeKind.NOT_REACHED, reason, time)
