@@ -52,11 +52,11 @@ function hear({ about, status, rows, events, images: headers }, blobs) {
 function hint({ draggable, carried_by, mode }) {
   if (mode === "recording") return;
   if (mode === "robot") {
-    element("drag-hint").textContent = "A real arm: the space bar stops it. In 3D, the arm is where its joints are; everything else is where the cell file has it.";
+    element("drag-hint").textContent = "A real arm: the space bar stops it. The 3D view shows the arm at its measured joints and everything else as placed in the cell file.";
     return;
   }
   element("drag-hint").textContent = draggable
-    ? "Drag the target with the mouse, in an image or in 3D, or move it with the arrow keys once an image has the focus. With Shift it comes nearer or goes away, with Alt it turns. "
+    ? "Drag the target in an image or in 3D, or select an image and use the arrow keys. Shift changes its distance, Alt turns it. "
     : `${carried_by} holds the target: the mouse cannot move it.`;
 }
 

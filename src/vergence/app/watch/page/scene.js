@@ -11,6 +11,7 @@ const VIEWER = "/index.html";
 const LINES = ["/state", "/ui"]; // its connections
 const AGAIN_MS = 1000;
 const PATIENCE_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
+const MOST_PATIENCE_MS = 160_000; // doubled up to this, where a slow computer needs longer
 const BAR = 32; // px of the viewer's own bar, which is left outside
 const TURN_DEG = 5; // of a press of an arrow
 const ZOOM = 1.1;
@@ -42,6 +43,7 @@ export class Scene {
     /** @type {Set<string>} */
     this.lines = new Set(); // the viewer's connections over which something has come
     this.waiting = 0; // a timer
+    this.patience = PATIENCE_MS;
     this.over = document.createElement("canvas");
     stage.addEventListener("keydown", (event) => {
       const turn = KEYS[event.key];
@@ -55,7 +57,7 @@ export class Scene {
   begin(about) {
     this.draggable = about.draggable;
     this.hint.textContent = about.scene
-      ? `drag turns, right drag shifts, wheel zooms; so do arrow keys, + and −${about.draggable ? "; the target can be dragged" : ""}`
+      ? `Drag or arrow keys: turn. Right-drag: shift. Wheel, + and −: zoom.${about.draggable ? " The target can be dragged." : ""}`
       : "";
     if (!about.scene) return this.say(about.no_scene ?? "");
     if (this.frame) return;
@@ -120,12 +122,19 @@ export class Scene {
    * @param {Set<string>} open  its connections over which something has come
    * @param {number} wait_ms  until the viewer is loaded again, unless all are open by then
    */
-  heard(page, open, wait_ms = PATIENCE_MS) {
+  heard(page, open, wait_ms = this.patience) {
     if (this.frame?.contentWindow !== page) return; // one that is no longer shown
     const lost = !LINES.every((path) => open.has(path));
     this.stage.classList.toggle("lost", lost);
     clearTimeout(this.waiting);
-    if (lost) this.waiting = setTimeout(() => { if (this.open) this.load(); }, wait_ms);
+    if (!lost) this.patience = PATIENCE_MS;
+    else this.waiting = setTimeout(() => this.again(wait_ms), wait_ms);
+  }
+
+  /** @param {number} waited_ms */
+  again(waited_ms) {
+    if (waited_ms > AGAIN_MS) this.patience = Math.min(2 * waited_ms, MOST_PATIENCE_MS);
+    if (this.open) this.load();
   }
   /** @param {string} text */
   say(text) {
