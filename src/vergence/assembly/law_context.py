@@ -32,7 +32,7 @@ class LawContext:
 
     cell: Cell
     model: "CellModel"  # arms at their start, the target at its placement
-    cameras: Mapping[str, Camera]  # by name
+    cameras: Mapping[str, Camera]  # cameras, by name
     inner_rate_hz: float
     joints: Mapping[str, FloatArray]  # positions at the start by arm name, (n,), rad or m
     points_px: Mapping[str, FloatArray]  # (M, 2) features in the first image, by camera name

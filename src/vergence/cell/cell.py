@@ -38,25 +38,31 @@ from vergence.validation import explain
 class Cell(Table):
     """Arms, cameras, a target, a task and a law: all that a run depends on."""
 
-    name: Name  # what its runs are called
-    duration_s: Duration  # of a run, at most
-    seed: Annotated[int, Field(ge=0, lt=1 << 63)] = 0  # of everything that is drawn by chance
-    inner_rate_hz: Annotated[float, Field(ge=100, le=1e4)] = 500.0  # of physics and guard
-    scene: SceneTable = SceneTable()  # what stands around the arms
-    arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # by name
-    cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # by name
-    collision: CollisionTable = CollisionTable()  # what must not be touched
-    target: TargetTable  # what is looked at
-    task: Task  # what is to be done about it
-    tasks: Annotated[tuple[Task, ...], Field(max_length=64)] = ()  # or several, one after another
-    perception: PerceptionTable = PerceptionTable()  # how its pose is estimated
-    outputs: dict[Name, OutputTable] = Field(  # of the driver, such as a gripper, by name
-        default_factory=dict, max_length=16
+    name: Name  # name of the cell; runs are named after it
+    duration_s: Duration  # longest duration of a run
+    seed: Annotated[int, Field(ge=0, lt=1 << 63)] = 0  # random seed
+    inner_rate_hz: Annotated[float, Field(ge=100, le=1e4)] = (
+        500.0  # rate of the physics, the inner loop and the guard
     )
-    driver: DriverTable | None = None  # the real robot; a simulation does not need it
-    law: Part  # how the arm is moved
-    laws: dict[Name, Part] = Field(  # others, by name, to compare it with
-        default_factory=dict, max_length=64
+    scene: SceneTable = SceneTable()  # surroundings of the arms
+    arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # arms, by name
+    cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # cameras, by name
+    collision: CollisionTable = CollisionTable()  # collision avoidance
+    target: TargetTable  # object that the cameras observe
+    task: Task  # what the arm should do
+    tasks: Annotated[
+        tuple[Task, ...], Field(max_length=64)
+    ] = ()  # sequence of tasks, instead of a single one
+    perception: PerceptionTable = PerceptionTable()  # how the target's pose is estimated
+    outputs: dict[Name, OutputTable] = (
+        Field(default_factory=dict, max_length=16)  # outputs of the driver, such as a gripper, by
+        # name
+    )
+    driver: DriverTable | None = None  # settings of the real robot; not needed in simulation
+    law: Part  # control law
+    laws: dict[Name, Part] = (
+        Field(default_factory=dict, max_length=64)  # other laws by name, for tasks and for
+        # comparison
     )
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")

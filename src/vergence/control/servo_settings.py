@@ -33,18 +33,24 @@ class ServoSettings:
     the same table; several stand in `objectives`.
     """
 
-    objectives: tuple[WeightedObjective, ...] = slot("term", many=True)  # each with its weight
-    limits: Limits | None = slot("limits", None)  # those of the solver's own defaults if absent
-    solver: Solver = slot("solver", QuadraticProgram)  # from objectives to joint rates
-    depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # believed at the start
-    depth: Depth | None = slot("depth", None)  # how it is followed; chosen by what is known if None
-    feed_forward: bool | None = knob(
-        None
-    )  # the target's own motion; if None, where it moves and the depth is right for that
-    prediction: bool = knob(True)  # features are carried from their exposure to now
-    flow_smoothing_s: float = knob(
-        0.2, "s", least=0, upto=10
-    )  # of the target's motion in the image, which is followed with its trend
+    objectives: tuple[WeightedObjective, ...] = slot(
+        "term", many=True
+    )  # objectives, each with its weight
+    limits: Limits | None = slot("limits", None)  # limits; the solver's defaults if absent
+    solver: Solver = (
+        slot("solver", QuadraticProgram)  # solver that computes joint rates from the objectives
+    )
+    depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # initial depth
+    depth: Depth | None = slot("depth", None)  # source of the depth; chosen automatically if absent
+    feed_forward: bool | None = (
+        knob(None)  # feed the target's motion forward; default: if it moves and the kind of depth
+        # allows it
+    )
+    prediction: bool = knob(True)  # predict features from their exposure to the present
+    flow_smoothing_s: float = (
+        knob(0.2, "s", least=0, upto=10)  # smoothing time of the target's estimated motion in the
+        # image
+    )
 
     def __post_init__(self) -> None:
         if not self.objectives:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 class PerceptionSettings:
     """Settings of the tracking loop."""
 
-    budget: int = 8  # features measured a tick, over all cameras
+    budget: int = 8  # features measured per tick, over all cameras
     budget_in_doubt: int = 32  # the same while the filter is inconsistent
     doubt_widens: float = 4.0  # windows by 1 + this · share of the last points that disagreed
     margin_px: float = 8.0  # from the border of an image

@@ -75,13 +75,21 @@ class RpyPoseFilter:
     `PoseFilter` has no such place.
     """
 
-    velocity_noise: float = knob(5e-6, "m²/s²", least=0, upto=1e6)  # in Q, a frame, section V
-    angle_rate_noise: float = knob(2e-5, "rad²/s²", least=0, upto=1e6)  # in Q, a frame
-    frame_period_s: float = knob(1.0 / 26.0, "s", above=0, upto=1e3)  # the frame Q is meant for
-    gate: float = knob(13.8, above=0, upto=1e12)  # on the Mahalanobis distance squared of a point
-    fading: float = knob(
-        0.9, above=0, below=1
-    )  # weight of the past in the consistency test, for each image
+    velocity_noise: float = (
+        knob(5e-6, "m²/s²", least=0, upto=1e6)  # velocity noise in Q per frame, section V
+    )
+    angle_rate_noise: float = (
+        knob(2e-5, "rad²/s²", least=0, upto=1e6)  # angular rate noise in Q per frame
+    )
+    frame_period_s: float = (
+        knob(1.0 / 26.0, "s", above=0, upto=1e3)  # frame period for which Q is given
+    )
+    gate: float = (
+        knob(13.8, above=0, upto=1e12)  # gate on the squared Mahalanobis distance of a point
+    )
+    fading: float = (
+        knob(0.9, above=0, below=1)  # forgetting factor per image of the consistency test
+    )
 
     @cached_property
     def noise(self) -> FloatArray:

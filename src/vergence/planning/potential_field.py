@@ -19,12 +19,19 @@ class PotentialFieldPlanner:
     minimum where a path exists, and says so; `OptimisedPlanner` finds more.
     """
 
-    step: float = knob(0.02, above=0, upto=1)  # ε, of Υ
-    steps_max: int = knob(1500, least=1, upto=100000)  # before the walk is given up
-    gain_image: float = knob(0.02, least=0, upto=1e3)  # γ, of the repulsion by the image's border
-    gain_joint: float = knob(0.5, least=0, upto=1e3)  # χ, of the repulsion by joint limits
-    image_zone_px: float = knob(100.0, "px", above=0, upto=1e4)  # width along the image's border
-    joint_zone: float = knob(0.2, above=0, upto=1)  # width at a joint limit, of half the range
+    step: float = knob(0.02, above=0, upto=1)  # ε, step length in Υ
+    steps_max: int = knob(1500, least=1, upto=100000)  # largest number of steps
+    gain_image: float = (
+        knob(0.02, least=0, upto=1e3)  # γ, gain of the repulsion from the image border
+    )
+    gain_joint: float = knob(0.5, least=0, upto=1e3)  # χ, gain of the repulsion from joint limits
+    image_zone_px: float = (
+        knob(100.0, "px", above=0, upto=1e4)  # width of the repulsive zone at the image border
+    )
+    joint_zone: float = (
+        knob(0.2, above=0, upto=1)  # width of the repulsive zone at a joint limit, as a fraction
+        # of half the range
+    )
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return a path that keeps every constraint, or what stood in the way.

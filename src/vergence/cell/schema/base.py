@@ -51,16 +51,16 @@ class Table(BaseModel):
 class Placement(Table):
     """A pose: a position and roll-pitch-yaw angles, R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    position_m: Vector3 = (0.0, 0.0, 0.0)  # x, y, z of its origin
+    position_m: Vector3 = (0.0, 0.0, 0.0)  # x, y, z of the origin
     rotation_rpy_deg: Angles3 = (0.0, 0.0, 0.0)  # roll, pitch, yaw
 
 
 class TaskTable(Table):
     """What every task has."""
 
-    name: Name | None = None  # what messages and reports call it; its kind if absent
-    law: Name | None = None  # one of [laws], in [[tasks]]; the cell's own if absent
-    until: Part = None  # when it is over; a task with a goal ends there if absent
+    name: Name | None = None  # name in messages and reports; the kind of the task if absent
+    law: Name | None = None  # name of one of [laws], only in [[tasks]]; [law] if absent
+    until: Part = None  # condition that ends the task; if absent, a task with a goal ends there
 
     @property
     def called(self) -> str:

@@ -47,8 +47,10 @@ _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
 class SceneTable(Table):
     """What stands around the arms."""
 
-    model: Path | None = None  # MJCF of floor, walls, lights; a plain floor and a lamp if absent
-    light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of every lamp
+    model: Path | None = (
+        None  # MJCF file of floor, walls and lights; a plain floor and a lamp if absent
+    )
+    light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of all lamps
 
 
 class CollisionTable(Table):
@@ -56,9 +58,12 @@ class CollisionTable(Table):
 
     avoid: Annotated[
         tuple[Literal["self", "arms", "fixtures", "target"], ...], Field(max_length=4)
-    ] = ("self", "arms", "fixtures")  # its own links, other arms, the scene; a stationary target
+    ] = (
+        ("self", "arms", "fixtures")  # the arm's own links, other arms, the scene; or a
+        # stationary target
+    )
     margin_m: Annotated[float, Field(ge=1e-3, le=1)] = (
-        0.01  # kept by the law's limit "collision"; the guard brakes at half of it
+        0.01  # distance kept by the law's limit "collision"; the guard brakes at half of it
     )
 
 
@@ -66,16 +71,16 @@ class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
     model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
-    body: Text  # the last body: cameras are mounted on it unless they name another
-    start_deg: _Joints  # at the start; metres for sliding joints
+    body: Text  # last body of the arm; cameras are mounted on it unless they name another
+    start_deg: _Joints  # initial joint positions; m for prismatic joints
     rate_max_deg_s: _JointRates | None = (
-        None  # m/s for sliding joints; if absent the model's limits, without those 180 or 0.5
+        None  # rate limits, m/s for prismatic joints; default: the model's, or else 180 or 0.5
     )
     acceleration_max_deg_s2: _JointRates | None = (
-        None  # m/s² for sliding joints; 720 or 2 if absent
+        None  # acceleration limits, m/s² for prismatic joints; 720 or 2 if absent
     )
-    servo_bandwidth_hz: Rate = 12.0  # of the joint servos that stand for the robot's own
-    motion: Part = None  # what it does by itself; without one the loop holds it
+    servo_bandwidth_hz: Rate = 12.0  # bandwidth of the joint servos that model those of the robot
+    motion: Part = None  # motion of its own; without one the loop holds it
 
 
 class DepthTable(Table):
@@ -150,9 +155,11 @@ class TargetTable(Placement):
     """The object; its placement is where its motion starts, or its pose in what carries it."""
 
     model: Path  # MJCF or URDF
-    carried_by: Text | None = None  # an arm, whose last body it is fixed to
-    motion: Part = "stationary"  # what it does by itself
-    features: _Features | None = None  # m, in the target; picked in the image if absent
+    carried_by: Text | None = None  # arm to whose last body it is attached
+    motion: Part = "stationary"  # motion of its own
+    features: _Features | None = (
+        None  # points in the target's frame, in m; picked in the first image if absent
+    )
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":
@@ -165,52 +172,55 @@ class ToolTable(Placement):
     """What the arm holds beside its camera; its placement is in the arm's last body."""
 
     model: Path  # MJCF
-    camera: Text  # the fixed one that looks at it
+    camera: Text  # fixed camera that observes the tool
     features: tuple[Vector3, ...] = Field(
         min_length=1, max_length=MOST_POINTS
-    )  # x, y, z of each, in the tool
-    desired: _Desired = "initial"  # in that camera, as for the task
+    )  # x, y, z of each point in the tool's frame
+    desired: _Desired = "initial"  # desired points in that camera, as for the task
 
 
 class TrackTable(TaskTable):
     """Keep features where they are desired in one camera's image."""
 
     kind: Literal["track"] = "track"
-    arm: Text  # which moves, or carries the target
-    camera: Text  # carried by the arm, or fixed
-    feature_count: Annotated[int, Field(ge=1, le=64)] = 1  # how many to pick, if they are picked
+    arm: Text  # arm that moves, or carries the target
+    camera: Text  # camera on the arm, or a fixed one
+    feature_count: Annotated[int, Field(ge=1, le=64)] = (
+        1  # number of points to pick, if they are picked
+    )
     points_px: Annotated[tuple[Point2, ...], Field(max_length=MOST_POINTS)] | None = (
-        None  # (u, v) of the features in the first image; found by the target's placement if absent
+        None  # (u, v) of the features in the first image; derived from the target's placement if
+        # absent
     )
     desired: _Desired = (
-        "initial"  # as at the start, or their middle in the image's, or (u, v) of each in pixels
+        "initial"  # as at the start, centred in the image, or (u, v) of each point in pixels
     )
-    tracker: Part = "ssd"  # what follows the features from image to image
+    tracker: Part = "ssd"  # tracker of the features
     approach: Literal["direct", "auto"] = (
         "direct"  # auto: along a planned path to stated `desired` points, where they can be planned
     )
-    tool: ToolTable | None = None  # to be kept in its place before a second, fixed camera
-    tolerance_px: Pixels = 1.0  # mean error above which an arm at rest has not reached its goal
-    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
-    target_timeout_s: Duration = 0.2  # with images, but none of the features found
+    tool: ToolTable | None = None  # tool to be kept in place in the image of a second, fixed camera
+    tolerance_px: Pixels = 1.0  # an arm at rest with a larger mean error has not reached its goal
+    image_timeout_s: Duration = 0.5  # time without an image after which the run ends
+    target_timeout_s: Duration = 0.2  # time without any feature found after which the run ends
 
 
 class FollowTable(TaskTable):
     """Keep a camera on the arm, or what the arm holds before a fixed one, at a desired pose."""
 
     kind: Literal["follow"]
-    arm: Text  # which moves
-    camera: Text  # carried by the arm, or fixed where the arm carries the target
-    desired: Literal["initial"] | Placement = "initial"  # the target's pose in that camera
-    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
-    target_timeout_s: Duration = 2.0  # with images, but the target lost
+    arm: Text  # arm that moves
+    camera: Text  # camera on the arm, or a fixed one if the arm carries the target
+    desired: Literal["initial"] | Placement = "initial"  # desired pose of the target in that camera
+    image_timeout_s: Duration = 0.5  # time without an image after which the run ends
+    target_timeout_s: Duration = 2.0  # time without finding the target after which the run ends
 
 
 class LengthTable(Table):
     """How far two points are apart that a photograph shows."""
 
-    points_px: tuple[Point2, Point2]  # (u, v) of both, in the photograph
-    length_m: Length  # between them
+    points_px: tuple[Point2, Point2]  # (u, v) of both end points in the photograph
+    length_m: Length  # distance between them
 
     @model_validator(mode="after")
     def _apart(self) -> "LengthTable":
@@ -223,43 +233,52 @@ class ReachTable(TaskTable):
     """Bring the camera to where the target looks as in an image taken before, along a plan."""
 
     kind: Literal["reach"]
-    arm: Text  # which moves
-    camera: Text  # carried by the arm
-    goal: Path | None = None  # a photograph of what to see; beside it may lie NAME.camera.yaml
+    arm: Text  # arm that moves
+    camera: Text  # camera on the arm
+    goal: Path | None = (
+        None  # photograph of the desired view; NAME.camera.yaml beside it gives its camera
+    )
     goal_deg: _Joints | None = (
-        None  # joints when it was taken; metres if they slide; a simulation can take it there
+        None  # joints at which it was taken, m if prismatic; a simulation can take the photograph
+        # there
     )
     distance_m: Length | None = (
-        None  # rough distance of that camera from what it sees; the arm's motion tells it as well
+        None  # approximate distance between camera and object; otherwise estimated while the arm
+        # moves
     )
-    length: LengthTable | None = None  # a known length in the photograph, for the scale
-    matcher: Part = "sift"  # what recognises the photograph
-    tolerance_m: Length = 1e-3  # distance from the goal at which it is reached, for sure
-    tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 0.2  # and angle
-    planner: Part = "optimised"  # of the path in the image: or the paper's, or one's own
-    tracker: Part = "round_marks"  # what follows the features from image to image
-    margin_px: Pixels = 10.0  # kept from the border of the image
-    margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01  # of half a joint's range
-    camera_speed_m_s: Speed = 0.25  # on the way
-    tolerance_px: Pixels = 1.0  # mean error of the farthest feature up to which it is reached
-    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
-    target_timeout_s: Duration = 0.5  # with images, but the target lost
+    length: LengthTable | None = None  # known length in the photograph, to set the scale
+    matcher: Part = "sift"  # method that recognises the photograph
+    tolerance_m: Length = 1e-3  # the goal is reached when certainly within this distance
+    tolerance_deg: Annotated[float, Field(gt=0, le=180)] = (
+        0.2  # the goal is reached when certainly within this angle
+    )
+    planner: Part = "optimised"  # planner of the path in the image
+    tracker: Part = "round_marks"  # tracker of the features
+    margin_px: Pixels = 10.0  # distance to keep from the border of the image
+    margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = (
+        0.01  # distance to keep from joint limits, as a fraction of half the range
+    )
+    camera_speed_m_s: Speed = 0.25  # speed of the camera along the path
+    tolerance_px: Pixels = 1.0  # largest mean error of the farthest feature that counts as reached
+    image_timeout_s: Duration = 0.5  # time without an image after which the run ends
+    target_timeout_s: Duration = 0.5  # time without finding the target after which the run ends
 
 
 class AdvanceTable(TaskTable):
     """Move the camera, or what the arm holds before a fixed one, along an axis, without images."""
 
     kind: Literal["advance"]
-    arm: Text  # which moves
-    camera: Text  # carried by the arm, or fixed
-    distance_m: Coordinate  # from where it is; negative for backwards
-    axis: Literal["x", "y", "z"] = "z"  # which way
+    arm: Text  # arm that moves
+    camera: Text  # camera on the arm, or a fixed one
+    distance_m: Coordinate  # distance to move; negative for backwards
+    axis: Literal["x", "y", "z"] = "z"  # axis to move along
     frame: Literal["camera", "flange", "world"] = (
-        "camera"  # whose axis, as it is at the start; flange is the arm's last body
+        "camera"  # frame of the axis, fixed at the start of the task; flange is the arm's last
+        # body
     )
-    speed_m_s: Speed = 0.1  # at most
-    tolerance_m: Length = 2e-3  # distance from the end at which it is reached
-    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+    speed_m_s: Speed = 0.1  # highest speed
+    tolerance_m: Length = 2e-3  # the end is reached within this distance
+    image_timeout_s: Duration = 0.5  # time without an image after which the run ends
 
     @field_validator("distance_m")
     @classmethod
@@ -273,12 +292,12 @@ class SwitchTable(TaskTable):
     """Switch an output of the driver, such as a gripper, while the arm stays where it is."""
 
     kind: Literal["switch"]
-    arm: Text  # which stays
-    camera: Text  # of the other tasks
-    output: Text  # one of [outputs]
-    value: Annotated[float, Field(ge=0, le=1)]  # 0 is off or open, 1 is on or closed
-    wait_s: Duration = 0.5  # until it has done what it does
-    image_timeout_s: Duration = 0.5  # without an image for so long, the run ends
+    arm: Text  # arm that stays at rest
+    camera: Text  # camera of the other tasks
+    output: Text  # name of one of [outputs]
+    value: Annotated[float, Field(ge=0, le=1)]  # 0 for off or open, 1 for on or closed
+    wait_s: Duration = 0.5  # time to wait for the output to act
+    image_timeout_s: Duration = 0.5  # time without an image after which the run ends
 
 
 class OutputTable(Placement):
@@ -311,21 +330,30 @@ class PerceptionTable(Table):
     """How the target's pose is estimated, where the task needs it."""
 
     cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = (
-        None  # those that are looked through; all if absent
+        None  # cameras to use; all if absent
     )
-    filter: Part = "pose"  # on SE(3), or the roll-pitch-yaw state of the paper, or one's own
+    filter: Part = "pose"  # pose filter: on SE(3), or with the paper's roll-pitch-yaw state
     selection: Literal["information", "indexes"] = (
-        "information"  # of features: or by spread, as [Lippiello2005]
+        "information"  # selection of features by information, or by distribution as in
+        # [Lippiello2005]
     )
-    budget: Annotated[int, Field(ge=3, le=4096)] = 16  # features measured a tick, over all cameras
-    noise_px: _Noise = 0.5  # expected of a measured point; drawn where there are no images
-    believed_noise_px: _Noise | None = None  # in place of what each measurement says of itself
-    outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # share of wrong matches made on purpose
-    occlusion: bool = True  # whether arms and fixtures in the way are predicted
+    budget: Annotated[int, Field(ge=3, le=4096)] = (
+        16  # features measured per tick, over all cameras
+    )
+    noise_px: _Noise = (
+        0.5  # standard deviation of a measured point; also simulated if no images are rendered
+    )
+    believed_noise_px: _Noise | None = (
+        None  # standard deviation that the filter uses instead of that stated by each measurement
+    )
+    outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # fraction of wrong matches to simulate
+    occlusion: bool = True  # whether to predict occlusion by arms and fixtures
     start_error_m: Distance | None = (
-        None  # how well the target's placement is known: 0.01 to follow, else 0
+        None  # uncertainty of the target's initial position; default 0.01 for follow, else 0
     )
-    start_error_deg: _Angle | None = None  # and its angle: 2 to follow
+    start_error_deg: _Angle | None = (
+        None  # uncertainty of its initial orientation; default 2 for follow, else 0
+    )
 
 
 class DriverTable(Table):
@@ -333,13 +361,15 @@ class DriverTable(Table):
 
     model_config = ConfigDict(extra="allow")
 
-    kind: Text  # a driver, or module:Class of your own; used where `--driver` names it
-    stamp_latency_s: dict[Name, Annotated[float, Field(ge=-0.1, le=2)]] = Field(
-        default_factory=dict, max_length=32
-    )  # by camera name: how much later than exposed its images are stamped; see `calibrate`
-    servo_lag_s: Annotated[float, Field(ge=0, le=1)] = (
-        0.0  # by which the joints follow their set-points; see `vergence calibrate --latency`
+    kind: Text  # driver, or module:Class of your own; used only if `--driver` names it
+    stamp_latency_s: dict[Name, Annotated[float, Field(ge=-0.1, le=2)]] = (
+        Field(default_factory=dict, max_length=32)  # by camera name: delay of the time stamps
+        # after exposure; see `vergence calibrate --latency`
     )
-    cameras: dict[Name, Part] = Field(
-        default_factory=dict, max_length=32
-    )  # by camera name: a source of its images on this computer
+    servo_lag_s: Annotated[float, Field(ge=0, le=1)] = (
+        0.0  # delay of the joints behind their set-points; see `vergence calibrate --latency`
+    )
+    cameras: dict[Name, Part] = (
+        Field(default_factory=dict, max_length=32)  # by camera name: source of its images on this
+        # computer
+    )

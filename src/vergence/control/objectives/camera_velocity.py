@@ -17,7 +17,9 @@ class CameraVelocity:
     keep in its place it follows that line.
     """
 
-    linear_m_s: tuple[float, ...] = knob((0.0, 0.0, 0.0), "m/s", live=False)  # along x, y, z
+    linear_m_s: tuple[float, ...] = knob(
+        (0.0, 0.0, 0.0), "m/s", live=False
+    )  # velocity along x, y, z
 
     def __post_init__(self) -> None:
         if len(self.linear_m_s) != _AXES:

@@ -16,8 +16,10 @@ class Posture:
     """
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
-    position: tuple[float, ...] | None = knob(None)  # q_star, rad or m; mid-range if absent
-    strength: float = knob(1e-4, above=0, upto=1e3)  # weight of its quadratic
+    position: tuple[float, ...] | None = knob(
+        None
+    )  # desired joint positions, rad or m; the middle of each range if absent
+    strength: float = knob(1e-4, above=0, upto=1e3)  # weight
 
     def quadratic(self, state: CameraState) -> JointQuadratic:
         """Return the quadratic for this tick."""

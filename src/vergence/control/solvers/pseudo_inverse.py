@@ -85,7 +85,10 @@ class DampedPseudoInverse:
     Weighting lets metres and radians, slow and fast joints share the work; see `resolve_redundant`.
     """
 
-    singular_below: float = knob(0.02, least=0, upto=1)  # damped below it, of the largest value
+    singular_below: float = (
+        knob(0.02, least=0, upto=1)  # singular values below this fraction of the largest are
+        # damped
+    )
 
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm."""

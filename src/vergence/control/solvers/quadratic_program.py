@@ -47,9 +47,11 @@ class QuadraticProgram:
     minimise Σ ½ vᵀ H v - gᵀ v + ½ μ ‖q̇ - q̇_null‖² + ½ S / w'(q + T q̇)  subject to  C q̇ ≥ d.
     """
 
-    S: float = knob(0.0, least=0, upto=1e3)  # on 1/w', the penalty taken joint by joint
-    avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100)  # joint rates S alone causes
-    damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, on the joint rates
+    S: float = knob(0.0, least=0, upto=1e3)  # weight of 1/w', with the penalty per joint
+    avoidance_rate_max: float = (
+        knob(0.5, "rad/s", above=0, upto=100)  # highest joint rate caused by S
+    )
+    damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, weight of the joint rates
 
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the program for one arm.

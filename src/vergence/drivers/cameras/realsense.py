@@ -12,16 +12,17 @@ from vergence.parts import knob, part
 class RealSense:
     """The colour or left infrared image of a RealSense, and its depth, at its own time stamps."""
 
-    serial: str = ""  # of the camera; the only one that is plugged in if empty
-    stream: Literal["infrared", "color"] = "infrared"  # infrared has a global shutter
-    width: int = knob(640, "px", least=1)  # of the images; the cell's resolution
-    height: int = knob(480, "px", least=1)  # likewise
-    rate_hz: int = knob(30, "Hz", least=1)  # one that the camera has for that size
-    depth: bool = False  # measure depth as well; the cell's camera then has a table `depth`
-    exposure_s: float = knob(0.0, "s", least=0.0, upto=1.0)  # automatic if 0
-    latency_s: float = knob(
-        0.0, "s", least=0.0, upto=2.0
-    )  # shortest from exposure to arrival; see `vergence calibrate --latency`
+    serial: str = ""  # serial number of the camera; the only connected one if empty
+    stream: Literal["infrared", "color"] = "infrared"  # image stream; infrared has a global shutter
+    width: int = knob(640, "px", least=1)  # image width; must match the cell's resolution
+    height: int = knob(480, "px", least=1)  # image height; must match the cell's resolution
+    rate_hz: int = knob(30, "Hz", least=1)  # a rate that the camera supports at that size
+    depth: bool = False  # also measure depth; the cell's camera then needs a table `depth`
+    exposure_s: float = knob(0.0, "s", least=0.0, upto=1.0)  # exposure time; automatic if 0
+    latency_s: float = (
+        knob(0.0, "s", least=0.0, upto=2.0)  # shortest delay from exposure to arrival; see
+        # `vergence calibrate --latency`
+    )
 
     def open(self, name: str, clock: Callable[[], float]) -> RealSenseCamera:
         """Open the camera; librealsense takes its images in threads of its own."""

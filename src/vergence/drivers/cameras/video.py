@@ -10,10 +10,11 @@ from vergence.runtime.hardware import VideoCamera
 class Video:
     """A USB camera by its number, a network stream by its address, or a video file."""
 
-    source: int | str = 0  # number of a device, path of a file, or address of a stream
-    latency_s: float = knob(
-        0.0, "s", least=0.0, upto=2.0
-    )  # from exposure until the image arrives; see `vergence calibrate --latency`
+    source: int | str = 0  # device number, file path, or address of a stream
+    latency_s: float = (
+        knob(0.0, "s", least=0.0, upto=2.0)  # delay from exposure to arrival; see `vergence
+        # calibrate --latency`
+    )
 
     def open(self, name: str, clock: Callable[[], float]) -> VideoCamera:
         """Open the camera; a thread takes its images."""

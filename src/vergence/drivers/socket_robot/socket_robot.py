@@ -15,8 +15,11 @@ class SocketRobot:
     """A robot in another process or on another computer, reached by the project's own protocol."""
 
     address: str = "localhost:5007"  # HOST:PORT, or PORT on this computer
-    timeout_s: float = knob(2.0, "s", above=0.0, upto=60.0)  # without a word, the robot is silent
-    connect_s: float = knob(30.0, "s", above=0.0, upto=600.0)  # for a robot that is starting
+    timeout_s: float = (
+        knob(2.0, "s", above=0.0, upto=60.0)  # time without a message after which the robot
+        # counts as silent
+    )
+    connect_s: float = knob(30.0, "s", above=0.0, upto=600.0)  # time to wait for the robot to start
 
     def open(self, equipment: Equipment) -> Driver:
         """Connect to the robot, whose rate is the cell's `inner_rate_hz`."""

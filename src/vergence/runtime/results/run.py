@@ -33,8 +33,8 @@ class Run:
     """What a run was: how it ended and all its numbers; images are not kept."""
 
     info: RunInfo  # the cell, its seed, and the arms and cameras in it
-    arms: Mapping[str, ArmTrace]  # by name
-    cameras: Mapping[str, CameraTrace]  # by name
+    arms: Mapping[str, ArmTrace]  # arms, by name
+    cameras: Mapping[str, CameraTrace]  # cameras, by name
     target: TargetTrace | None  # as a filter believed it; None where no filter ran
     events: tuple[Event, ...]  # in order of time
     outcome: Outcome

@@ -11,8 +11,8 @@ from vergence.signals import Outcome, OutcomeKind
 class CameraPosition:
     """The task is over once the camera, or what its arm holds, is near a place in the world."""
 
-    position_m: tuple[float, float, float] = knob(..., "m")  # x, y, z of the place
-    tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # how near
+    position_m: tuple[float, float, float] = knob(..., "m")  # x, y, z of the camera
+    tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # distance that counts as there
 
     def bind(self, setting: EndSetting) -> Until:
         """Return what watches the camera."""

@@ -13,9 +13,15 @@ from vergence.signals import Outcome, OutcomeKind
 class JointPosition:
     """The task is over once a joint is above or below a position."""
 
-    joint: str = knob(...)  # its name
-    above_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # over from here up,
-    below_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # or from here down
+    joint: str = knob(...)  # name of the joint
+    above_deg: float | None = (
+        knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # the task ends when the joint is above
+        # this position
+    )
+    below_deg: float | None = (
+        knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # the task ends when the joint is below
+        # this position
+    )
 
     @model_validator(mode="after")
     def _one_side(self) -> "JointPosition":

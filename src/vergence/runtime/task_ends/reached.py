@@ -17,10 +17,16 @@ class Reached:
     tolerances say.
     """
 
-    tolerance_px: float = knob(1.0, "px", above=0, upto=1e4)  # of every feature, for image points
-    tolerance_m: float = knob(2e-3, "m", above=0, upto=10)  # of the target, for a desired pose
-    tolerance_deg: float = knob(0.3, "°", above=0, upto=180)  # and its angle
-    time_s: float = knob(0.5, "s", least=0, upto=60)  # for so long
+    tolerance_px: float = (
+        knob(1.0, "px", above=0, upto=1e4)  # largest error of every feature, for image points
+    )
+    tolerance_m: float = (
+        knob(2e-3, "m", above=0, upto=10)  # largest position error, for a desired pose
+    )
+    tolerance_deg: float = (
+        knob(0.3, "°", above=0, upto=180)  # largest orientation error, for a desired pose
+    )
+    time_s: float = knob(0.5, "s", least=0, upto=60)  # time for which this must hold
 
     def bind(self, setting: EndSetting) -> Until:
         """Return what watches the error."""

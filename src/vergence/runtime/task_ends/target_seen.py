@@ -11,10 +11,10 @@ from vergence.signals import Outcome, OutcomeKind
 class TargetSeen:
     """The task is over once some features of the target were found in several images in a row."""
 
-    images: int = knob(3, least=1, upto=1000)  # in a row
+    images: int = knob(3, least=1, upto=1000)  # number of consecutive images
     looks_for_target: ClassVar[bool] = True  # so that a task without images has to
 
-    features: int = knob(4, least=1, upto=1000)  # found in each, over all cameras
+    features: int = knob(4, least=1, upto=1000)  # features found in each of them, over all cameras
 
     def bind(self, setting: EndSetting) -> Until:
         """Return what counts."""

@@ -9,7 +9,7 @@ from vergence.signals import Outcome, OutcomeKind
 class TimeOver:
     """The task is over after some time."""
 
-    time_s: float = knob(..., "s", above=0, upto=86400)  # since the task began
+    time_s: float = knob(..., "s", above=0, upto=86400)  # time since the task began
 
     def bind(self, setting: EndSetting) -> "TimeOver":
         """Return itself: it has no state."""

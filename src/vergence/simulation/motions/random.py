@@ -13,9 +13,9 @@ _SINUSOIDS = 3
 class Random:
     """The target wanders smoothly: a few sinusoids of random phase on every axis."""
 
-    amplitude_m: Vector3 = knob(unit="m")  # along the world's axes
-    amplitude_rpy_deg: Angles3 = knob((0.0, 0.0, 0.0), "°")  # about them
-    fastest_hz: float = knob(0.3, "Hz", least=1e-2, upto=1e4)  # of the sinusoids
+    amplitude_m: Vector3 = knob(unit="m")  # amplitude along the world's axes
+    amplitude_rpy_deg: Angles3 = knob((0.0, 0.0, 0.0), "°")  # amplitude of rotation about them
+    fastest_hz: float = knob(0.3, "Hz", least=1e-2, upto=1e4)  # highest frequency of the sinusoids
     start_s: float = knob(0.0, "s", least=0, upto=86400)  # stationary until then
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:

@@ -20,8 +20,8 @@ class Stationary:
 class Line:
     """The target moves along a line, then stops."""
 
-    velocity_m_s: Vector3 = knob(unit="m/s")  # in the world
-    distance_m: float = knob(unit="m", least=1e-6, upto=1e3)  # after which it stops
+    velocity_m_s: Vector3 = knob(unit="m/s")  # velocity in the world
+    distance_m: float = knob(unit="m", least=1e-6, upto=1e3)  # distance after which it stops
     start_s: float = knob(0.0, "s", least=0, upto=86400)  # stationary until then
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:
@@ -37,8 +37,8 @@ class Line:
 class Circle:
     """The target moves on a horizontal circle that starts at its placement."""
 
-    radius_m: float = knob(unit="m", least=1e-6, upto=1e3)  # of the circle
-    period_s: float = knob(unit="s", least=1e-3, upto=86400)  # of one revolution
+    radius_m: float = knob(unit="m", least=1e-6, upto=1e3)  # radius of the circle
+    period_s: float = knob(unit="s", least=1e-3, upto=86400)  # duration of one revolution
     start_s: float = knob(0.0, "s", least=0, upto=86400)  # stationary until then
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:
@@ -52,8 +52,8 @@ class Circle:
 class Step:
     """The target jumps."""
 
-    offset_m: Vector3 = knob(unit="m")  # in the world
-    time_s: float = knob(unit="s", least=0, upto=86400)  # when
+    offset_m: Vector3 = knob(unit="m")  # displacement in the world
+    time_s: float = knob(unit="s", least=0, upto=86400)  # time of the step
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:
         """Return the poses (K, 4, 4)."""

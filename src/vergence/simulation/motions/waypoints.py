@@ -63,14 +63,14 @@ class PoseMotion(Waypoints):
     A way-point is the pose in the frame that the body or target had at the start.
     """
 
-    times_s: _Times = knob(unit="s")  # of the way-points, first 0, increasing
+    times_s: _Times = knob(unit="s")  # times of the way-points, increasing from 0
     positions_m: Annotated[tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
         unit="m"
     )  # one for each time
     rotations_rpy_deg: Annotated[tuple[Angles3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
         unit="°"
     )  # one for each time
-    speed: float = knob(1.0, least=1e-3, upto=1e3)  # the times are divided by it
+    speed: float = knob(1.0, least=1e-3, upto=1e3)  # speed factor; the times are divided by it
 
     def __post_init__(self) -> None:
         self._check("positions_m", "rotations_rpy_deg")
@@ -87,12 +87,12 @@ class PoseMotion(Waypoints):
 class JointMotion(Waypoints):
     """The arm moves its joints through way-points, relative to its start."""
 
-    times_s: _Times = knob(unit="s")  # of the way-points, first 0, increasing
+    times_s: _Times = knob(unit="s")  # times of the way-points, increasing from 0
     offsets_deg: Annotated[
         tuple[Annotated[tuple[Angle, ...], Field(max_length=64)], ...],
         Field(max_length=_MOST_WAYPOINTS),
-    ] = knob(unit="°")  # one row for each time; metres for sliding joints
-    speed: float = knob(1.0, least=1e-3, upto=1e3)  # the times are divided by it
+    ] = knob(unit="°")  # one row for each time; m for prismatic joints
+    speed: float = knob(1.0, least=1e-3, upto=1e3)  # speed factor; the times are divided by it
 
     def __post_init__(self) -> None:
         self._check("offsets_deg")

@@ -11,9 +11,11 @@ from vergence.vision.curves.line_tracker import LineTracker, lines_through
 class LineTracking:
     """Follows straight edges, each given by two points on it; see `LineTracker`."""
 
-    reach_px: float = knob(20.0, "px", least=4, upto=200)  # a line moves no more between images
-    length_px: float = knob(240.0, "px", least=32, upto=1e4)  # of each line, that is looked at
-    contrast: float = knob(15.0, least=3, upto=255)  # least step across a line, grey values
+    reach_px: float = (
+        knob(20.0, "px", least=4, upto=200)  # largest motion of a line between two images
+    )
+    length_px: float = knob(240.0, "px", least=32, upto=1e4)  # length of each line that is searched
+    contrast: float = knob(15.0, least=3, upto=255)  # smallest step across a line, in grey levels
 
     def start(self, image: ImageArray, points_px: FloatArray) -> LineTracker:
         """Return the tracker of the lines through pairs of points.

@@ -11,7 +11,7 @@ from vergence.vision.curves.rings import joined_rings, resampled, rings_of, sign
 class RegionTracking:
     """Follows a region that is lighter or darker than all around it; see `RegionTracker`."""
 
-    holes: bool = knob(True)  # whether holes are cut out of it
+    holes: bool = knob(True)  # whether to track holes
 
     def start(self, image: ImageArray, points_px: FloatArray) -> RegionTracker:
         """Return the tracker of the region around one place, or within a rough outline.

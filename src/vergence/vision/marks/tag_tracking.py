@@ -14,9 +14,12 @@ from vergence.vision.tracks import PointTracker, Tracks, nothing_found
 class TagTracking:
     """Follows corners of markers by the markers' numbers, so that none is taken for another."""
 
-    dictionary: str = knob("apriltag_36h11")  # of the markers, such as aruco_4x4_50
-    noise_px: float = knob(0.05, "px", above=0, upto=100)  # least deviation of a found corner
-    away_px: float = knob(10.0, "px", above=0, upto=1e4)  # of a point from its corner at the start
+    dictionary: str = knob("apriltag_36h11")  # dictionary of the markers, such as aruco_4x4_50
+    noise_px: float = knob(0.05, "px", above=0, upto=100)  # smallest standard deviation of a corner
+    away_px: float = (
+        knob(10.0, "px", above=0, upto=1e4)  # largest initial distance between a point and its
+        # corner
+    )
 
     def __post_init__(self) -> None:
         MarkerDetector(self.dictionary)  # which names those that are known
