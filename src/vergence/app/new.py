@@ -53,9 +53,9 @@ _TARGET = """<!-- {name}, speckled so that features are found on it. Its frame i
 </mujoco>
 """
 
-_CELL = """# A first cell for {model_name}: a camera on {body} keeps its place
-# before a {what} that wanders. Start, mounting and {what} were placed by `vergence new`; the arm's
-# accelerations and the camera are guesses, to be replaced by your own.
+_CELL = """# A first cell for {model_name}: a camera on {body} keeps its pose relative to
+# a moving {what}. `vergence new` chose start, mounting and {what}; the arm's accelerations and the
+# camera are guesses, to be replaced with your own values.
 name = "{name}"
 duration_s = 10.0
 
@@ -63,18 +63,18 @@ duration_s = 10.0
 model = "{model}"
 body = "{body}"  # the arm's last body
 position_m = [0.0, 0.0, {height}]  # of its base
-start_deg = {start}  # metres for sliding joints
-rate_max_deg_s = {rates}  # {rates_from}; m/s for sliding joints
+start_deg = {start}  # metres for prismatic joints
+rate_max_deg_s = {rates}  # {rates_from}; m/s for prismatic joints
 acceleration_max_deg_s2 = {accelerations}  # a guess: see the robot's manual
 
 [cameras.wrist]
 arm = "arm"
-position_m = {camera_m}  # in the last body: z looks ahead, x right, y down
+position_m = {camera_m}  # in the last body; z points forward, x right, y down
 rotation_rpy_deg = {camera_rpy}
-radius_m = 0.03  # of a ball around it that must touch nothing
+radius_m = 0.03  # of a sphere around it, for collision checks
 {lens}
 rate_hz = 30.0
-latency_frames = 1  # from exposure until the image arrives
+latency_frames = 1  # delay from exposure to arrival
 
 [collision]
 avoid = ["self", "fixtures"]  # the arm's own links, the scene; also "arms", "target"
@@ -101,8 +101,8 @@ feature_count = 4  # picked in the first image
 kind = "image_based"  # joint limits, view and singularities are kept by the default solver
 gain = 3.0
 
-# The same cell on the robot: put in its driver and camera, remove the "# " of the lines below, then
-#   vergence check {name} --driver ur   looks at clocks, joints, images; nudges each joint
+# The same cell on the robot: uncomment the lines below, enter its driver and camera, then run
+#   vergence check {name} --driver ur   checks clocks, joints and images, then moves each joint a little
 #   vergence run {name} --driver ur     moves the robot
 # Drivers: {drivers}; your own is "my_robot:Driver", from my_robot.py beside this file.
 # [driver]

@@ -197,7 +197,8 @@ class TrackTable(TaskTable):
     )
     tracker: Part = "ssd"  # tracker of the features
     approach: Literal["direct", "auto"] = (
-        "direct"  # auto: along a planned path to stated `desired` points, where they can be planned
+        "direct"  # auto: follow a planned path to the `desired` points if they are given and a path
+        # exists
     )
     tool: ToolTable | None = None  # tool to be kept in place in the image of a second, fixed camera
     tolerance_px: Pixels = 1.0  # an arm at rest with a larger mean error has not reached its goal
