@@ -102,7 +102,7 @@ kind = "image_based"  # joint limits, view and singularities are kept by the def
 gain = 3.0
 
 # The same cell on the robot: uncomment the lines below, enter its driver and camera, then run
-#   vergence check {name} --driver ur   checks clocks, joints and images, then moves each joint a little
+#   vergence check {name} --driver ur   checks clocks and images, then each joint by a small move
 #   vergence run {name} --driver ur     moves the robot
 # Drivers: {drivers}; your own is "my_robot:Driver", from my_robot.py beside this file.
 # [driver]

@@ -34,41 +34,48 @@ _AHEAD_S = 0.02  # that a trajectory goes on before it brakes, at least
 class Ros2:
     """A robot behind ROS 2: joint states and images in, commands of its arm controller out."""
 
-    address: str = "/usr/bin/python3"  # the Python that has rclpy
+    address: str = "/usr/bin/python3"  # Python interpreter that has rclpy
     command: Literal["trajectory", "velocity", "position", "twist"] = "trajectory"  # see the guide
-    command_topic: str = ""  # of the arm's controller; the usual one of `command` if empty
-    joint_states: str = "/joint_states"  # topic; the stamps are the driver's clock
-    joints: tuple[str, ...] = ()  # their names there, one a joint; those of the model if absent
+    command_topic: str = ""  # topic of the arm's controller; the usual one for command if empty
+    joint_states: str = (
+        "/joint_states"  # topic of the joint states; their time stamps are the driver's clock
+    )
+    joints: tuple[str, ...] = ()  # joint names in ROS, one per joint; those of the model if absent
     images: dict[str, str] = field(
         default_factory=dict
-    )  # topic by camera name; /NAME/image_raw if absent
+    )  # image topics by camera name; /NAME/image_raw if absent
     mountings: dict[str, tuple[str, str]] = field(
         default_factory=dict
     )  # by camera, TF's names of what carries it and of its optical frame; else the cell's is used
-    image_latency_s: float = knob(
-        0.0, "s", least=0.0, upto=2.0
-    )  # from exposure to an image's stamp
-    running: str = ""  # topic of a Bool, false while the robot takes no commands
+    image_latency_s: float = (
+        knob(0.0, "s", least=0.0, upto=2.0)  # delay from exposure to an image's time stamp
+    )
+    running: str = ""  # topic of a Bool that is false while the robot accepts no commands
     start: str = ""  # service Trigger that is called before a run, such as to play a program
     stop: str = ""  # service Trigger that is called after it, once the arm is braked
-    speed_scale: str = ""  # topic of a Float64, in percent
+    speed_scale: str = ""  # topic of a Float64 with the speed scaling in percent
     twist_frame: str = ""  # of `twist`: TF's name of the cell's camera, the end effector of Servo
-    position_gain: float = knob(
-        4.0, "1/s", least=0.0, upto=20.0
-    )  # of `velocity` and `twist`: pulls the joints to the set-points
-    outputs: dict[str, str] = field(
-        default_factory=dict
-    )  # topic by name, of Bool, Float64 or Float64MultiArray; or a service SetBool
-    output_values: dict[str, tuple[float, float]] = field(
-        default_factory=dict
-    )  # by name, what a topic of numbers is told at 0 and at 1; 0 and 1 if absent
-    watchdog_s: float = knob(
-        0.25, "s", least=0.02, upto=10.0
-    )  # without a set-point, the bridge brakes an arm that moves
-    timeout_s: float = knob(
-        0.5, "s", above=0.0, upto=10.0
-    )  # without joint states, the robot is silent
-    connect_s: float = knob(10.0, "s", above=0.0, upto=600.0)  # for topics that are starting
+    position_gain: float = (
+        knob(4.0, "1/s", least=0.0, upto=20.0)  # for `velocity` and `twist`: gain of the position
+        # feedback to the set-points
+    )
+    outputs: dict[str, str] = (
+        field(default_factory=dict)  # by name: topic of Bool, Float64 or Float64MultiArray, or a
+        # SetBool service
+    )
+    output_values: dict[str, tuple[float, float]] = (
+        field(default_factory=dict)  # by name: numbers to publish for the values 0 and 1; 0 and 1
+        # if absent
+    )
+    watchdog_s: float = (
+        knob(0.25, "s", least=0.02, upto=10.0)  # time without a set-point after which the bridge
+        # brakes the arm
+    )
+    timeout_s: float = (
+        knob(0.5, "s", above=0.0, upto=10.0)  # time without joint states after which the robot
+        # counts as silent
+    )
+    connect_s: float = knob(10.0, "s", above=0.0, upto=600.0)  # time to wait for topics to start
 
     def open(self, equipment: Equipment) -> Driver:
         """Start the bridge and wait for the robot's topics; nothing moves before a set-point."""

@@ -32,18 +32,28 @@ class Ur:
 
     package: ClassVar[tuple[str, str]] = "rtde_control", "ur"  # a module, and the extra that has it
 
-    address: str  # of the controller, such as 192.168.1.10
-    command: Literal["speedj", "servoj"] = "speedj"  # joint speeds, or joint positions
-    rate_hz: float = knob(500.0, "Hz", least=50.0, upto=500.0)  # 125 for a CB-series controller
-    position_gain: float = knob(
-        4.0, "1/s", least=0.0, upto=20.0
-    )  # of `speedj`: pulls the joints to the set-points
-    lookahead_s: float = knob(0.05, "s", least=0.03, upto=0.2)  # of `servoj`: smooths its motion
-    servo_gain: int = knob(300, least=100, upto=2000)  # of `servoj`
-    watchdog_hz: float = knob(
-        10.0, "Hz", least=2.0, upto=100.0
-    )  # the robot stops if set-points come less often
-    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)  # the robot's clock may stand so long
+    address: str  # address of the controller, such as 192.168.1.10
+    command: Literal["speedj", "servoj"] = "speedj"  # speedj: joint speeds; servoj: joint positions
+    rate_hz: float = (
+        knob(500.0, "Hz", least=50.0, upto=500.0)  # rate of set-points; 125 for a CB-series
+        # controller
+    )
+    position_gain: float = (
+        knob(4.0, "1/s", least=0.0, upto=20.0)  # for `speedj`: gain of the position feedback to
+        # the set-points
+    )
+    lookahead_s: float = (
+        knob(0.05, "s", least=0.03, upto=0.2)  # for `servoj`: look-ahead time, smooths the motion
+    )
+    servo_gain: int = knob(300, least=100, upto=2000)  # for `servoj`: gain
+    watchdog_hz: float = (
+        knob(10.0, "Hz", least=2.0, upto=100.0)  # the robot stops if set-points arrive at a lower
+        # rate
+    )
+    timeout_s: float = (
+        knob(0.5, "s", above=0.0, upto=10.0)  # longest time that the robot's clock may stand
+        # still
+    )
     outputs: dict[str, _DigitalOutput] = field(
         default_factory=dict
     )  # by name: standard 0 to 7, configurable 0 to 7, tool 0 or 1
