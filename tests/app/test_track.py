@@ -15,6 +15,7 @@ from vergence.arrays import FloatArray
 from vergence.geometry import quaternion_to_matrix, se3, so3_exp
 
 sys.path.append(str(Path(__file__).parents[1] / "vision_known"))
+from ball_scene import RADIUS, ball_place, colored_clutter, drawn_ball
 from known_scene import CAMERA, OBJ, clutter, drawn_image, pose, pose_error
 
 RATE_HZ = 25.0
@@ -128,7 +129,7 @@ def test_an_object_that_goes_is_lost_with_a_reason(
     answer = json.loads(capsys.readouterr().out)
     assert answer["outcome"]["kind"] == "target lost"
     assert answer["outcome"]["reason"].startswith("last seen at 0.44 s; ")
-    assert "of the edges expected were found" in answer["outcome"]["reason"]
+    assert "of edges expected found" in answer["outcome"]["reason"]
     lines = (tmp_path / "here" / "poses.jsonl").read_text().splitlines()
     records = [json.loads(line) for line in lines]
     assert [r["sighting"] for r in records[:12]] == ["seen"] * 12
@@ -201,7 +202,7 @@ def test_points_found_by_hand_are_a_start(track: Track, tmp_path: Path) -> None:
     [
         ({"images": "nowhere"}, "nowhere: no such folder or file"),
         ({"model": "gone.obj"}, "gone.obj: no such file"),
-        ({"model": "flat.obj"}, "no corner"),
+        ({"by": "corners"}, "corners"),
         ({"camera": "gone.toml"}, "gone.toml: no such file"),
         ({"camera": "small.toml"}, "small.toml: width: given 640; allowed: 320"),
         ({"camera": "typo.toml"}, "did you mean fx"),
@@ -225,10 +226,6 @@ def test_points_found_by_hand_are_a_start(track: Track, tmp_path: Path) -> None:
 def test_bad_input_is_named_with_what_is_allowed(
     track: Track, tmp_path: Path, capsys: object, options: dict[str, object], words: str
 ) -> None:
-    disc = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 60, endpoint=False)]
-    rim = "".join(f"v {x} {y} 0\n" for x, y in disc)
-    fan = "".join(f"f 1 {k} {k + 1}\n" for k in range(2, 60))
-    (tmp_path / "flat.obj").write_text(rim + fan)
     (tmp_path / "small.toml").write_text("width=640\nheight=480\nfx=300\nfy=300\ncx=9\ncy=9\n")
     (tmp_path / "typo.toml").write_text("fxx=300\nfy=300\ncx=9\ncy=9\n")
     (tmp_path / "aside.toml").write_text("fx=300\nfy=300\ncx=900\ncy=9\n")
@@ -243,3 +240,28 @@ def test_bad_input_is_named_with_what_is_allowed(
     cv2.imwrite(str(tmp_path / "nan" / "a.tiff"), np.full((240, 320), np.nan, np.float32))
     assert track(out="here", **options) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_round_object_is_followed_by_its_outline(
+    track: Track, tmp_path: Path, capsys: object
+) -> None:
+    rng = np.random.default_rng(2)
+    (tmp_path / "round").mkdir()
+    (tmp_path / "ball.xml").write_text(
+        f"<mujoco><worldbody><geom size='{RADIUS}'/></worldbody></mujoco>"
+    )
+    ground = colored_clutter(rng)
+    for k in range(8):
+        cv2.imwrite(str(tmp_path / "round" / f"{k}.png"), drawn_ball(ball_place(k), rng, ground))
+    start = ",".join(f"{value:.4f}" for value in ball_place(0) + 0.002) + ",0,0,0"
+    options = {"model": tmp_path / "ball.xml", "start": start, "images": tmp_path / "round"}
+    assert track("--json", out="here", **options) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["seen"] == 8
+    assert answer["unseen_turns"] == "no turn of it shows in its outline"
+    assert answer["last"]["position_m"] == pytest.approx(ball_place(7), abs=2e-3)
+    assert np.sqrt(np.diag(answer["last"]["covariance"])[3:]) == pytest.approx(np.pi / np.sqrt(3))
+    grey = cv2.imread(str(tmp_path / "round" / "3.png"), cv2.IMREAD_GRAYSCALE)
+    cv2.imwrite(str(tmp_path / "round" / "3.png"), grey)
+    assert track(out="there", **options) == 2
+    assert "a grey image; allowed: colour" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from known_scene import HALF, OBJ, SIGNS, box_model
 from vergence.arrays import FloatArray
 from vergence.errors import InputError
 from vergence.vision.known_object import ObjectModel, load_object_model, object_model_of
-from vergence.vision.known_object.primitives import cylinder
+from vergence.vision.known_object.primitives import capsule, cylinder, ellipsoid
 
 BOX_XML = (
     "<mujoco><worldbody><body name='b' pos='1 2 3' euler='10 20 30'>{}</body></worldbody></mujoco>"
@@ -113,9 +113,20 @@ def test_vertices_at_one_place_are_one() -> None:
 
 
 def test_the_rims_of_a_cylinder_are_sharp_but_have_no_corners() -> None:
+    model = ObjectModel.from_mesh("can", *cylinder(0.03, 0.05))
+    assert (len(model.edges), len(model.corners)) == (96, 0)
     with pytest.raises(InputError, match="no corner") as error:
-        ObjectModel.from_mesh("can", *cylinder(0.03, 0.05))
+        model.with_corners()
     assert "96 sharp edges" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "mesh", [cylinder(0.03, 0.05), ellipsoid((0.1, 0.1, 0.05)), capsule(0.02, 0.1)]
+)
+def test_round_primitives_are_closed_and_face_outward(mesh: tuple[np.ndarray, np.ndarray]) -> None:
+    model = ObjectModel.from_mesh("round", *mesh)
+    assert model.closed
+    assert (np.einsum("fi,fi->f", model.surface.mean(axis=1), model.normals) > 0.0).all()
 
 
 def test_parts_of_a_model_stay_together(tmp_path: Path) -> None:
@@ -138,9 +149,9 @@ def test_parts_of_a_model_stay_together(tmp_path: Path) -> None:
         ("broken.obj", "v 0 0\nf 1 2 3\n", "geometry that MuJoCo reads"),
         ("broken.xml", "<mujoco><nonsense/></mujoco>", "a model that MuJoCo reads"),
         (
-            "round.xml",
-            "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
-            "box or cylinder",
+            "flat.xml",
+            "<mujoco><worldbody><geom type='plane' size='1 1 1'/></worldbody></mujoco>",
+            "one of mesh, box, cylinder",
         ),
     ],
 )

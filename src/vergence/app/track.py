@@ -13,8 +13,9 @@ from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from vergence.app.options import TrackOptions
-    from vergence.app.tracking.follower import ObjectFollower, Step
+    from vergence.app.tracking.follower import FollowRule, ObjectFollower, ObjectTracker, Step
     from vergence.app.tracking.footage import Footage, FootageFrame
+    from vergence.arrays import ImageArray
     from vergence.camera import Camera
     from vergence.vision.known_object import ObjectModel
 
@@ -34,8 +35,9 @@ class Tracked(NamedTuple):
     seen: int
     last: "Step"
     deviation_max_m: float  # largest standard deviation of the position while seen
-    deviation_max_rad: float
+    deviation_max_rad: float  # but for turns that no image shows
     median_ms: float  # an image, drawing and files left out
+    free: str  # which turns no image shows; empty if there are none
 
 
 def track(options: "TrackOptions") -> int:
@@ -48,10 +50,10 @@ def track(options: "TrackOptions") -> int:
     frames = footage.frames()
     first = next(frames)
     camera = _camera(options, first)
-    follower = _follower(options, model, camera, footage)
+    follower = _follower(options, model, camera, footage, first)
     folder = options.out or new_folder(f"track-{Path(options.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
-    run = _Run(folder, footage, model, camera, follower, options.overlay)
+    run = _Run(folder, footage, camera, follower, options.overlay)
     tracked = run.through(first, frames)
     files = run.files()
     if options.as_json:
@@ -77,30 +79,50 @@ def _camera(options: "TrackOptions", first: "FootageFrame") -> "Camera":
 
 
 def _follower(
-    options: "TrackOptions", model: "ObjectModel", camera: "Camera", footage: "Footage"
+    options: "TrackOptions",
+    model: "ObjectModel",
+    camera: "Camera",
+    footage: "Footage",
+    first: "FootageFrame",
 ) -> "ObjectFollower":
-    from vergence.app.tracking.follower import FollowRule, ObjectFollower
+    from vergence.app.tracking.follower import ObjectFollower
     from vergence.app.tracking.start import starting_pose
     from vergence.errors import InputError
-    from vergence.vision.known_object import EdgeTracker
 
     for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("vergence track", key, value, "a number above zero")
-    if not 0.2 <= options.share <= 1.0:
-        allowed = "0.2 … 1: with fewer of its edges an object is not told from its background"
-        raise InputError("vergence track", "--share", options.share, allowed)
-    start = starting_pose(options.start, camera)
-    tracker = EdgeTracker(model, contrast=options.contrast)
     share = options.share
-    usual = FollowRule()
-    rule = FollowRule(
-        jolt_px=options.jolt,
-        least_of_all=share,
-        least_share=min(usual.least_share, share + 0.07),
-        surprising_share=max(usual.surprising_share, share),
-    )
+    if share is not None and not 0.2 <= share <= 1.0:
+        allowed = "0.2 … 1: with less of it an object is not told from its background"
+        raise InputError("vergence track", "--share", share, allowed)
+    start = starting_pose(options.start, camera)
+    tracker, usual = _tracker(options, model, first)
+    rule = replace(usual, jolt_px=options.jolt)
+    if share is not None:
+        rule = replace(
+            rule,
+            least_of_all=share,
+            least_share=min(usual.least_share, share + 0.07),
+            surprising_share=max(usual.surprising_share, share),
+        )
     return ObjectFollower(tracker, camera, start, 0.0, 1.0 / footage.rate_hz, rule)
+
+
+def _tracker(
+    options: "TrackOptions", model: "ObjectModel", first: "FootageFrame"
+) -> "tuple[ObjectTracker, FollowRule]":
+    """Return what measures the object, chosen by its model, and when an image counts."""
+    from vergence.app.options.track import Modality
+    from vergence.app.tracking.follower import OUTLINE_RULE, FollowRule
+    from vergence.vision.known_object import EdgeTracker, SilhouetteTracker, shown_by_edges
+
+    by_edges = options.by is Modality.EDGES or (
+        options.by is Modality.AUTO and shown_by_edges(model)
+    )
+    if by_edges:
+        return EdgeTracker(model, contrast=options.contrast), FollowRule()
+    return SilhouetteTracker(model, 1 if first.color is None else 3), OUTLINE_RULE
 
 
 class _Run:
@@ -110,7 +132,6 @@ class _Run:
         self,
         folder: Path,
         footage: "Footage",
-        model: "ObjectModel",
         camera: "Camera",
         follower: "ObjectFollower",
         overlay: bool,
@@ -119,7 +140,7 @@ class _Run:
         from vergence.app.tracking.results import PoseFiles
 
         self._folder, self._footage, self._overlay = folder, footage, overlay
-        self._model, self._camera, self._follower = model, camera, follower
+        self._camera, self._follower = camera, follower
         self._poses = PoseFiles(folder)
         self._film = Film(folder / "overlay.webm", footage.rate_hz)
         self._key_frames: list[Path] = []
@@ -147,7 +168,7 @@ class _Run:
         with progress, self._poses as poses, self._film:
             for number, frame in enumerate(chain((first,), rest)):
                 began = perf_counter()
-                step = self._follower.follow(frame.image, frame.time)
+                step = self._follower.follow(self._image(frame), frame.time)
                 took.append(perf_counter() - began)
                 poses.add(Path(frame.name).name, step)
                 self._draw(number, frame, step, steps[-1] if steps else None)
@@ -156,7 +177,17 @@ class _Run:
                 if step.sighting is Sighting.LOST:
                     break
             self._key_frame(len(steps) - 1, frame, step)
-        return _summary(steps, took)
+        return _summary(steps, took, self._follower.tracker.free)
+
+    def _image(self, frame: "FootageFrame") -> "ImageArray":
+        """Return the image as the tracker takes it."""
+        from vergence.errors import InputError
+
+        if not self._follower.in_color:
+            return frame.image
+        if frame.color is None:
+            raise InputError(frame.name, "", "a grey image", "colour, as the first image")
+        return frame.color
 
     def _draw(
         self, number: int, frame: "FootageFrame", step: "Step", before: "Step | None"
@@ -164,7 +195,9 @@ class _Run:
         from vergence.app.tracking.drawing import draw_step
 
         if self._overlay:
-            self._film.add(draw_step(frame.image, step, self._model, self._camera))
+            self._film.add(
+                draw_step(self._image(frame), step, self._follower.tracker, self._camera)
+            )
         spacing = max(1, (self._footage.count or 600) // _KEY_FRAMES)
         changed = before is not None and before.sighting is not step.sighting
         if number % spacing == 0 or changed:
@@ -179,25 +212,25 @@ class _Run:
         if not self._overlay or path in self._key_frames:
             return
         if len(self._key_frames) < _MOST_KEY_FRAMES:
-            canvas = draw_step(frame.image, step, self._model, self._camera)
+            canvas = draw_step(self._image(frame), step, self._follower.tracker, self._camera)
             path.write_bytes(bytes(cv2.imencode(".jpg", canvas)[1]))
             self._key_frames.append(path)
 
 
-def _summary(steps: "list[Step]", took: list[float]) -> Tracked:
+def _summary(steps: "list[Step]", took: list[float], free: str) -> Tracked:
     from vergence.app.tracking.follower import Sighting
 
     seen = [step for step in steps if step.sighting is Sighting.SEEN]
-    deviations = np.array([np.sqrt(np.diag(step.covariance)[:6]) for step in seen])
-    widest = deviations.max(axis=0) if seen else np.full(6, np.nan)
+    widest = np.max([step.deviation for step in seen], axis=0) if seen else np.full(2, np.nan)
     return Tracked(
         _outcome(steps),
         len(steps),
         len(seen),
         steps[-1],
-        float(widest[:3].max()),
-        float(widest[3:].max()),
+        float(widest[0]),
+        float(widest[1]),
         float(np.median(took)) * 1e3,
+        free,
     )
 
 
@@ -238,6 +271,7 @@ def _answer(
         "position_deviation_max_m": tracked.deviation_max_m,
         "rotation_deviation_max_deg": float(np.rad2deg(tracked.deviation_max_rad)),
         "median_ms": tracked.median_ms,
+        "unseen_turns": tracked.free or None,
         "last": pose_record(tracked.last),
         "run": folder,
         **files,
@@ -251,6 +285,8 @@ def _tell(tracked: Tracked, files: Mapping[str, Any], folder: Path) -> None:
         f"{1e3 * tracked.deviation_max_m:.2g} mm, {np.rad2deg(tracked.deviation_max_rad):.2g}° · "
         f"{tracked.median_ms:.1f} ms an image"
     )
+    if tracked.free:
+        say(f"  {tracked.free}; its standard deviation is that of an unknown angle, 104°")
     say(f"  poses    {files['poses']}  (with covariances: {files['poses_with_covariance'].name})")
     if files["overlay"]:
         say(f"  overlay  {files['overlay']}")

@@ -63,7 +63,7 @@ def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
 
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
-    return object_model_of(model.model, "target")
+    return object_model_of(model.model, "target").with_corners()
 
 
 def follow_pose(

@@ -71,3 +71,18 @@ def grey_levels(values: np.ndarray, white: float) -> ImageArray:
         return np.ascontiguousarray(values)
     scaled: Any = np.rint(values * np.float32(255.0 / white))
     return np.ascontiguousarray(np.clip(scaled, 0.0, 255.0), dtype=np.uint8)
+
+
+def color_levels(raw: np.ndarray, white: float) -> ImageArray | None:
+    """Return the colours of an image as bytes, (height, width, 3) blue, green, red.
+
+    Args:
+        raw: as OpenCV reads it; what `grey_values` takes.
+        white: the value that is white, of all channels.
+
+    Returns:
+        None if the image is grey.
+    """
+    if raw.ndim != 3 or raw.shape[2] not in _COLOUR:
+        return None
+    return grey_levels(np.ascontiguousarray(raw[:, :, :3]), white)

@@ -2,19 +2,34 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from vergence.arrays import ImageArray
-from vergence.camera.grey_levels import grey_levels, grey_values, white_level
+from vergence.camera.grey_levels import color_levels, grey_levels, grey_values, white_level
 from vergence.camera.image_file import read_image_file
 from vergence.errors import InputError
 
 _SAMPLED = 8  # images that tell how deep all are
 
 
+class LeveledImage(NamedTuple):
+    """An image on the scale of its folder."""
+
+    file: Path
+    grey: ImageArray  # (height, width)
+    color: ImageArray | None  # (height, width, 3) blue, green, red; None of a grey file
+
+
 def grey_images(files: Sequence[Path]) -> Iterator[tuple[Path, ImageArray]]:
-    """Yield images one by one, all of one size, their grey levels by one scale.
+    """Yield the grey levels of `leveled_images`."""
+    for image in leveled_images(files):
+        yield image.file, image.grey
+
+
+def leveled_images(files: Sequence[Path]) -> Iterator[LeveledImage]:
+    """Yield images one by one, all of one size, their levels by one scale.
 
     The scale is that of the brightest of some images throughout the folder. An image that is
     brighter still raises it from there on.
@@ -24,11 +39,12 @@ def grey_images(files: Sequence[Path]) -> Iterator[tuple[Path, ImageArray]]:
     """
     first, white = None, _white(files)
     for file in files:
-        values = grey_values(read_image_file(file), str(file))
+        raw = read_image_file(file)
+        values = grey_values(raw, str(file))
         first = values if first is None else first
         require_like(values, first, str(file))
         white = white_level(values, white)
-        yield file, grey_levels(values, white)
+        yield LeveledImage(file, grey_levels(values, white), color_levels(raw, white))
 
 
 def require_like(values: np.ndarray, first: np.ndarray, name: str) -> None:

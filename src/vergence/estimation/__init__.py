@@ -27,6 +27,13 @@ from vergence.estimation.self_calibration import SelfCalibration, SelfCalibrator
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.tracked_points import TrackedPoints
+from vergence.estimation.unseen_turns import (
+    shown_covariance,
+    told_covariance,
+    with_unknown,
+    with_unseen,
+    without_unseen,
+)
 from vergence.estimation.view import Exposure, Seen, View, view_of
 from vergence.estimation.visibility import (
     Blocked,
@@ -80,7 +87,12 @@ __all__ = [
     "pose_from_points",
     "predict_visibility",
     "seen_from_tip",
+    "shown_covariance",
+    "told_covariance",
     "view_of",
+    "with_unknown",
+    "with_unseen",
+    "without_unseen",
     "SelfCalibration",
     "SelfCalibrator",
     "WithMeasuredDepth",

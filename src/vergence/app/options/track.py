@@ -1,12 +1,21 @@
 """The options of `vergence track`."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vergence.app.options.shared import Json, Out
+
+
+class Modality(StrEnum):
+    """What of an object is followed."""
+
+    AUTO = "auto"
+    EDGES = "edges"
+    OUTLINE = "outline"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +64,19 @@ class TrackOptions:
         float, typer.Option(help="Unpredicted motion to allow for, in pixels per image.")
     ] = 3.0
     share: Annotated[
-        float, typer.Option(help="Fraction of the edges that must be found for an image to count.")
-    ] = 0.5
+        float | None,
+        typer.Option(
+            help="Fraction of the edges, or of the outline, that must be found for an image to "
+            "count. Default: 0.5 of edges, 0.35 of an outline."
+        ),
+    ] = None
+    by: Annotated[
+        Modality,
+        typer.Option(
+            help="What is followed: sharp edges, or the outline by its colours. Default: edges "
+            "where most of the outline runs along them."
+        ),
+    ] = Modality.AUTO
     overlay: Annotated[
         bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
     ] = True

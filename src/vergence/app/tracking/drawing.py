@@ -4,28 +4,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.overlay import DESIRED, FOUND, LOST
-from vergence.app.tracking.follower import Sighting, Step
+from vergence.app.tracking.follower import ObjectTracker, Sighting, Step
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
-from vergence.vision.known_object import ObjectModel
+from vergence.vision.known_object import ObjectModel, SilhouetteTracker
 from vergence.vision.known_object.edge_samples import sample_edges
+from vergence.vision.known_object.silhouette import outline_of
 
 _SHIFT = 4  # fractional bits of a place
 _PLACES = 60  # along an edge: where it comes out from behind something
+_BESIDE_PX = 4.0  # places on one outline
 _AXES = ((0, 0, 230), (0, 180, 0), (230, 80, 0))  # x red, y green, z blue
 _COLORS = {Sighting.SEEN: FOUND, Sighting.PREDICTED: DESIRED, Sighting.LOST: LOST}
 
 
 def draw_step(
-    image: ImageArray, step: Step, model: ObjectModel, camera: Camera
+    image: ImageArray, step: Step, tracker: ObjectTracker, camera: Camera
 ) -> NDArray[np.uint8]:
-    """Return the image in colour with the object's visible edges and axes over it.
+    """Return the image in colour with the object's outline or visible edges, and axes, over it.
 
     Args:
-        image: (height, width) grey.
+        image: (height, width) grey, or (height, width, 3).
         step: what was made of it.
-        model: the object.
+        tracker: what measured the object.
         camera: the camera's model.
 
     Returns:
@@ -33,10 +35,12 @@ def draw_step(
     """
     import cv2
 
-    canvas = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-    T = np.ascontiguousarray(step.T_camera_target)
+    grey = image.ndim == 2
+    canvas = np.array(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if grey else image, dtype=np.uint8)
+    T, model = np.ascontiguousarray(step.T_camera_target), tracker.model
     if T[2, 3] > 0.0:
-        _edges(canvas, T, model, camera, _COLORS[step.sighting])
+        draw = _outline if isinstance(tracker, SilhouetteTracker) else _edges
+        draw(canvas, T, model, camera, _COLORS[step.sighting])
         _axes(canvas, T, 0.25 * model.size, camera)
     for place, found in zip(step.samples_px, step.samples_found, strict=True):
         if not found:
@@ -64,6 +68,25 @@ def _edges(
     for n in np.flatnonzero(along):
         ends = _fixed(seen.points_px[n]), _fixed(seen.points_px[n + 1])
         cv2.line(canvas, *ends, color, 1, cv2.LINE_AA, _SHIFT)
+
+
+def _outline(
+    canvas: NDArray[np.uint8],
+    T: FloatArray,
+    model: ObjectModel,
+    camera: Camera,
+    color: tuple[int, ...],
+) -> None:
+    import cv2
+
+    closed = False  # faces seen from behind change nothing, and cost little here
+    seen = outline_of(T, pack_lens(camera), model.vertices, model.triangles, closed, 10**6)
+    if seen is None:
+        return
+    apart = np.linalg.norm(np.diff(seen.points_px, axis=0), axis=1)
+    for n in np.flatnonzero(apart < _BESIDE_PX):
+        ends = _fixed(seen.points_px[n]), _fixed(seen.points_px[n + 1])
+        cv2.line(canvas, *ends, color, 2, cv2.LINE_AA, _SHIFT)
 
 
 def _axes(canvas: NDArray[np.uint8], T: FloatArray, length: float, camera: Camera) -> None:

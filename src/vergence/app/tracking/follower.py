@@ -2,19 +2,100 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any, Protocol
 
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation import Belief, PoseFilter, Verdict, view_of
+from vergence.estimation import (
+    Belief,
+    PoseFilter,
+    Verdict,
+    shown_covariance,
+    told_covariance,
+    view_of,
+    with_unknown,
+    with_unseen,
+    without_unseen,
+)
 from vergence.geometry import so3_log
 from vergence.signals import ImagePoints
-from vergence.vision.known_object import EdgeMeasurement, EdgeMemory, EdgeTracker
+from vergence.vision.known_object import ObjectModel
 
 CAMERA = "camera"
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
+
+
+class Measurement(Protocol):
+    """What an image says about an object, in the form of points that a filter takes."""
+
+    points: FloatArray  # (M, 3) object's frame, m
+    points_px: FloatArray  # (M, 2)
+    covariance_px: FloatArray  # (M, 2, 2) px²
+    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
+    expected: int  # places that should be seen
+    usual: float  # share found, each place weighing as often as it was found of late
+    samples_px: FloatArray  # (N, 2) the places looked at
+    samples_found: np.typing.NDArray[np.bool_]  # (N,)
+
+    @property
+    def unseen(self) -> FloatArray:
+        """Motions (δp, δθ) that do not show, (6, K), along camera axes, m and rad."""
+        ...
+
+    @property
+    def shared(self) -> FloatArray:
+        """Covariance (6, 6) of the pose error that all images have in common."""
+        ...
+
+    @property
+    def share(self) -> float:
+        """How much of what should be seen was found, 0 … 1."""
+        ...
+
+
+class ObjectTracker(Protocol):
+    """Measures an object near where a pose predicts it: `EdgeTracker`, `SilhouetteTracker`."""
+
+    @property
+    def model(self) -> ObjectModel:
+        """The object."""
+        ...
+
+    @property
+    def free(self) -> str:
+        """Which turns no image shows; empty if there are none."""
+        ...
+
+    def free_motions(self, T_camera_target: FloatArray) -> FloatArray:
+        """Return the motions (δp, δθ) that no image shows, (6, K), along camera axes."""
+        ...
+
+    @property
+    def sought(self) -> str:
+        """What it looks for, for messages."""
+        ...
+
+    def blank(self) -> Any:
+        """Return the memory before the first image."""
+        ...
+
+    def measure(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        T_camera_target: FloatArray,
+        pose_covariance: FloatArray,
+        memory: Any,
+    ) -> Any:
+        """Return the `Measurement` of an image."""
+        ...
+
+    def remember(self, memory: Any, seen: Any) -> Any:
+        """Return the memory after an image that was believed."""
+        ...
 
 
 class Sighting(StrEnum):
@@ -35,7 +116,9 @@ class Step:
     T_camera_target: FloatArray  # (4, 4)
     velocity: FloatArray  # (6,) (v, ω) along camera axes, m/s and rad/s
     covariance: FloatArray  # (12, 12) of (δp, δθ, δv, δω) along camera axes, SI
-    share: float  # of the edges that should be seen, how much was found, 0 … 1
+    deviation: tuple[float, float]  # m and rad, largest, but for turns that do not show
+    unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
+    share: float  # of what should be seen, how much was found, 0 … 1
     samples_px: FloatArray  # (N, 2) the places looked at
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
 
@@ -45,10 +128,10 @@ class FollowRule:
     """When an image counts, and when the object is lost."""
 
     jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the image, per frame
-    least_share: float = 0.57  # of the edges usually found, to believe an image
-    least_of_all: float = 0.5  # of all the edges that should be seen
+    least_share: float = 0.57  # of what is usually found, to believe an image
+    least_of_all: float = 0.5  # of all that should be seen
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
-    least_lines: int = 3  # edges found, to believe an image
+    least_points: int = 6  # measured, to believe an image; an edge has two
     patience: int = 12  # images in a row without the object, after which it is lost
     turn_max_rad: float = (
         0.25  # standard deviation of the rotation beyond which the pose is unknown
@@ -56,11 +139,17 @@ class FollowRule:
     distance_max: float = 0.2  # and of the position, as a share of the distance
 
 
+# Lines across an outline are found or not each for itself, and half of it may be hidden.
+OUTLINE_RULE = FollowRule(
+    least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25
+)
+
+
 class ObjectFollower:
     """Follows an object from a starting pose.
 
     Args:
-        tracker: finds the object's edges.
+        tracker: finds the object's edges, or its outline.
         camera: the camera's model.
         T_camera_target: pose in the first image, (4, 4); may be rough, some 10 px.
         time: of the first image, s.
@@ -70,7 +159,7 @@ class ObjectFollower:
 
     def __init__(
         self,
-        tracker: EdgeTracker,
+        tracker: ObjectTracker,
         camera: Camera,
         T_camera_target: FloatArray,
         time: float,
@@ -89,11 +178,23 @@ class ObjectFollower:
         start = np.repeat(
             [3.0 * jolt, 3.0 * jolt / lever, 2.0 * jolt / period, 2.0 * jolt / lever / period], 3
         )
+        self._unseen = tracker.free_motions(T_camera_target)
         self._belief: Belief = self._filter.start(
-            time, T_camera_target, covariance=np.diag(start**2)
+            time, T_camera_target, covariance=with_unknown(np.diag(start**2), self._unseen)
         )
-        self._memory: EdgeMemory = tracker.blank()
+        self._memory = tracker.blank()
+        self._shared = np.zeros((6, 6))
         self._missed = 0
+
+    @property
+    def tracker(self) -> ObjectTracker:
+        """What measures the object."""
+        return self._tracker
+
+    @property
+    def in_color(self) -> bool:
+        """Whether images are to be in colour, (height, width, 3); else grey, (height, width)."""
+        return getattr(self._tracker, "channels", 1) == 3
 
     def follow(self, image: ImageArray, time: float) -> Step:
         """Look at the next image.
@@ -109,11 +210,11 @@ class ObjectFollower:
             seen, reason = again if not again[1] else (seen, reason)
         if not reason:
             view = view_of(_points(seen, time), self._camera, np.eye(4), seen.points)
-            update = self._filter.update(self._belief, view)
-            belief = update.belief
+            update = self._filter.update(without_unseen(belief, seen.unseen), view)
+            belief = with_unseen(belief, update.belief, seen.unseen)
             if update.verdict not in _USED:
                 reason = f"the image {update.verdict.value}"
-        self._belief = belief
+        self._belief, self._unseen, self._shared = belief, seen.unseen, seen.shared
         if not reason:
             self._missed = 0
             self._memory = self._tracker.remember(self._memory, seen)
@@ -128,7 +229,9 @@ class ObjectFollower:
             reason,
             belief.T_world_target,
             belief.velocity,
-            belief.honest_covariance,
+            told_covariance(belief, self._unseen, self._shared),
+            self._deviation(),
+            seen.unseen,
             seen.share,
             seen.samples_px,
             seen.samples_found,
@@ -136,40 +239,47 @@ class ObjectFollower:
 
     def _look(
         self, image: ImageArray, belief: Belief, T_camera_target: FloatArray
-    ) -> tuple[EdgeMeasurement, str]:
+    ) -> tuple[Measurement, str]:
         """Search around a pose; return what is seen, and why it is not to be believed."""
-        covariance = belief.honest_covariance[:6, :6]
-        seen = self._tracker.measure(image, self._camera, T_camera_target, covariance, self._memory)
+        covariance = shown_covariance(belief, self._unseen)[:6, :6]
+        seen: Measurement = self._tracker.measure(
+            image, self._camera, T_camera_target, covariance, self._memory
+        )
         return seen, self._doubt(belief, seen)
 
-    def _doubt(self, belief: Belief, seen: EdgeMeasurement) -> str:
+    def _doubt(self, belief: Belief, seen: Measurement) -> str:
         """Say why an image is not to be believed; empty if it is.
 
         The more an image surprises, the more of the object it has to show.
         """
-        rule = self._rule
+        rule, sought = self._rule, self._tracker.sought
         if not seen.expected:
             return "the object is outside the image"
         surprise = min(1.0, _surprise(belief, seen.T_camera_target) / _SURPRISING)
         for share, least, what in (
-            (seen.usual, rule.least_share, "the edges expected"),
-            (seen.share, rule.least_of_all, "all edges"),
+            (seen.usual, rule.least_share, f"{sought} expected"),
+            (seen.share, rule.least_of_all, f"all of {sought}"),
         ):
             needed = least + surprise * (rule.surprising_share - least)
             if share < needed:
-                return f"{share:.0%} of {what} were found; {needed:.0%} are needed"
-        if len(seen.points) < 2 * rule.least_lines:
-            return f"{len(seen.points) // 2} edges were found; {rule.least_lines} are needed"
+                return f"{share:.0%} of {what} found; {needed:.0%} needed"
+        if len(seen.points) < rule.least_points:
+            return f"{len(seen.points)} points of {sought} found; {rule.least_points} needed"
         return ""
+
+    def _deviation(self) -> tuple[float, float]:
+        """Return the largest deviation of the position, m, and of the turns that show, rad."""
+        P = shown_covariance(self._belief, self._unseen, self._shared)
+        deviation = np.sqrt(np.diag(P)[:6])
+        return float(deviation[:3].max()), float(deviation[3:].max())
 
     def _vague(self) -> str:
         """Say why the pose is too uncertain to be told; empty if it is not."""
-        deviation = np.sqrt(np.diag(self._belief.honest_covariance)[:6])
+        place, turn = self._deviation()
         distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
-        turn, place = float(deviation[3:].max()), float(deviation[:3].max())
         if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
             return (
-                f"the edges seen leave the pose open: {place:.3g} m and "
+                f"what is seen of {self._tracker.sought} leaves the pose open: {place:.3g} m and "
                 f"{np.rad2deg(turn):.2g} degrees of standard deviation"
             )
         return ""
@@ -187,7 +297,7 @@ def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:
     return float(error @ np.linalg.solve(belief.honest_covariance[:6, :6], error))
 
 
-def _points(seen: EdgeMeasurement, time: float) -> ImagePoints:
+def _points(seen: Measurement, time: float) -> ImagePoints:
     count = len(seen.points)
     return ImagePoints(
         CAMERA,

@@ -9,9 +9,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vergence.arrays import ImageArray
-from vergence.camera.grey_levels import grey_levels, grey_values, white_level
+from vergence.camera.grey_levels import color_levels, grey_levels, grey_values, white_level
 from vergence.camera.image_file import image_files, require_size
-from vergence.camera.image_folder import grey_images, require_like
+from vergence.camera.image_folder import leveled_images, require_like
 from vergence.errors import Absent, InputError
 from vergence.runtime.bags import COMPRESSED, IMAGE, Bag, is_bag
 
@@ -27,6 +27,7 @@ class FootageFrame(NamedTuple):
     name: str  # its file, or the video's with a number
     time: float  # s since the first
     image: ImageArray  # (height, width) grey
+    color: ImageArray | None = None  # (height, width, 3) blue, green, red; None if it has none
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +42,15 @@ class Footage:
     topic: str = ""  # of a bag
 
     def frames(self) -> Iterator[FootageFrame]:
-        """Yield the images, all of one size; those of a folder as `grey_images` does.
+        """Yield the images, all of one size; those of a folder as `leveled_images` does.
 
         Raises:
             InputError: if one cannot be read, is too large, or differs in size or depth from the
                 first.
         """
         if self.files:
-            for number, (file, image) in enumerate(grey_images(self.files)):
-                yield FootageFrame(str(file), number / self.rate_hz, image)
+            for number, (file, grey, color) in enumerate(leveled_images(self.files)):
+                yield FootageFrame(str(file), number / self.rate_hz, grey, color)
             return
         first = None
         source = _bag(self.path, self.topic) if self.topic else _video(self.path)
@@ -57,7 +58,8 @@ class Footage:
             values = grey_values(raw, name)
             first = values if first is None else first
             require_like(values, first, name)
-            yield FootageFrame(name, time, grey_levels(values, white_level(values)))
+            white = white_level(values)
+            yield FootageFrame(name, time, grey_levels(values, white), color_levels(raw, white))
 
 
 def open_footage(

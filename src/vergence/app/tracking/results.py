@@ -25,6 +25,7 @@ class PoseFiles:
 
     Poses are those of the object in the camera: z forward, x right, y down. The covariance is that
     of (δp, δθ), t + δp and exp(δθ) R, along the camera's axes, in m and rad.
+    Motions that do not show in the image have a large one, and are listed.
 
     Args:
         folder: where to.
@@ -77,4 +78,5 @@ def pose_record(step: Step) -> dict[str, Any]:
         "quaternion_wxyz": matrix_to_quaternion(np.ascontiguousarray(T[:3, :3])).tolist(),
         "velocity": step.velocity.tolist(),
         "covariance": step.covariance[:6, :6].tolist(),
+        "unseen_motions": step.unseen.T.tolist(),
     }

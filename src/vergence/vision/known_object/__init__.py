@@ -1,4 +1,4 @@
-"""A known rigid object: its geometry, its corners in windows, its edges from image to image."""
+"""A known rigid object: its geometry, corners in windows, edges or outline from image to image."""
 
 from vergence.vision.known_object.corner_extractor import (
     CornerExtractor,
@@ -8,7 +8,13 @@ from vergence.vision.known_object.corner_extractor import (
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement, EdgeMemory
 from vergence.vision.known_object.edge_tracker import EdgeTracker
 from vergence.vision.known_object.loading import load_object_model, object_model_of
+from vergence.vision.known_object.modality import shown_by_edges
 from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.silhouette_tracker import (
+    SilhouetteMeasurement,
+    SilhouetteTracker,
+)
+from vergence.vision.known_object.symmetry import FreeAxes, free_axes
 
 __all__ = [
     "CornerExtractor",
@@ -16,8 +22,13 @@ __all__ = [
     "EdgeMeasurement",
     "EdgeMemory",
     "EdgeTracker",
+    "FreeAxes",
     "ObjectModel",
+    "SilhouetteMeasurement",
+    "SilhouetteTracker",
+    "free_axes",
     "load_object_model",
     "object_model_of",
     "require_image",
+    "shown_by_edges",
 ]

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 from vergence.vision.known_object.pose_fit import PoseFit
@@ -50,6 +52,16 @@ class EdgeMeasurement(NamedTuple):
     fit: PoseFit
     samples: EdgeSamples
     steps: Steps
+
+    @property
+    def unseen(self) -> FloatArray:
+        """Motions that do not show, (6, 0): edges in several directions show all."""
+        return np.zeros((6, 0))
+
+    @property
+    def shared(self) -> FloatArray:
+        """Covariance (6, 6) of what all images have wrong alike: in that of the points already."""
+        return np.zeros((6, 6))
 
     @property
     def share(self) -> float:

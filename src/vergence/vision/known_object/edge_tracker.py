@@ -1,6 +1,7 @@
 """Follows the edges of a known object from image to image."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class EdgeTracker:
     bias_px: float = 0.25  # what does not average out along an edge: model, lens
 
     geometry: EdgeGeometry = field(init=False, repr=False, compare=False)  # of the model
+    free: ClassVar[str] = ""  # turns that no image shows: corners tell them all
+    sought: ClassVar[str] = "edges"
 
     def __post_init__(self) -> None:
         if not len(self.model.edges):
@@ -51,6 +54,10 @@ class EdgeTracker:
         model = self.model
         geometry = EdgeGeometry(model.edges, model.edge_normals, model.surface, _places(model))
         object.__setattr__(self, "geometry", geometry)
+
+    def free_motions(self, _T_camera_target: FloatArray) -> FloatArray:
+        """Return the motions that no image shows, (6, 0)."""
+        return np.zeros((6, 0))
 
     def blank(self) -> EdgeMemory:
         """Return the memory before the first image."""

@@ -9,11 +9,12 @@ import numpy as np
 from vergence.arrays import FloatArray, IntArray
 from vergence.errors import Absent, InputError
 from vergence.vision.known_object.object_model import SHARP_RAD, ObjectModel
-from vergence.vision.known_object.primitives import box, cylinder
+from vergence.vision.known_object.primitives import box, capsule, cylinder, ellipsoid
 
 MESHES = (".obj", ".stl")
 SCENES = (".xml", ".mjcf")
 SEEN_GROUPS = 3  # MuJoCo draws geoms of groups 0, 1, 2
+_SHAPES = ("mesh", "box", "cylinder", "sphere", "ellipsoid", "capsule")
 
 
 def load_object_model(
@@ -27,7 +28,7 @@ def load_object_model(
         sharp_rad: the angle between the normals of two faces from which on their edge is sharp.
 
     Raises:
-        InputError: if there is no such file, it cannot be read, or its geometry has no corners.
+        InputError: if there is no such file, it cannot be read, or nothing in it is drawn.
     """
     file = Path(path)
     kind = file.suffix.lower()
@@ -54,7 +55,7 @@ def object_model_of(model: Any, body: str, sharp_rad: float = SHARP_RAD) -> Obje
         sharp_rad: see `load_object_model`.
 
     Raises:
-        InputError: if there is no such body or its geometry has no corners.
+        InputError: if there is no such body or nothing of it is drawn.
     """
     import mujoco
 
@@ -102,8 +103,8 @@ def _joined(model: Any, source: str, body: int = 0) -> tuple[FloatArray, IntArra
     """Return the visible geometry below a body as one mesh in that body's frame."""
     parts = list(_parts(model, body))
     if not parts:
-        allowed = "a mesh, box or cylinder among the geometry that is drawn (groups 0, 1, 2)"
-        raise InputError(source, "geom", "none with edges", allowed)
+        allowed = f"one of {', '.join(_SHAPES)} among the geometry that is drawn (groups 0, 1, 2)"
+        raise InputError(source, "geom", Absent("none of finite size"), allowed)
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
     triangles = [tri + start for (_, tri), start in zip(parts, starts, strict=True)]
     return np.vstack([vertices for vertices, _ in parts]), np.vstack(triangles)
@@ -134,7 +135,7 @@ def _hangs_on(model: Any, body: int, ancestor: int) -> bool:
 
 
 def _shape(model: Any, geom: int) -> tuple[FloatArray, IntArray] | None:
-    """Return vertices and triangles in the geom's frame; None for what has no edges."""
+    """Return vertices and triangles in the geom's frame; None for a plane and its like."""
     import mujoco
 
     size, kind = model.geom_size[geom], model.geom_type[geom]
@@ -142,6 +143,12 @@ def _shape(model: Any, geom: int) -> tuple[FloatArray, IntArray] | None:
         return box(size)
     if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
         return cylinder(float(size[0]), float(size[1]))
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return ellipsoid((size[0], size[0], size[0]))
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return ellipsoid(size)
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return capsule(float(size[0]), float(size[1]))
     if kind != mujoco.mjtGeom.mjGEOM_MESH:
         return None
     mesh = model.geom_dataid[geom]

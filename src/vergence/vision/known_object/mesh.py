@@ -120,3 +120,11 @@ def _turns(vertices: FloatArray, ends: IntArray, vertex: int, edges: list[int]) 
     return bool(
         np.linalg.norm(np.cross(directions[:, None], directions), axis=2).max() > CORNER_SINE
     )
+
+
+def is_closed(triangles: IntArray) -> bool:
+    """Tell whether every edge has two triangles that run along it in opposite directions."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    forward = np.unique(directed, axis=0)
+    backward = np.unique(directed[:, ::-1], axis=0)
+    return len(forward) == len(directed) and np.array_equal(forward, backward)

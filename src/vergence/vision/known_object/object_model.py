@@ -10,6 +10,7 @@ from vergence.arrays import FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
 from vergence.vision.known_object.mesh import (
     corner_table,
+    is_closed,
     merge_vertices,
     sharp_edges,
     triangle_normals,
@@ -50,7 +51,7 @@ class ObjectModel:
 
         Raises:
             InputError: if there is no triangle, anything is not finite, a triangle names a vertex
-                that is not there, or the mesh has no corner.
+                that is not there.
         """
         places = frozen(vertices, (None, 3), "vertices")
         index = np.array(triangles, dtype=np.int64).reshape(-1, 3)
@@ -65,10 +66,6 @@ class ObjectModel:
         normals = triangle_normals(places, index)
         ends, sides = sharp_edges(places, index, normals, sharp_rad)
         corner_vertices, corner_edges = corner_table(places, ends)
-        if not len(corner_vertices):
-            given = f"{len(index)} triangles, {len(ends)} sharp edges, no corner"
-            allowed = "an object with corners, where sharp edges of different directions meet"
-            raise InputError(name, "faces", given, allowed)
         return cls(
             name,
             frozen(places),
@@ -104,10 +101,27 @@ class ObjectModel:
             _frozen_index(np.full((len(places), 1), -1)),
         )
 
+    def with_corners(self) -> Self:
+        """Return the model itself.
+
+        Raises:
+            InputError: if it has no corner.
+        """
+        if not len(self.corners):
+            given = f"{len(self.triangles)} triangles, {len(self.edges)} sharp edges, no corner"
+            allowed = "an object with corners, where sharp edges of different directions meet"
+            raise InputError(self.name, "faces", given, allowed)
+        return self
+
     @property
     def size(self) -> float:
         """Diagonal of the box around it, m."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @property
+    def closed(self) -> bool:
+        """Whether its surface encloses a volume."""
+        return is_closed(self.triangles)
 
     @property
     def surface(self) -> FloatArray:

@@ -55,7 +55,7 @@ def fit_pose(
     """
     slopes, start = _linearized(T_start, lens, samples)
     moved = np.zeros(6)
-    ahead = _difference(T_prior, T_start)
+    ahead = pose_difference(T_prior, T_start)
     shrink = (narrowest_px / widest_px) ** (1.0 / max(iterations - 1, 1))
     tolerance = widest_px
     for _ in range(iterations):
@@ -85,7 +85,7 @@ def fit_pose(
         chosen[n] = j
     belonging = np.abs(residuals[chosen >= 0])
     spread = 1.4826 * np.median(belonging) if len(belonging) else np.inf
-    return PoseFit(_moved(T_start, moved), chosen, residuals, max(spread, LEAST_SPREAD_PX))
+    return PoseFit(moved_pose(T_start, moved), chosen, residuals, max(spread, LEAST_SPREAD_PX))
 
 
 @njit(cache=True)
@@ -133,7 +133,7 @@ def _likeliest(
 
 
 @njit(cache=True)
-def _difference(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
+def pose_difference(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
     """Return (δp, δθ) that moves pose b to a: t_a - t_b, log(R_a R_bᵀ)."""
     difference = np.empty(6)
     difference[:3] = T_a[:3, 3] - T_b[:3, 3]
@@ -146,7 +146,7 @@ def _difference(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _moved(T: FloatArray, step: FloatArray) -> FloatArray:
+def moved_pose(T: FloatArray, step: FloatArray) -> FloatArray:
     """Return the pose moved by (δp, δθ)."""
     E = so3_exp(step[3:])
     R = np.zeros((3, 3))
@@ -163,7 +163,7 @@ def shifted(T: FloatArray, lens: FloatArray, dx: float, dy: float) -> FloatArray
     step = np.zeros(6)
     step[0] = dx * T[2, 3] / lens[0]
     step[1] = dy * T[2, 3] / lens[1]
-    return _moved(T, step)
+    return moved_pose(T, step)
 
 
 @njit(cache=True)

@@ -1,6 +1,7 @@
 """Meshes of MuJoCo's primitive geometry, faces counter-clockwise seen from outside."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, IntArray
 
@@ -28,3 +29,40 @@ def cylinder(radius: float, half_length: float) -> tuple[FloatArray, IntArray]:
         triangles += [(k, n, SIDES + n), (k, SIDES + n, SIDES + k)]
         triangles += [(n, k, 2 * SIDES), (SIDES + k, SIDES + n, 2 * SIDES + 1)]
     return np.vstack((low, high, centres)), np.array(triangles, dtype=np.int64)
+
+
+def ellipsoid(half: ArrayLike) -> tuple[FloatArray, IntArray]:
+    """Return an ellipsoid around the origin, its half axes (3,) given, m."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
+    unit, triangles = _turned(np.cos(angle), np.sin(angle))
+    return unit * np.asarray(half), triangles
+
+
+def capsule(radius: float, half_length: float) -> tuple[FloatArray, IntArray]:
+    """Return a capsule around z: a cylinder, its half length given, with half balls at its ends."""
+    angle = np.linspace(-np.pi / 2, 0.0, SIDES // 4 + 1)
+    bow, rise = radius * np.cos(angle), radius * np.sin(angle) - half_length
+    return _turned(np.append(bow, bow[::-1]), np.append(rise, -rise[::-1]))
+
+
+def _turned(radius: FloatArray, height: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return a body of revolution around z from its profile, lowest first, closed at both ends."""
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    count = len(radius)
+    vertices = np.column_stack(
+        (
+            np.outer(radius, np.cos(angle)).ravel(),
+            np.outer(radius, np.sin(angle)).ravel(),
+            np.repeat(height, SIDES),
+        )
+    )
+    k = np.arange(SIDES)
+    n = (k + 1) % SIDES
+    triangles = []
+    for ring in range(count - 1):
+        low, high = ring * SIDES, (ring + 1) * SIDES
+        if ring < count - 2:
+            triangles.append(np.column_stack((low + k, high + n, high + k)))
+        if ring > 0:
+            triangles.append(np.column_stack((low + k, low + n, high + n)))
+    return vertices, np.concatenate(triangles)

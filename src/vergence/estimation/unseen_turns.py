@@ -1,0 +1,121 @@
+"""Turns of a target that no measurement shows: kept as predicted, and said to be unknown.
+
+An image of a ball shows none of its turns, that of a can not the one about its axis, that of a mug
+not while its handle is hidden. Such a turn w may go with a motion of the origin: F = [δp; w] are
+the motions (6, K) that do not show, the turns of unit length and orthogonal. With E = [0; w] the
+projector Π = I - F Eᵀ takes them out of an error (δp, δθ) and leaves everything else as it is.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.estimation.belief import Belief
+from vergence.geometry import se3, so3_exp, so3_log
+
+UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of an angle that may be anything
+MOST_RAD = 0.3  # up to which a turn that does not show is followed by its growing deviation
+_FIXED_RAD = 1e-4  # while a measurement is taken in
+_DAMPING = 0.8  # of a speed that does not show, per image
+
+
+def without_unseen(belief: Belief, motions: FloatArray) -> Belief:
+    """Return a predicted belief in which the motions that do not show are fixed.
+
+    What errors of measurement say of such a motion is noise, which would let the target spin.
+
+    Args:
+        belief: predicted to the image.
+        motions: that do not show in it, (6, K), along the axes of the world, m and rad.
+    """
+    if not motions.shape[1]:
+        return belief
+    P = _projected(belief.covariance, motions) + _along(motions, _FIXED_RAD**2)
+    return replace(belief, covariance=np.ascontiguousarray(P))
+
+
+def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Belief:
+    """Return an updated belief that knows of the motions that do not show what was predicted.
+
+    Args:
+        predicted: the belief before the update.
+        updated: what an update made of it `without_unseen`.
+        motions: (6, K), as there.
+    """
+    if not motions.shape[1]:
+        return updated
+    turns: FloatArray = motions[3:]
+    ahead = turns.T @ pose_error(updated.T_world_target, predicted.T_world_target)[3:]
+    back = motions @ -ahead
+    T = updated.T_world_target
+    R = so3_exp(np.ascontiguousarray(back[3:])) @ T[:3, :3]
+    speed = turns.T @ updated.velocity[3:]
+    kept = np.minimum(unseen_variance(predicted, motions), MOST_RAD**2)
+    P = _projected(updated.covariance, motions) + _along(motions, kept)
+    return replace(
+        updated,
+        T_world_target=se3(np.ascontiguousarray(R), T[:3, 3] + back[:3]),
+        velocity=updated.velocity - (1.0 - _DAMPING) * motions @ speed,
+        covariance=np.ascontiguousarray(P),
+    )
+
+
+def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return a covariance (12, 12) in which motions that no image shows are not known."""
+    P = _projected(covariance, motions) + _along(motions, MOST_RAD**2)
+    return np.ascontiguousarray(0.5 * (P + P.T))
+
+
+def told_covariance(belief: Belief, motions: FloatArray, shared: FloatArray) -> FloatArray:
+    """Return the covariance (12, 12) of a belief to be told to others.
+
+    A turn that has not shown for so long that its deviation reached the bound may be anything.
+
+    Args:
+        belief: after an image.
+        motions: that do not show, (6, K).
+        shared: covariance of the pose error that all images have in common, (6, 6).
+    """
+    P = belief.honest_covariance.copy()
+    P[:6, :6] += shared
+    if not motions.shape[1]:
+        return P
+    variance = unseen_variance(belief, motions)
+    unknown = np.where(variance < (0.99 * MOST_RAD) ** 2, variance, UNKNOWN_RAD**2)
+    return np.ascontiguousarray(_projected(P, motions) + _along(motions, unknown))
+
+
+def shown_covariance(
+    belief: Belief, motions: FloatArray, shared: FloatArray | None = None
+) -> FloatArray:
+    """Return the covariance (12, 12) with the motions that do not show all but fixed."""
+    P = belief.honest_covariance.copy()
+    if shared is not None:
+        P[:6, :6] += shared
+    return _projected(P, motions) + _along(motions, _FIXED_RAD**2) if motions.shape[1] else P
+
+
+def unseen_variance(belief: Belief, motions: FloatArray) -> FloatArray:
+    """Return the variance of each turn that does not show, (K,), rad²."""
+    turns = motions[3:]
+    return np.asarray(np.einsum("ik,ij,jk->k", turns, belief.covariance[3:6, 3:6], turns))
+
+
+def pose_error(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
+    """Return (δp, δθ) that moves pose b to a: t_a - t_b, log(R_a R_bᵀ)."""
+    turn = so3_log(np.ascontiguousarray(T_a[:3, :3] @ T_b[:3, :3].T))
+    return np.concatenate((T_a[:3, 3] - T_b[:3, 3], turn))
+
+
+def _projected(covariance: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return Π P Πᵀ, of pose and velocity alike."""
+    projector = np.eye(6)
+    projector[:, 3:] -= motions @ motions[3:].T
+    both = np.kron(np.eye(2), projector)
+    return np.asarray(both @ covariance @ both.T)
+
+
+def _along(motions: FloatArray, variance: FloatArray | float) -> FloatArray:
+    """Return F diag(variance) Fᵀ, of pose and velocity alike, (12, 12)."""
+    return np.asarray(np.kron(np.eye(2), (motions * variance) @ motions.T))

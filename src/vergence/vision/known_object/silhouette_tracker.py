@@ -1,0 +1,330 @@
+"""Follows the outline of a known object from image to image, by the colours on both sides of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.camera import Camera
+from vergence.camera.lens import pack_lens
+from vergence.errors import InputError
+from vergence.robot.positive_definite import invert_spd
+from vergence.vision.known_object.color_model import (
+    ColorModel,
+    blank_colors,
+    colors_of,
+    mixed_colors,
+)
+from vergence.vision.known_object.contour_fit import (
+    contour_points,
+    contour_slopes,
+    fit_contour,
+    residuals_of,
+)
+from vergence.vision.known_object.contour_lines import (
+    REACH,
+    ContourLines,
+    count_colors,
+    read_lines,
+)
+from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.projection import pixel_rows
+from vergence.vision.known_object.silhouette import Outline, outline_of
+from vergence.vision.known_object.symmetry import FreeAxes, free_axes
+from vergence.vision.known_object.weak_turns import least_shown_of, weak_turns
+
+_INDEPENDENT = 60  # lines that err apart: neighbours share pixels
+_MOST_SCALE = 5  # pixels in a segment; odd
+_FINE = (1, 1)  # scales one after the other, for a pose that is known to some pixels
+_TOLERANCE_PX = 1.5  # residual at which a line counts a quarter, at one pixel a segment
+_STEPS = 3  # of Newton for one outline
+_LEARNING_GAPS_PX = (5.0, 2.0, 0.5)  # in the first image the contour is not known well
+_GAP_PX = 0.5  # on both sides of the contour, where pixels show both
+_LEARNED_DEPTH_PX = 18.0
+_FOUND_PX = 2.0  # residual of a line that found the contour
+_ASIDE = 0.03  # of the object's size, by which its origin is wrong while a turn is unknown
+_FORGOTTEN = 0.2  # of the share found, by one image
+_AS_USUAL = 0.85  # of it, with which a narrow search is content
+_BETTER = 1.2  # times as many lines a wide search has to find
+_DEEP_ODDS = 0.5  # mean log odds of the object's pixels on a line that counts
+_LEARNED_ODDS = 1.0  # and on one whose colours are learned
+_CLEAR = 1.0 / 3.0**2  # information of a line that tells where the contour is, 1/px²
+
+
+class SilhouetteMeasurement(NamedTuple):
+    """What an image says about the outline, in the form of points that a filter takes."""
+
+    points: FloatArray  # (M, 3) object's frame, m
+    points_px: FloatArray  # (M, 2)
+    covariance_px: FloatArray  # (M, 2, 2) small across the outline, large along it, px²
+    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
+    expected: int  # lines across the outline that can be read
+    found: int  # of them, where the colours change at the fitted outline
+    usual: float  # the same as a share
+    samples_px: FloatArray  # (N, 2) the places on the outline
+    samples_found: BoolArray  # (N,)
+    colors: ColorModel  # of this image, along the lines found
+    unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
+    shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
+
+    @property
+    def share(self) -> float:
+        """How much of what should be seen was found, 0 … 1."""
+        return self.found / self.expected if self.expected else 0.0
+
+
+class SilhouetteMemory(NamedTuple):
+    """What an object looked like."""
+
+    colors: ColorModel
+    share: float  # of its outline that was found of late, 0 … 1
+
+
+class _Prior(NamedTuple):
+    T: FloatArray  # (4, 4) predicted pose
+    covariance: FloatArray  # (6, 6) of its error (δp, δθ) along camera axes
+    information: FloatArray  # (6, 6) its inverse
+
+
+@dataclass(frozen=True, slots=True)
+class SilhouetteTracker:
+    """Measures an object by its outline: where its colours give way to others.
+
+    The outline is drawn under the predicted pose; lines across it say where the contour is, from
+    histograms of the object's colours and of those beside it [Stoiber2022]; Newton steps fit the
+    pose, from coarse to fine. It needs neither edges nor texture.
+    """
+
+    model: ObjectModel
+    channels: int = 3  # of the images: 3 colours, or 1 where they are grey
+    lines: int = 200  # across the outline
+    learned: float = 0.2  # share of an image in what the colours are taken to be
+    bias_px: float = 0.1  # what does not average out along the outline: shading, model, lens
+
+    closed: bool = field(init=False, repr=False, compare=False)  # whether the mesh is
+    least_shown: float = field(init=False, repr=False, compare=False)  # see `least_shown_of`
+    size: float = field(init=False, repr=False, compare=False)  # of the model, m
+    axes: FreeAxes = field(init=False, repr=False, compare=False)  # turns that no outline shows
+    sought: ClassVar[str] = "the outline"
+
+    def __post_init__(self) -> None:
+        if self.channels not in (1, 3):
+            raise InputError("SilhouetteTracker", "channels", self.channels, "1 or 3")
+        object.__setattr__(self, "closed", self.model.closed)
+        object.__setattr__(self, "size", self.model.size)
+        object.__setattr__(self, "axes", free_axes(self.model))
+        object.__setattr__(self, "least_shown", least_shown_of(self.model, self.axes))
+
+    @property
+    def free(self) -> str:
+        """Which turns no image shows; empty if there are none."""
+        return str(self.axes)
+
+    def free_motions(self, T_camera_target: FloatArray) -> FloatArray:
+        """Return the motions (δp, δθ) that no image shows, (6, K), along camera axes."""
+        return self.axes.motions(T_camera_target)
+
+    def blank(self) -> SilhouetteMemory:
+        """Return the memory before the first image."""
+        return SilhouetteMemory(blank_colors(self.channels), 0.0)
+
+    def measure(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        T_camera_target: FloatArray,
+        pose_covariance: FloatArray,
+        memory: SilhouetteMemory,
+    ) -> SilhouetteMeasurement:
+        """Find the outline near where a pose predicts it.
+
+        Args:
+            image: grey (height, width) or colour (height, width, 3), of the camera's size.
+            camera: the camera's model.
+            T_camera_target: predicted pose, (4, 4).
+            pose_covariance: of its error (δp, δθ) along camera axes, (6, 6); decides how far
+                to search.
+            memory: what it looked like; without any its colours are learned at the predicted pose.
+
+        Raises:
+            InputError: if the image has another size, type or number of channels.
+        """
+        pixels, lens = self._pixels(image, camera), pack_lens(camera)
+        covariance = np.ascontiguousarray(pose_covariance)
+        prior = _Prior(np.ascontiguousarray(T_camera_target), covariance, invert_spd(covariance)[0])
+        if memory.colors.known:
+            return self._sought(pixels, lens, prior, memory)
+        T, colors = prior.T, memory.colors
+        for gap_px in _LEARNING_GAPS_PX:
+            outline = self._outline(T, lens)
+            if outline is not None:
+                everywhere = np.ones(len(outline.points), dtype=np.bool_)
+                colors = self._counted(pixels, outline, everywhere, ~everywhere, gap_px)
+            seen = self._look(pixels, lens, T, prior, colors, None)
+            T = seen.T_camera_target
+        return seen
+
+    def remember(self, memory: SilhouetteMemory, seen: SilhouetteMeasurement) -> SilhouetteMemory:
+        """Return the memory after an image that was believed."""
+        if not memory.colors.known:
+            return SilhouetteMemory(seen.colors, seen.share)
+        colors: ColorModel = memory.colors
+        if seen.colors.known:
+            colors = mixed_colors(colors, seen.colors, self.learned)
+        return SilhouetteMemory(colors, memory.share + _FORGOTTEN * (seen.share - memory.share))
+
+    def _sought(
+        self, pixels: ImageArray, lens: FloatArray, prior: _Prior, memory: SilhouetteMemory
+    ) -> SilhouetteMeasurement:
+        """Look close to the prediction; farther away if less is found there than of late.
+
+        Something that comes before the object draws a wide search towards itself.
+        """
+        seen = self._look(pixels, lens, prior.T, prior, memory.colors, _FINE)
+        if seen.share > _AS_USUAL * memory.share:
+            return seen
+        wide = self._look(pixels, lens, prior.T, prior, memory.colors, None)
+        return wide if wide.found > _BETTER * seen.found else seen
+
+    def _pixels(self, image: ImageArray, camera: Camera) -> ImageArray:
+        shape = (camera.height, camera.width) + ((3,) if self.channels == 3 else ())
+        if image.shape != shape or image.dtype != np.uint8:
+            given = f"{image.dtype} of shape {image.shape}"
+            raise InputError("SilhouetteTracker", "image", given, f"uint8 of shape {shape}")
+        return np.ascontiguousarray(image).reshape(camera.height, camera.width, self.channels)
+
+    def _outline(self, T: FloatArray, lens: FloatArray) -> Outline | None:
+        return outline_of(
+            T, lens, self.model.vertices, self.model.triangles, self.closed, self.lines
+        )
+
+    def _look(
+        self,
+        pixels: ImageArray,
+        lens: FloatArray,
+        T: FloatArray,
+        prior: _Prior,
+        colors: ColorModel,
+        schedule: Sequence[int] | None,
+    ) -> SilhouetteMeasurement:
+        """Fit the pose from coarse to fine; the last outline is the measurement."""
+        outline = self._outline(T, lens)
+        scales = list(schedule or ())
+        while outline is not None:
+            scales = scales or _scales(T, lens, outline, prior.covariance)
+            scale = scales.pop(0)
+            lines = read_lines(pixels, outline, colors.odds, scale)
+            T = fit_contour(
+                T,
+                prior.T,
+                prior.information,
+                lens,
+                outline,
+                lines,
+                _weights(lines),
+                _TOLERANCE_PX * scale,
+                _STEPS,
+            )
+            if not scales:
+                return self._measured(pixels, lens, T, outline, lines)
+            outline = self._outline(T, lens)
+        return _nothing(T, blank_colors(self.channels))
+
+    def _measured(
+        self,
+        pixels: ImageArray,
+        lens: FloatArray,
+        T: FloatArray,
+        outline: Outline,
+        lines: ContourLines,
+    ) -> SilhouetteMeasurement:
+        found = (
+            lines.usable
+            & (np.abs(residuals_of(T, lens, outline, lines)) < _FOUND_PX)
+            & (lines.information > _CLEAR)
+            & (lines.deep_odds > _DEEP_ODDS)
+        )
+        slopes = contour_slopes(T, lens, outline)[found]
+        learned = found & (lines.deep_odds > _LEARNED_ODDS)
+        covered = lines.usable & (lines.deep_odds < -_LEARNED_ODDS)
+        unseen, shared = self._unseen(T, lens, slopes), _shared_error(slopes, self.bias_px)
+        if unseen.shape[1] > len(self.axes.axes):  # a wrong turn puts the origin wrong, too
+            shared[:3, :3] += (_ASIDE * self.size) ** 2 * np.eye(3)
+        expected, count = int(lines.usable.sum()), int(found.sum())
+        # The less of the outline is found, the likelier some of it is something else's.
+        doubt = (expected / max(count, 1)) ** 3
+        shared = doubt * shared
+        enlarged = doubt * max(count / _INDEPENDENT, 1.0)
+        return SilhouetteMeasurement(
+            *contour_points(outline, lines, found, enlarged),
+            T,
+            expected,
+            count,
+            count / max(expected, 1),
+            outline.points_px,
+            found,
+            self._counted(pixels, outline, learned, covered, _GAP_PX),
+            unseen,
+            shared,
+        )
+
+    def _unseen(self, T: FloatArray, lens: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the motions (6, K) that the outline does not show.
+
+        These are the turns under which, with the best motion of the origin, the outline moves by
+        less than the places on it are known. An ellipsoid has one, a mug with hidden handle.
+        """
+        free = self.axes.motions(T)
+        half_px = 0.5 * self.size * lens[0] / T[2, 3]
+        weak = weak_turns(slopes, free, half_px, self.least_shown)
+        return np.hstack((free, weak))
+
+    def _counted(
+        self,
+        pixels: ImageArray,
+        outline: Outline,
+        learned: BoolArray,
+        covered: BoolArray,
+        gap_px: float,
+    ) -> ColorModel:
+        inside, outside = np.zeros((2, *blank_colors(self.channels).inside.shape))
+        count_colors(pixels, outline, learned, covered, gap_px, _LEARNED_DEPTH_PX, inside, outside)
+        colors: ColorModel = colors_of(inside, outside)
+        return colors
+
+
+def _weights(lines: ContourLines) -> FloatArray:
+    """Return how far each line is believed: not where something else is before the object."""
+    return np.where(lines.usable, np.clip(lines.deep_odds - _DEEP_ODDS, 0.0, 1.0), 0.0)
+
+
+def _scales(T: FloatArray, lens: FloatArray, outline: Outline, covariance: FloatArray) -> list[int]:
+    """Return pixels in a segment, step by step: at first as three standard deviations need."""
+    widest, rows = 0.0, np.empty((2, 6))
+    for n in range(0, len(outline.points), 10):
+        pixel_rows(T, lens, outline.points[n], rows)
+        across = outline.normals[n] @ rows
+        widest = max(widest, float(across @ covariance @ across))
+    needed = 3.0 * np.sqrt(widest) / REACH
+    first = int(np.clip(2 * np.ceil(0.5 * (needed - 1.0)) + 1, 1, _MOST_SCALE))
+    return [*range(first, 1, -2), 1, 1]
+
+
+def _shared_error(slopes: FloatArray, bias_px: float) -> FloatArray:
+    """Return what a bias of the outline does to the pose, (6, 6): images do not average it out."""
+    if len(slopes) < 6:
+        return np.zeros((6, 6))
+    scale = np.sqrt(np.mean(slopes**2, axis=0))
+    scaled = slopes / scale
+    inverse = np.linalg.inv(scaled.T @ scaled / len(slopes) + 1e-4 * np.eye(6))
+    return np.asarray(bias_px**2 * inverse / np.outer(scale, scale))
+
+
+def _nothing(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
+    none = np.zeros((0, 2))
+    return SilhouetteMeasurement(
+        np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, none,
+        np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)),
+    )  # fmt: skip

@@ -1,0 +1,109 @@
+"""About which axes an object can turn without any change of its outline.
+
+No image of an outline tells how far such an object has turned. It is tried, not derived from the
+mesh: the outline is drawn at several turns about each axis that may be one.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.geometry import se3, so3_exp
+from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.silhouette import Grid, draw_nearness, project_vertices
+
+_CELLS = 200  # along the mask
+_DISTANCE = 5.0  # of the object, of its size
+_TURNS_RAD = (0.41, 1.13, 1.83, 2.62, 3.9)
+_SLANTS_RAD = (0.5, 1.2)  # between an axis and the line of sight
+
+
+class FreeAxes(NamedTuple):
+    """Axes about which a turn does not show, in the object's frame."""
+
+    axes: FloatArray  # (K, 3) unit vectors, K = 0 (none), 1 (a can) or 3 (a ball)
+    centre: FloatArray  # (3,) m, on all of them
+
+    def motions(self, T: FloatArray) -> FloatArray:
+        """Return the motions (δp, δθ) along camera axes that do not show, (6, K), m and rad.
+
+        Args:
+            T: pose of the object in the camera, (4, 4).
+        """
+        turns = self.axes @ T[:3, :3].T
+        moved = np.cross(turns, -(T[:3, :3] @ self.centre))
+        return np.vstack((moved.T, turns.T))
+
+    def __str__(self) -> str:
+        if not len(self.axes):
+            return ""
+        if len(self.axes) == 3:
+            return "no turn of it shows in its outline"
+        axis = ", ".join(f"{value:.2g}" for value in self.axes[0].round(3) + 0.0)
+        return f"a turn about its axis ({axis}) does not show in its outline"
+
+
+def free_axes(model: ObjectModel) -> FreeAxes:
+    """Return the axes about which an object can turn without a change of its outline."""
+    centre, principal = _principal_axes(model)
+    closed = model.closed
+    candidates = [*principal.T, *np.eye(3)]
+    free: list[FloatArray] = []
+    for axis in candidates:
+        new = all(abs(float(axis @ other)) < 0.99 for other in free)
+        if new and _turns_unseen(model, closed, centre, axis):
+            free.append(axis)
+    if len(free) > 1:  # about two axes: then about all
+        free = list(np.eye(3))
+    axes = np.array(free, dtype=np.float64).reshape(-1, 3)
+    return FreeAxes(frozen(axes), frozen(centre))
+
+
+def _principal_axes(model: ObjectModel) -> tuple[FloatArray, FloatArray]:
+    """Return the centroid (3,) of the surface and its principal axes, columns of (3, 3)."""
+    a, b, c = (model.surface[:, k] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    middles = np.concatenate((a + b, b + c, c + a)) / 2.0  # exact for second moments
+    weights = np.tile(area, 3) / (3.0 * area.sum())
+    centre = weights @ middles
+    spread = (middles - centre).T @ (weights[:, None] * (middles - centre))
+    return centre, np.ascontiguousarray(np.linalg.eigh(spread)[1])
+
+
+def _turns_unseen(model: ObjectModel, closed: bool, centre: FloatArray, axis: FloatArray) -> bool:
+    for slant in _SLANTS_RAD:
+        base = _upright(axis, slant)
+        first = _mask(model, closed, base, centre)
+        for turn in _TURNS_RAD:
+            R = base @ so3_exp(np.ascontiguousarray(turn * axis))
+            if _differ(first, _mask(model, closed, np.ascontiguousarray(R), centre)):
+                return False
+    return True
+
+
+def _upright(axis: FloatArray, slant: float) -> FloatArray:
+    """Return a rotation that brings the axis to an angle from the camera's own, (3, 3)."""
+    aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    aside /= np.linalg.norm(aside)
+    own = np.array((aside, np.cross(axis, aside), axis))  # brings the axis to z
+    R: FloatArray = np.ascontiguousarray(so3_exp(np.array((slant, 0.0, 0.0))) @ own)
+    return R
+
+
+def _mask(model: ObjectModel, closed: bool, R: FloatArray, centre: FloatArray) -> BoolArray:
+    T = se3(R, np.array((0.0, 0.0, _DISTANCE * model.size)) - R @ centre)
+    projected = np.empty((len(model.vertices), 3))
+    project_vertices(T, model.vertices, projected, np.empty(4))
+    half = 0.7 / _DISTANCE
+    grid = Grid(-half, -half, 2.0 * half / (_CELLS - 1), _CELLS, _CELLS)
+    mask: BoolArray = draw_nearness(projected, model.triangles, grid, closed) > 0.0
+    return mask
+
+
+def _differ(one: BoolArray, other: BoolArray) -> bool:
+    """Tell whether two masks differ by three cells across somewhere."""
+    import cv2
+
+    different = (one != other).view(np.uint8)
+    return bool(cv2.erode(different, np.ones((3, 3), np.uint8)).any())

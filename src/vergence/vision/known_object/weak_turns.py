@@ -1,0 +1,76 @@
+"""Turns under which the outline of an object hardly moves, whatever motion goes with them.
+
+The outline of an ellipsoid is an ellipse, told by five numbers: of its six degrees of freedom one
+never shows. The outline of a mug does not show its turn while the handle is hidden.
+"""
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.camera import Camera
+from vergence.camera.lens import pack_lens
+from vergence.geometry import se3, so3_exp
+from vergence.vision.known_object.contour_fit import contour_slopes
+from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.silhouette import outline_of
+from vergence.vision.known_object.symmetry import FreeAxes
+
+# Of half the object's size, by which a turn of one radian has to move its outline to be seen. What
+# the places on an outline have wrong moves it by 0.01.
+USUAL, ELLIPSOID = 0.012, 0.03
+_LIKE_ELLIPSOID = 0.0145  # least motion, as a median over views
+_CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
+_VIEWS = 15
+_PLACES = 200
+
+
+def weak_turns(
+    slopes: FloatArray, free: FloatArray, half_px: float, least_shown: float
+) -> FloatArray:
+    """Return the motions (δp, δθ) that hardly move an outline, (6, K), the turns of unit length.
+
+    Args:
+        slopes: how each place on the outline moves across it with (δp, δθ), (N, 6), px.
+        free: motions that are known not to show, (6, F); those returned turn otherwise.
+        half_px: half the object's size in the image.
+        least_shown: motion of the outline, of `half_px`, from which on its weakest turn is seen;
+            for the others that is `USUAL`.
+    """
+    squares, motions = _shown(slopes, free)
+    least = np.full(len(squares), USUAL * half_px)
+    least[:1] = least_shown * half_px
+    return motions[:, squares < least**2]
+
+
+def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
+    """Return from which motion on of its outline a turn of an object is seen, of half its size.
+
+    An object like an ellipsoid has a turn that is never seen, whatever a single image seems to say.
+    """
+    random = np.random.default_rng(0)
+    middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
+    lens, closed, least = pack_lens(_CAMERA), model.closed, []
+    for _ in range(_VIEWS):
+        R = so3_exp(random.normal(0.0, 1.2, 3))
+        T = se3(R, np.array((0.0, 0.0, 3.0 * model.size)) - R @ middle)
+        outline = outline_of(T, lens, model.vertices, model.triangles, closed, _PLACES)
+        assert outline is not None  # it lies before the camera
+        squares, _ = _shown(contour_slopes(T, lens, outline), axes.motions(T))
+        if len(squares):
+            least.append(np.sqrt(max(squares[0], 0.0)) * T[2, 3] / (0.5 * model.size * lens[0]))
+    return ELLIPSOID if least and float(np.median(least)) < _LIKE_ELLIPSOID else USUAL
+
+
+def _shown(slopes: FloatArray, free: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean square motions of the outline, (K,) ascending, and the motions, (6, K).
+
+    Each turn goes with the motion of the origin that moves the outline least.
+    """
+    if len(slopes) < 6 or free.shape[1] == 3:
+        return np.zeros(0), np.zeros((6, 0))
+    along = np.linalg.lstsq(slopes[:, :3], slopes[:, 3:], rcond=1e-6)[0]
+    left = slopes[:, 3:] - slopes[:, :3] @ along
+    others = np.linalg.svd(free[3:], full_matrices=True)[0][:, free.shape[1] :]
+    squares, turns = np.linalg.eigh((left @ others).T @ (left @ others) / len(slopes))
+    turns = others @ turns
+    return squares, np.vstack((-along @ turns, turns))

@@ -1,0 +1,68 @@
+"""What does not show in an image stays as predicted, and everything else is taken from it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vergence.estimation import (
+    Belief,
+    PoseFilter,
+    shown_covariance,
+    told_covariance,
+    with_unseen,
+    without_unseen,
+)
+from vergence.estimation.unseen_turns import MOST_RAD, UNKNOWN_RAD, pose_error
+from vergence.geometry import se3, so3_exp
+
+
+def turning(rng: np.random.Generator) -> tuple[Belief, np.ndarray]:
+    """A belief, and the motion of a turn about an axis beside the origin."""
+    T = se3(so3_exp(rng.normal(0.0, 1.0, 3)), rng.normal(0.0, 0.3, 3))
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    half = rng.normal(0.0, 0.05, (12, 12))
+    belief = PoseFilter().start(0.0, T, covariance=half @ half.T + 1e-6 * np.eye(12))
+    motion = np.concatenate((np.cross(axis, rng.normal(0.0, 0.1, 3)), axis))
+    return belief, motion[:, None]
+
+
+def test_a_turn_that_does_not_show_is_not_corrected_and_the_rest_is() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        belief, motions = turning(rng)
+        step = rng.normal(0.0, 0.002, 6)
+        T = belief.T_world_target
+        moved = se3(so3_exp(step[3:].copy()) @ T[:3, :3], T[:3, 3] + step[:3])
+        updated = replace(without_unseen(belief, motions), T_world_target=moved)
+        after = with_unseen(belief, updated, motions)
+        change = pose_error(after.T_world_target, T)
+        expected = step - motions[:, 0] * (motions[3:, 0] @ step[3:])
+        assert change == pytest.approx(expected, abs=2e-5)
+
+
+def test_its_variance_is_that_of_the_prediction_up_to_a_bound_and_told_as_unknown_there() -> None:
+    rng = np.random.default_rng(1)
+    belief, motions = turning(rng)
+    axis = motions[3:, 0]
+    for size in (0.1, 10.0):
+        known = replace(belief, covariance=size * belief.covariance)
+        predicted = axis @ known.covariance[3:6, 3:6] @ axis
+        after = with_unseen(known, without_unseen(known, motions), motions)
+        assert axis @ after.covariance[3:6, 3:6] @ axis == pytest.approx(
+            min(predicted, MOST_RAD**2)
+        )
+        told = told_covariance(after, motions, np.zeros((6, 6)))
+        expected = predicted if predicted < MOST_RAD**2 else UNKNOWN_RAD**2
+        assert axis @ told[3:6, 3:6] @ axis == pytest.approx(expected)
+        shown = shown_covariance(after, motions)
+        assert axis @ shown[3:6, 3:6] @ axis < 1e-6
+        np.linalg.cholesky(shown[:6, :6])
+
+
+def test_without_such_motions_a_belief_stays_what_it_is() -> None:
+    belief, _ = turning(np.random.default_rng(2))
+    none = np.zeros((6, 0))
+    assert without_unseen(belief, none) is belief
+    assert with_unseen(belief, belief, none) is belief
