@@ -202,3 +202,19 @@ def test_a_value_of_one_of_the_tasks_can_be_set(panda):
     assert cell.task.until.time_s == 0.1
     assert cell.tasks[1].tolerance_px == 3
     assert cell.replace(seed=5).tasks == cell.tasks
+
+
+def test_points_that_are_picked_after_a_task_without_any_are_those_of_the_next_task():
+    track = {"kind": "track", "arm": "puma", "camera": "wrist"}
+    tasks = [
+        {**track, "until": {"kind": "time", "time_s": 0.1}},
+        {"kind": "advance", "arm": "puma", "camera": "wrist", "distance_m": 0.002},
+        {**track, "until": {"kind": "time", "time_s": 0.1}},
+    ]
+    law = {"kind": "image_based"}
+    still = {"motion": "stationary"}
+    cell = load_cell("puma560").replace(tasks=tasks, law=law, target=still)
+    run = run_cell(cell, images=False)
+    assert [task.outcome.kind.value for task in run.outcome.tasks] == [
+        "completed", "reached", "completed"
+    ]  # fmt: skip

@@ -132,6 +132,11 @@ class TaskSequence:
         started.frames = dict(frames)
         if isinstance(started.driver, SimulatedDriver):
             started.driver.take_up(cell.task)
+            if not self._images:  # what they show is of the task before
+                started.frames = {
+                    name: replace(frame, truth=started.driver.first_frame(name).truth)
+                    for name, frame in frames.items()
+                }
         try:
             with self._naming(self._number):
                 parts = task_parts(cell, started, self._images, self._first.context.model)
