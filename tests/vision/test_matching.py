@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from bench_vision import IMAGES, PACKAGE
+from vergence.camera import Camera
 from vergence.cell import load_cell
 from vergence.errors import ShapeError
 from vergence.geometry import se3_inverse, so3_exp, so3_log
@@ -114,3 +116,50 @@ def test_a_turn_of_the_camera_alone_is_told_as_such(driver):
     assert found.view is None
     error = so3_log(np.ascontiguousarray(found.rotation.T @ R))
     assert np.rad2deg(np.linalg.norm(error)) < 0.1
+
+
+REAL = Camera(384, 288, focal_px=550.0)  # about
+
+
+def real(name):
+    assert IMAGES.is_dir(), f"{PACKAGE} is missing"
+    image = cv2.imread(str(IMAGES / name), cv2.IMREAD_GRAYSCALE)
+    return cv2.resize(image, (384, 288), interpolation=cv2.INTER_AREA)
+
+
+@pytest.mark.parametrize("number", [40, 79])
+def test_real_images_of_one_thing_tell_the_same_motion_both_ways(number):
+    images = real("cube/image.0000.pgm"), real(f"cube/image.{number:04d}.pgm")
+    there, back = (compare_images(*pair, REAL, Sift()) for pair in (images, images[::-1]))
+    assert min(len(there.matches.points_px), len(back.matches.points_px)) > 50
+    motions = [
+        [one.rotation, *(v.rotation for v in one.view.alternatives)] for one in (there, back)
+    ]
+    apart = min(np.linalg.norm(so3_log(A @ B)) for A in motions[0] for B in motions[1])
+    assert np.rad2deg(apart) < 2.0
+
+
+def test_real_images_of_different_things_are_refused():
+    names = [
+        "cube/image.0000.pgm", "mire-2/image.0001.pgm", "Klimt/Klimt.pgm",
+        "Solvay/Solvay_conference_1927_Version2_640x440.png", "calibration/grid36-01.pgm",
+    ]  # fmt: skip
+    images = [real(name) for name in names]
+    for i, image in enumerate(images):
+        for other in images[i + 1 :]:
+            assert isinstance(compare_images(image, other, REAL, Sift()), TwoViewFailure)
+
+
+def test_a_texture_that_repeats_itself_is_refused():
+    tile = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(60, 60)), (0, 0), 2)
+    repeated = np.tile(np.clip(128 + 60 * tile / tile.std(), 0, 255).astype(np.uint8), (30, 30))
+    checks = ((np.indices((1800, 1800)) // 60).sum(axis=0) % 2 * 200).astype(np.uint8)
+    camera = Camera(640, 480, focal_px=600.0)
+    for texture in (repeated, checks):
+        images = []
+        for turn, shift in ((0.0, 0.0), (0.35, 0.12)):
+            R = so3_exp(np.array([0.05, -0.07, turn]) * (turn > 0))
+            plane = np.array([[1, 0, -900], [0, 1, -900], [0, 0, 600.0]]) / 600.0
+            H = camera.matrix @ (R @ plane + np.outer([shift, 0.03, 0.05], [0, 0, 1.0]))
+            images.append(cv2.warpPerspective(texture, H, (640, 480)))
+        assert isinstance(compare_images(*images, camera, Sift()), TwoViewFailure)
