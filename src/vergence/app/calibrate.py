@@ -80,7 +80,7 @@ def calibrate(options: "CalibrateOptions") -> int:
     folder = options.out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
     if not options.overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
         given = f"{folder}, which holds a calibration"
-        raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")
+        raise InputError("calibrate", "--out", given, "another folder, or --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
     data, truth = _data(options, folder)
     if truth is not None:
@@ -106,10 +106,10 @@ def _require_one_source(options: "CalibrateOptions") -> None:
     if count != 1:
         given = "several of them" if count else NOTHING
         allowed = "a folder of images, a ROS 2 bag, --synthetic CELL, or --driver NAME --cell CELL"
-        raise InputError("vergence calibrate", "", given, allowed)
+        raise InputError("calibrate", "", given, allowed)
     if options.driver and not options.cell:
         allowed = "only together with --cell CELL, or with --latency CELL or --mounting CELL"
-        raise InputError("vergence calibrate", "--driver", options.driver, allowed)
+        raise InputError("calibrate", "--driver", options.driver, allowed)
     bag = options.images is not None and is_bag(options.images)
     for key, given_too, fits in (
         ("--topic", options.topic, bag),
@@ -117,32 +117,32 @@ def _require_one_source(options: "CalibrateOptions") -> None:
         ("--cell", options.cell, bag or options.driver is not None),
     ):
         if given_too and not fits:
-            raise InputError("vergence calibrate", key, given_too, "only with a ROS 2 bag")
+            raise InputError("calibrate", key, given_too, "only with a ROS 2 bag")
     if options.joints and not options.cell:
         allowed = "--cell too: the cell whose arm has these joints"
-        raise InputError("vergence calibrate", "--joints", options.joints, allowed)
+        raise InputError("calibrate", "--joints", options.joints, allowed)
     if options.move and options.driver is None:
         allowed = "only together with --driver NAME --cell CELL"
-        raise InputError("vergence calibrate", "--move", True, allowed)
+        raise InputError("calibrate", "--move", True, allowed)
     if options.yes and not options.move:
-        raise InputError("vergence calibrate", "--yes", True, "only together with --move")
+        raise InputError("calibrate", "--yes", True, "only together with --move")
     if options.projected and options.synthetic is None:
-        raise InputError("vergence calibrate", "--projected", True, "with --synthetic CELL")
+        raise InputError("calibrate", "--projected", True, "with --synthetic CELL")
     if options.watch and options.synthetic is None and options.driver is None:
         allowed = "with --synthetic CELL or --driver NAME"
-        raise InputError("vergence calibrate", "--watch", options.watch, allowed)
+        raise InputError("calibrate", "--watch", options.watch, allowed)
 
 
 def _require_lens(lens: str) -> None:
     from vergence.camera.calibration import MODELS
 
     if lens not in MODELS:
-        raise InputError("vergence calibrate", "--lens", lens, nearest(lens, MODELS))
+        raise InputError("calibrate", "--lens", lens, nearest(lens, MODELS))
 
 
 def _require_deviation(percent: float) -> None:
     if not 0.0 <= percent <= 20.0:
-        raise InputError("vergence calibrate", "--square-deviation", percent, "0 … 20, in percent")
+        raise InputError("calibrate", "--square-deviation", percent, "0 … 20, in percent")
 
 
 def _base(options: "CalibrateOptions") -> "FloatArray":
@@ -215,11 +215,11 @@ def _robot_data(options: "CalibrateOptions", board: "Board | None", folder: Path
     from vergence.cell import load_cell
 
     if board is None:
-        raise InputError("vergence calibrate", "--board", None, "COLUMNSxROWS of the board")
+        raise InputError("calibrate", "--board", None, "COLUMNSxROWS of the board")
     cell = load_cell(str(options.cell), overrides(options.settings))
     camera = options.watch or cell.task.camera
     if camera not in cell.cameras:
-        raise InputError("vergence calibrate", "--watch", camera, nearest(camera, cell.cameras))
+        raise InputError("calibrate", "--watch", camera, nearest(camera, cell.cameras))
     if options.move:
         _require_agreement(cell, camera, options.yes)
     images = _empty_folder(folder / "images")
@@ -240,12 +240,12 @@ def _require_agreement(cell: "Cell", camera: str, agreed: bool) -> None:
     arm = cell.task.arm
     if cell.cameras[camera].arm != arm:
         allowed = f"a camera that {arm} carries; without --move you move the arm yourself"
-        raise InputError("vergence calibrate", "--move", f"camera {camera}", allowed)
+        raise InputError("calibrate", "--move", f"camera {camera}", allowed)
     question = (
         f"{arm} will move by itself, slowly, around the board it sees now. Is it free? [y/N] "
     )
     if not agreed and not confirmed(question):
-        raise InputError("vergence calibrate", "--move", NOTHING, "y, or --yes")
+        raise InputError("calibrate", "--move", NOTHING, "y, or --yes")
 
 
 def _empty_folder(folder: Path) -> Path:

@@ -74,7 +74,7 @@ def _camera(options: "TrackOptions", first: "FootageFrame") -> "Camera":
         return camera_of_options(intrinsics, options.distortion, width, height)
     for key, value in (*intrinsics.items(), ("distortion", options.distortion)):
         if value is not None:
-            raise InputError("vergence track", f"--{key}", value, "either --camera or intrinsics")
+            raise InputError("track", f"--{key}", value, "either --camera or intrinsics")
     return read_camera(options.camera, width, height)
 
 
@@ -91,11 +91,11 @@ def _follower(
 
     for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError("vergence track", key, value, "a number above zero")
+            raise InputError("track", key, value, "a number above zero")
     share = options.share
     if share is not None and not 0.2 <= share <= 1.0:
-        allowed = "0.2 … 1: with less of it an object is not told from its background"
-        raise InputError("vergence track", "--share", share, allowed)
+        allowed = "0.2 … 1: with less of it an object cannot be distinguished from its background"
+        raise InputError("track", "--share", share, allowed)
     start = starting_pose(options.start, camera)
     tracker, usual = _tracker(options, model, first)
     rule = replace(usual, jolt_px=options.jolt)

@@ -27,7 +27,7 @@ class WeightedObjective:
 
 @part("servo", "servo")
 class ServoSettings:
-    """Objectives, limits and solver, and what is assumed of the features between images.
+    """Objectives, limits and solver, and assumptions about the features between images.
 
     In a cell file, a table with a `kind` is a servo with that one objective, whose keys stand in
     the same table; several stand in `objectives`.

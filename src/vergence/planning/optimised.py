@@ -38,7 +38,7 @@ class _Candidate:
 
 @part("planner", "optimised")
 class OptimisedPlanner:
-    """Smooth joint paths under visibility and joint limits, from several guesses.
+    """Smooth joint paths within visibility and joint limits, from several initial guesses.
 
     The cost is ∫ |q'/q̇_max|² + smoothing ∫ |q''/q̇_max|² over the path. Guesses: straight in joint
     space to every inverse-kinematics branch, the same pulled into view, and the camera's straight

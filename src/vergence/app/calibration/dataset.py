@@ -75,14 +75,14 @@ def board_of_options(
             ("--pattern", pattern),
         ):  # fmt: skip
             if value is not None:
-                raise InputError("vergence calibrate", key, value, "with --board COLUMNSxROWS")
+                raise InputError("calibrate", key, value, "with --board COLUMNSxROWS")
         return None
     columns, _, rows = size.lower().partition("x")
     if not (columns.isdigit() and rows.isdigit()):
         allowed = "inner corners in a row x rows, such as 11x8"
-        raise InputError("vergence calibrate", "--board", size, allowed)
+        raise InputError("calibrate", "--board", size, allowed)
     if square_mm is None:
-        raise InputError("vergence calibrate", "--square-mm", NOTHING, "a square's side in mm")
+        raise InputError("calibrate", "--square-mm", NOTHING, "a square's side in mm")
     sizes = {"columns": float(columns), "rows": float(rows), "square_mm": square_mm}
     if marker_mm is not None:
         sizes["marker_mm"] = marker_mm

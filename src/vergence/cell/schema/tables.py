@@ -45,7 +45,7 @@ _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
 
 
 class SceneTable(Table):
-    """What stands around the arms."""
+    """Surroundings of the arms."""
 
     model: Path | None = (
         None  # MJCF file of floor, walls and lights; a plain floor and a lamp if absent
@@ -54,7 +54,7 @@ class SceneTable(Table):
 
 
 class CollisionTable(Table):
-    """What the task's arm must not touch: the law keeps a distance, the guard brakes before."""
+    """Collision avoidance of the task's arm, by the law and, as a last resort, the guard."""
 
     avoid: Annotated[
         tuple[Literal["self", "arms", "fixtures", "target"], ...], Field(max_length=4)
@@ -152,7 +152,7 @@ def _kind(motion: Any) -> Any:
 
 
 class TargetTable(Placement):
-    """The object; its placement is where its motion starts, or its pose in what carries it."""
+    """The object; its placement is where it starts, or its pose in the body that carries it."""
 
     model: Path  # MJCF or URDF
     carried_by: Text | None = None  # arm to whose last body it is attached
@@ -169,7 +169,7 @@ class TargetTable(Placement):
 
 
 class ToolTable(Placement):
-    """What the arm holds beside its camera; its placement is in the arm's last body."""
+    """A tool that the arm holds beside its camera; its placement is in the arm's last body."""
 
     model: Path  # MJCF
     camera: Text  # fixed camera that observes the tool
@@ -180,7 +180,7 @@ class ToolTable(Placement):
 
 
 class TrackTable(TaskTable):
-    """Keep features where they are desired in one camera's image."""
+    """Keep features at their desired positions in one camera's image."""
 
     kind: Literal["track"] = "track"
     arm: Text  # arm that moves, or carries the target
@@ -207,7 +207,7 @@ class TrackTable(TaskTable):
 
 
 class FollowTable(TaskTable):
-    """Keep a camera on the arm, or what the arm holds before a fixed one, at a desired pose."""
+    """Keep a desired pose between target and camera, which is on the arm or fixed."""
 
     kind: Literal["follow"]
     arm: Text  # arm that moves
@@ -218,7 +218,7 @@ class FollowTable(TaskTable):
 
 
 class LengthTable(Table):
-    """How far two points are apart that a photograph shows."""
+    """The known distance between two points in the photograph."""
 
     points_px: tuple[Point2, Point2]  # (u, v) of both end points in the photograph
     length_m: Length  # distance between them
@@ -231,7 +231,7 @@ class LengthTable(Table):
 
 
 class ReachTable(TaskTable):
-    """Bring the camera to where the target looks as in an image taken before, along a plan."""
+    """Move the camera to where an earlier image of the target was taken, along a planned path."""
 
     kind: Literal["reach"]
     arm: Text  # arm that moves
@@ -266,7 +266,7 @@ class ReachTable(TaskTable):
 
 
 class AdvanceTable(TaskTable):
-    """Move the camera, or what the arm holds before a fixed one, along an axis, without images."""
+    """Move the camera, or the object that the arm holds, along an axis, without using images."""
 
     kind: Literal["advance"]
     arm: Text  # arm that moves
@@ -290,7 +290,7 @@ class AdvanceTable(TaskTable):
 
 
 class SwitchTable(TaskTable):
-    """Switch an output of the driver, such as a gripper, while the arm stays where it is."""
+    """Switch an output of the driver, such as a gripper, while the arm stays at rest."""
 
     kind: Literal["switch"]
     arm: Text  # arm that stays at rest
@@ -328,7 +328,7 @@ Task = Annotated[
 
 
 class PerceptionTable(Table):
-    """How the target's pose is estimated, where the task needs it."""
+    """How the target's pose is estimated, if the task needs it."""
 
     cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = (
         None  # cameras to use; all if absent

@@ -35,7 +35,7 @@ class Limit(Protocol):
 
 @part("limits", "limits")
 class Limits:
-    """What the quadratic program keeps. Joint positions, rates and accelerations are hard.
+    """Limits of the quadratic program. Joint positions, rates and accelerations are hard.
 
     The others are relaxed when they conflict, the last of `order` first, then a user's own; the
     slack is reported. A limit that is not in `order` is not kept.

@@ -10,7 +10,7 @@ from vergence.parts import knob, part
 
 @part("objective", "point_pose")
 class PointPose:
-    """Takes the camera straight to where it should be: v = -λ (Rᵀ t, θu) of its pose in the goal.
+    """Moves the camera straight to its goal: v = -λ (Rᵀ t, θu) of its pose in the goal frame.
 
     The pose is the one that brings the points, by their depths, onto those at the goal
     [Chaumette2006] section 3.

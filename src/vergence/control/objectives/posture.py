@@ -10,7 +10,7 @@ from vergence.parts import knob, part
 
 @part("objective", "posture")
 class Posture:
-    """Draws the joints to a posture: q̇ = -λ (q - q_star), with a weight small beside the others'.
+    """Pulls the joints towards a posture: q̇ = -λ (q - q_star), with a small weight.
 
     With the pseudo-inverse it acts in the null space of the other objectives.
     """

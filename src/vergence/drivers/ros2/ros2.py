@@ -32,7 +32,7 @@ _AHEAD_S = 0.02  # that a trajectory goes on before it brakes, at least
 
 @part("driver", "ros2")
 class Ros2:
-    """A robot behind ROS 2: joint states and images in, commands of its arm controller out."""
+    """A robot behind ROS 2: reads joint states and images, and commands its arm controller."""
 
     address: str = "/usr/bin/python3"  # Python interpreter that has rclpy
     command: Literal["trajectory", "velocity", "position", "twist"] = "trajectory"  # see the guide

@@ -9,7 +9,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "pose")
 class CameraPosition:
-    """The task is over once the camera, or what its arm holds, is near a place in the world."""
+    """Ends the task when the camera, or the object that the arm holds, is near a position."""
 
     position_m: tuple[float, float, float] = knob(..., "m")  # x, y, z of the camera
     tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # distance that counts as there

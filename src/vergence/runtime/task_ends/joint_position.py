@@ -11,7 +11,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "joint")
 class JointPosition:
-    """The task is over once a joint is above or below a position."""
+    """Ends the task when a joint is above or below a position."""
 
     joint: str = knob(...)  # name of the joint
     above_deg: float | None = (

@@ -11,7 +11,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "reached")
 class Reached:
-    """The task is over once every image of some time shows the features, or the pose, as desired.
+    """Ends the task when features or pose have been as desired for some time.
 
     A task that knows its goal by itself, such as `reach` or `advance`, ends there whatever these
     tolerances say.

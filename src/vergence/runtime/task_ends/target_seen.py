@@ -9,7 +9,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "seen")
 class TargetSeen:
-    """The task is over once some features of the target were found in several images in a row."""
+    """Ends the task when features of the target were found in several consecutive images."""
 
     images: int = knob(3, least=1, upto=1000)  # number of consecutive images
     looks_for_target: ClassVar[bool] = True  # so that a task without images has to

@@ -7,7 +7,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "time")
 class TimeOver:
-    """The task is over after some time."""
+    """Ends the task after some time."""
 
     time_s: float = knob(..., "s", above=0, upto=86400)  # time since the task began
 

@@ -9,7 +9,7 @@ from vergence.vision.curves.rings import joined_rings, resampled, rings_of, sign
 
 @part("tracker", "region")
 class RegionTracking:
-    """Follows a region that is lighter or darker than all around it; see `RegionTracker`."""
+    """Follows a region that is lighter or darker than its surroundings; see `RegionTracker`."""
 
     holes: bool = knob(True)  # whether to track holes
 

@@ -12,7 +12,7 @@ from vergence.vision.tracks import PointTracker, Tracks, nothing_found
 
 @part("tracker", "tags")
 class TagTracking:
-    """Follows corners of markers by the markers' numbers, so that none is taken for another."""
+    """Follows corners of markers, which are identified by their numbers."""
 
     dictionary: str = knob("apriltag_36h11")  # dictionary of the markers, such as aruco_4x4_50
     noise_px: float = knob(0.05, "px", above=0, upto=100)  # smallest standard deviation of a corner
