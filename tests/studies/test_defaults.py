@@ -39,8 +39,9 @@ def test_a_plan_that_passes_near_a_singularity_is_followed_to_its_end(
     found = plan(far, np.random.default_rng(10))
     assert isinstance(found.path, Path)
     assert follow(far, found.path, np.random.default_rng(10)).end is End.REACHED
-    # The limits of a law without a plan would hold the arm on the way.
-    monkeypatch.setattr(defaults_run, "limits_on_plan", lambda limits, *_: limits)
+    # A law that keeps its distance from singularities is held on the way.
+    away = Limits(manipulability_share=0.2)
+    monkeypatch.setattr(defaults_run, "limits_on_plan", lambda *_: away)
     assert follow(far, found.path, np.random.default_rng(10)).end is not End.REACHED
 
 

@@ -6,9 +6,7 @@ from vergence.control import Limits
 
 PLAN_MARGIN_PX, PLAN_MARGIN_JOINT = 10.0, 0.01  # of a plan whose task states none
 _SHARE = 0.5  # of a plan's margins that is kept: it was made to be followed to within them
-# A plan keeps clear of borders by itself: near them it is not to be slowed. It may pass near a
-# singularity, where rates stay within the joints' limits.
-_RATE_HZ, _MANIPULABILITY_SHARE = 8.0, 0.0
+_RATE_HZ = 8.0  # a plan keeps clear of borders by itself: near them it is not to be slowed
 
 
 def limits_on_plan(
@@ -23,11 +21,10 @@ def limits_on_plan(
         period_s: how long a command acts.
     """
     view_px, joint = limits.view_margin_px, limits.joint_margin
-    rate, share = limits.approach_rate_hz, limits.manipulability_share
+    rate = limits.approach_rate_hz
     return replace(
         limits,
         view_margin_px=_SHARE * margin_px if view_px is None else view_px,
         joint_margin=_SHARE * margin_joint / 2.0 if joint is None else joint,
         approach_rate_hz=min(_RATE_HZ, 1.0 / period_s) if rate is None else rate,
-        manipulability_share=_MANIPULABILITY_SHARE if share is None else share,
     )

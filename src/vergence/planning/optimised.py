@@ -15,10 +15,11 @@ from vergence.planning.problem import PlanningProblem
 from vergence.planning.separation import Separation
 from vergence.planning.smoothing import SplineProblem, least_clearance, optimise_spline
 from vergence.planning.spline import SplineBasis, fit_controls, spline_basis
-from vergence.planning.tree import connect_trees, pull_into_view, shorten
+from vergence.planning.tree import pull_into_view, shorten
+from vergence.planning.tree_search import TreeSearch
 from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
-from vergence.robot.inverse_kinematics import finite_range, goal_configurations
+from vergence.robot.inverse_kinematics import goal_configurations
 
 PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
 WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last
@@ -56,7 +57,8 @@ class OptimisedPlanner:
     )
     smoothing: float = knob(0.005, least=0, upto=1)  # weight of the path's curvature
     branches: int = (
-        knob(3, least=1, upto=16)  # number of inverse kinematics solutions of the goal to try
+        knob(3, least=1, upto=16)  # number of inverse kinematics solutions of the goal to try; if
+        # none leads there, as many again
     )
     waypoints: int = knob(121, least=8, upto=10000)  # way-points of the resulting path
     tree_samples: int = (
@@ -72,46 +74,66 @@ class OptimisedPlanner:
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
+        goals = self._goals(problem)
         separation = Separation(problem)
-        plan = self._with_margins(problem, WRIST_CELLS[0], separation)
-        if isinstance(plan, Path) or plan.proved or plan.obstacle is Obstacle.COLLISION:
-            return plan
+        if not len(goals):
+            failure = _unreachable(problem)
+            proved = failure.obstacle is not Obstacle.COLLISION and separation.proves_no_path(
+                PROOF_CELLS[1]
+            )
+            return _proved(failure) if proved else failure
+        trees = TreeSearch(problem, goals, 2 * SOFT_MARGIN, self.tree_samples)
+        found = self._direct(problem, goals)
+        if found is None and separation.proves_no_path(PROOF_CELLS[0]):
+            return _proved(self._obstacle(problem, goals))
+        found = found or self._searched(problem, goals, WRIST_CELLS[0], trees)
+        if found is not None:
+            return found
+        failure = self._obstacle(problem, goals)
+        if failure.obstacle is Obstacle.COLLISION:
+            return failure
         if separation.proves_no_path(PROOF_CELLS[1]):
-            return _proved(plan)
-        if separation.bars_wrist(self._goals(problem)):
-            return plan  # without margins there is no way either
+            return _proved(failure)
+        if separation.bars_wrist(goals):
+            return failure  # without margins there is no way either
         for share in MARGINS:
             px, joint = share * problem.margin_px, share * problem.margin_joint
             nearer = replace(problem, margin_px=px, margin_joint=joint)
-            found = self._with_margins(nearer, WRIST_CELLS[1], separation)
-            if found:
+            found = self._direct(nearer, goals)
+            found = found or self._searched(nearer, goals, WRIST_CELLS[1], trees)
+            if found is not None:
                 return found
-        return plan
+        return failure
 
     def _goals(self, problem: PlanningProblem) -> FloatArray:
         """Return goal configurations without collisions, (G, n)."""
         bodies = problem.bodies
         return goal_configurations(
-            problem.arm, problem.T_world_goal, problem.q_start, self.branches,
+            problem.arm, problem.T_world_goal, problem.q_start, 2 * self.branches,
             None if bodies is None else lambda q: not collision_at(bodies, q),
         )  # fmt: skip
 
-    def _with_margins(
-        self, problem: PlanningProblem, wrist_cells: int, separation: Separation
-    ) -> Path | PlanFailure:
-        goals = self._goals(problem)
-        if not len(goals):
-            return _unreachable(problem)
-        view = problem.view(_margin_kept(problem))
-        best = self._from_guesses(problem, view, goals) or self._from_detours(problem, view, goals)
-        if best is None:
-            if separation.proves_no_path(PROOF_CELLS[0]):
-                return _proved(self._obstacle(problem, view, goals))
-            best = self._from_wrist(problem, view, goals, wrist_cells)
-            if best is None and self.tree_samples > 0:
-                best = self._from_tree(problem, view, goals)
-        if best is None:
-            return self._obstacle(problem, view, goals)
+    def _direct(self, problem: PlanningProblem, goals: FloatArray) -> Path | None:
+        """Return the best of what guesses come to, or of detours where bodies are in the way."""
+        view = _view(problem)
+        for some in filter(len, (goals[: self.branches], goals[self.branches :])):
+            best = self._from_guesses(problem, view, some)
+            best = best or self._from_detours(problem, view, some)
+            if best is not None:
+                return self._path(problem, best)
+        return None
+
+    def _searched(
+        self, problem: PlanningProblem, goals: FloatArray, wrist_cells: int, trees: TreeSearch
+    ) -> Path | None:
+        """Return what a search over the wrist finds, or else one by trees."""
+        view = _view(problem)
+        guess = wrist_path(problem, view, goals, wrist_cells)
+        best = self._smoothest(problem, view, [guess]) if len(guess) else None
+        best = best or self._from_tree(problem, view, trees)
+        return None if best is None else self._path(problem, best)
+
+    def _path(self, problem: PlanningProblem, best: _Candidate) -> Path:
         return Path.through(problem, self._waypoints(best.controls), "optimised")
 
     def _waypoints(self, controls: FloatArray) -> FloatArray:
@@ -210,28 +232,15 @@ class OptimisedPlanner:
         return best
 
     def _from_tree(
-        self, problem: PlanningProblem, view: View, goals: FloatArray
+        self, problem: PlanningProblem, view: View, trees: TreeSearch
     ) -> _Candidate | None:
-        arm, random = problem.arm, np.random.default_rng(0)
-        low, high = finite_range(arm, problem.q_start)
-        samples = random.uniform(low, high, (self.tree_samples, arm.joint_count))
-        scale = 1.0 / arm.rate_max
-        path = connect_trees(
-            arm.chain, view, 2 * SOFT_MARGIN, low, high, scale,
-            problem.q_start.copy(), goals, samples, 0.15,
-        )  # fmt: skip
+        path = trees.waypoints(view)
         if not len(path):
             return None
+        arm, random = problem.arm, np.random.default_rng(0)
         draws = (random.random((200, 2)), np.empty((0, 2)))
-        return self._smoothest(
-            problem, view, [shorten(arm.chain, view, scale, path, some) for some in draws]
-        )
-
-    def _from_wrist(
-        self, problem: PlanningProblem, view: View, goals: FloatArray, cells: int
-    ) -> _Candidate | None:
-        guess = wrist_path(problem, view, goals, cells)
-        return self._smoothest(problem, view, [guess]) if len(guess) else None
+        shorter = [shorten(arm.chain, view, 1.0 / arm.rate_max, path, some) for some in draws]
+        return self._smoothest(problem, view, shorter)
 
     def _smoothest(
         self, problem: PlanningProblem, view: View, guesses: Sequence[FloatArray]
@@ -245,8 +254,9 @@ class OptimisedPlanner:
                     return found
         return None
 
-    def _obstacle(self, problem: PlanningProblem, view: View, goals: FloatArray) -> PlanFailure:
+    def _obstacle(self, problem: PlanningProblem, goals: FloatArray) -> PlanFailure:
         """Name the constraint without which there would be a path."""
+        view, goals = _view(problem), goals[: self.branches]
         if problem.bodies is not None:
             free = self._from_guesses(replace(problem, bodies=None), view, goals)
             if free is not None:
@@ -301,6 +311,10 @@ def _image_margin_px(problem: PlanningProblem, T_world_camera: FloatArray) -> fl
 def _margin_kept(problem: PlanningProblem) -> float:
     """Return the margin to the image border: the desired one, or less where the ends have less."""
     return max(0.0, min(problem.margin_px, *(0.8 * m - 0.1 for m in _end_margins_px(problem))))
+
+
+def _view(problem: PlanningProblem) -> View:
+    return problem.view(_margin_kept(problem))
 
 
 def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:

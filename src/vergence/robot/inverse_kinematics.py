@@ -1,6 +1,6 @@
 """Joint positions that bring the tip to a pose: all branches that random seeds find."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
@@ -12,6 +12,7 @@ from vergence.robot import Arm, Chain, forward_kinematics, jacobian
 
 SEEDS = 48  # random starts of the search
 TOLERANCE = 1e-8  # of the pose, m and rad together
+_SAME = 1e-4  # rad or m, between joint positions that are one solution
 
 
 @njit(cache=True)
@@ -55,7 +56,7 @@ def solve_from_seeds(
         q, error = solve_pose(chain, seed, T, low, high, 40)
         known = error >= 100 * TOLERANCE
         for k in range(count):
-            known = known or np.abs(found[k] - q).max() < 1e-4
+            known = known or np.abs(found[k] - q).max() < _SAME
         if not known:
             found[count] = q
             count += 1
@@ -89,8 +90,17 @@ def goal_configurations(
     solutions = solve_from_seeds(arm.chain, seeds, np.ascontiguousarray(T), low, high)
     turned = [shifted for q in solutions for shifted in _full_turns(arm, q, low, high)]
     turned.sort(key=lambda q: float(np.abs((q - near) / arm.rate_max).max()))
-    fitting = islice((q for q in turned if allowed is None or allowed(q)), most)
+    fitting = islice((q for q in _once(turned) if allowed is None or allowed(q)), most)
     return np.array(list(fitting)).reshape(-1, arm.joint_count)
+
+
+def _once(solutions: list[FloatArray]) -> Iterator[FloatArray]:
+    """Yield each solution once: turned by whole turns, two seeds' may be one."""
+    seen: list[FloatArray] = []
+    for q in solutions:
+        if not any(np.abs(other - q).max() < _SAME for other in seen):
+            seen.append(q)
+            yield q
 
 
 def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:

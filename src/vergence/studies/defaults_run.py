@@ -1,7 +1,7 @@
 """One start and goal, served by one choice of settings, on exact kinematics; judged strictly."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from time import process_time
 from typing import NamedTuple
@@ -40,6 +40,7 @@ from vergence.planning import (
     PlanningProblem,
     Trajectory,
 )
+from vergence.planning.replanner import MOST_PLANS
 from vergence.runtime.arrival import Arrival, Goal
 from vergence.runtime.stages import Planner
 from vergence.signals import ImagePoints, JointState, Observation, Reference
@@ -103,7 +104,8 @@ class Finish(NamedTuple):
     m: float  # true distance of the camera from its goal
     deg: float  # and angle
     time: float  # s
-    reason: str = ""
+    reason: str
+    q: FloatArray  # (n,) where the joints are
 
 
 class TrueScene:
@@ -149,7 +151,7 @@ class TrueScene:
         close = error < REACHED_PX and alike
         if close and end in (End.STALLED, End.UNNAMED, End.OFF, End.LATE):
             end = End.REACHED
-        return Finish(end, error, m, deg, time, reason)
+        return Finish(end, error, m, deg, time, reason, q.copy())
 
 
 def _pose_deviation(scene: Scene, noise_px: float) -> tuple[float, float]:
@@ -317,6 +319,28 @@ def plan(scene: Scene, random: np.random.Generator, noise_px: float = 0.0) -> Pl
     )
     path = OptimisedPlanner().plan(problem)
     return Planned(path, process_time() - begin)
+
+
+def plan_again(
+    scene: Scene, finish: Finish, random: np.random.Generator, noise_px: float = 0.0
+) -> Finish:
+    """Plan from where the arm stalls and follow that path, as often as `Replanner` does.
+
+    Args:
+        scene: what is true.
+        finish: how the run ended so far.
+        random: draws the noise.
+        noise_px: standard deviation of each measured coordinate.
+    """
+    for _ in range(MOST_PLANS):
+        if finish.end not in (End.STALLED, End.UNNAMED):
+            break
+        here = replace(scene, q_start=finish.q)
+        found = plan(here, random, noise_px)
+        if not isinstance(found.path, Path):
+            break
+        finish = follow(here, found.path, random, noise_px)
+    return finish
 
 
 def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: float = 0.0) -> Finish:

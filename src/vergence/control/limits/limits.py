@@ -57,10 +57,9 @@ class Limits:
     clearance_m: float = (
         knob(0.02, "m", least=0, upto=10)  # distance between lines of sight and obstacles
     )
-    manipulability_share: float | None = (
-        knob(None, least=0, below=1)  # fraction of √det(J Jᵀ) at the start to keep; default 0.2,
-        # or 0 on a plan
-    )
+    manipulability_share: float = knob(
+        0.0, least=0, below=1
+    )  # fraction of √det(J Jᵀ) at the start to keep; yields if it alone stops the arm
     approach_rate_hz: float | None = (
         knob(None, "1/s", above=0, upto=1e3)  # rate of approach to a limit, relative to the
         # distance left; default 2, or 8 on a plan

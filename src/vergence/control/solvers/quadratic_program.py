@@ -31,7 +31,7 @@ from vergence.parts import knob, part
 from vergence.robot import NearPairs, manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
-_MANIPULABILITY_SHARE, _APPROACH_RATE_HZ = 0.2, 2.0
+_APPROACH_RATE_HZ = 2.0
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
 _DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
@@ -74,9 +74,7 @@ class BoundProgram:
 
     def __init__(self, program: QuadraticProgram, setting: Setting) -> None:
         self._setting = setting
-        self._limits = limits = setting.limits or Limits()
-        share = limits.manipulability_share
-        self._manipulability_share = _MANIPULABILITY_SHARE if share is None else share
+        self._limits = setting.limits or Limits()
         self.names = self._limits.names
         self.settings = constraint_settings(setting, self._limits)
         self.view = self.settings.view_low, self.settings.view_high
@@ -151,7 +149,7 @@ class BoundProgram:
         if q is None or "singularity" not in self._limits.order:
             return q is not None
         measure = manipulability_measure(self._setting.arm.jacobian(q))
-        least = self._manipulability_share * measure
+        least = self._limits.manipulability_share * measure
         self.settings = self.settings._replace(manipulability_min=least)
         return True
 
