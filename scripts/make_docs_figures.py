@@ -50,14 +50,14 @@ def answer(name: str, *command: str) -> dict[str, Any]:
 def reproduce(paper: str) -> None:
     """Write a study's checks and figures."""
     checks = answer(paper, "reproduce", paper)["checks"]
-    lines = ["| check | the paper | measured | holds |", "|---|---|--:|---|"]
+    lines = ["| check | expected | measured | holds |", "|---|---|--:|---|"]
     for check in checks:
         measured = f"{check['measured']:.3g} {check['unit']}".strip()
         said = check["paper"].replace("|", "\\|")
         holds = "yes" if check["holds"] else "**no**"
         lines.append(f"| `{check['name']}` | {said} | {measured} | {holds} |")
     held = sum(check["holds"] for check in checks)
-    lines += ["", f"{held} of {len(checks)} checks hold. What was measured besides:", ""]
+    lines += ["", f"{held} of {len(checks)} checks hold. Further measurements:", ""]
     lines += [f"- `{check['name']}`: {check['note']}" for check in checks if check["note"]]
     (DOCS / "papers" / f"_{paper}.md").write_text("\n".join(lines) + "\n")
     images = DOCS / "images" / paper

@@ -5,7 +5,7 @@ from html import escape
 
 from vergence.studies import Check
 
-HEADINGS = ("check", "paper", "measured", "unit", "holds", "note")
+HEADINGS = ("check", "expected", "measured", "unit", "holds", "note")
 
 
 def as_json(check: Check) -> Mapping[str, object]:

@@ -26,6 +26,10 @@ _REMARK = (
     "All laws have the same random {drawn}, with the target in view at the start, and the same "
     "goal. Features are exact projections; the cell's rate and acceleration limits apply; {motion}."
 )
+_LAG = (
+    "The target moves, so laws without feed-forward end with a steady lag; --tolerance-px allows "
+    "for it."
+)
 
 
 def compare(options: "CompareOptions") -> int:
@@ -75,6 +79,7 @@ def _write_page(
 ) -> "Path":
     from vergence.app.figures.endings import scores_figure, starts_figure
     from vergence.experiments import Ending, Goal
+    from vergence.parts import kind_of
 
     cell = source.load()
     goal = Goal.of(cell)
@@ -82,13 +87,14 @@ def _write_page(
     middle = tuple(sum(row[axis] for row in goal.desired_px) / count for axis in (0, 1))
     size = cell.cameras[cell.task.camera].resolution
     failing = any(score.count(Ending.CONVERGED) < score.trials for score in found.scores)
+    lag = "" if kind_of(cell.target.motion) == "stationary" else f" {_LAG}"
     tables = html_table(found.headings, [found.row(score) for score in found.scores])
     parts = [
         markup.section(
             "Result",
             tables,
             f"<p>Converged: every feature within {how.options.tolerance_px:g} px at the end. Time "
-            "until then and the camera's path are medians over the runs that converged.</p>",
+            f"until then and the camera's path are medians over the runs that converged.{lag}</p>",
             markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),
         markup.section(

@@ -223,7 +223,9 @@ def watch(options: WatchOptions) -> int:
     return command(options)
 
 
-@app.command(epilog="Example: vergence compare panda --laws image_based,constrained --starts 40")
+@app.command(
+    epilog="Example: vergence compare panda --laws image_based,constrained --tolerance-px 5"
+)
 @takes(CompareOptions)
 def compare(options: CompareOptions) -> int:
     """Run several laws from the same random starts, and show where each of them fails."""
