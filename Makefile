@@ -15,7 +15,7 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup test-drivers test-images test-browser demo test docs bench peers format clean
+.PHONY: help setup drivers test-drivers test-images test-browser demo test docs bench peers format clean
 .PHONY: check kernels wheel test-wheel lint lint-format lint-rules lint-types lint-page bounds fuzz soak
 
 help:
@@ -63,6 +63,8 @@ demo: setup
 
 test: setup test-images test-browser
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
+
+drivers: $(DRIVERS:%=.drivers/%/.installed)
 
 test-drivers: $(DRIVERS:%=test-driver-%)
 
