@@ -174,7 +174,7 @@ def find(
         known = [each for each, value in vars(module).items() if hasattr(value, "__part_roles__")]
         raise refuse(f"but {name} has no {attribute}; its parts: {nearest(attribute, known)}")
     if not isinstance(found, type):
-        raise refuse("which is no class")
+        raise refuse("which is not a class")
     declared = getattr(found, "__part_roles__", ())
     if role not in declared:
         what = f"declared as {' and '.join(declared) or 'nothing'}"

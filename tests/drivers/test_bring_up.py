@@ -77,7 +77,7 @@ def test_a_robot_that_is_as_its_model_passes_and_returns_to_its_start(
     robot = Robot(monkeypatch, images=True)
     found = findings(robot, camera=True)
     assert wrong(found) == {}
-    assert sum("moves as told" in each.name for each in found) == 6
+    assert sum("moves as commanded" in each.name for each in found) == 6
     assert sum("turns as in the model" in each.name for each in found) == 6
     assert np.abs(robot.world.joint_position("ur5") - robot.start).max() < 0.002
 
@@ -106,9 +106,9 @@ def _mirrored(step, robot: Robot):
 @pytest.mark.parametrize(
     ("faults", "name", "note"),
     [
-        ({"sign": [1, 1, -1, 1, 1, 1]}, "elbow_joint moves as told", "the other way"),
-        ({"order": [1, 0, 2, 3, 4, 5]}, "shoulder_pan_joint moves as told", "another order"),
-        ({"unit": 57.3 / 180}, "elbow_joint moves as told", "another amount"),
+        ({"sign": [1, 1, -1, 1, 1, 1]}, "elbow_joint moves as commanded", "the other way"),
+        ({"order": [1, 0, 2, 3, 4, 5]}, "shoulder_pan_joint moves as commanded", "another order"),
+        ({"unit": 57.3 / 180}, "elbow_joint moves as commanded", "another amount"),
         ({"rate_unit": 57.3}, "elbow_joint reports its rate", "another unit"),
         ({"pace": 1.2}, "drift of the robot's clock", "another clock"),
         ({"late_s": 0.5}, "age of the images of wrist by their stamps", "another clock"),
@@ -125,7 +125,7 @@ def test_what_is_wrong_is_named_with_its_cause(
 
 def test_no_joint_moves_before_everything_at_rest_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = Robot(monkeypatch, late_s=0.5)
-    assert not any("moves as told" in each.name for each in findings(robot))
+    assert not any("moves as commanded" in each.name for each in findings(robot))
 
 
 def test_the_command_prints_and_writes_what_it_found(

@@ -101,7 +101,7 @@ def test_a_mesh_that_cannot_be_drawn_costs_the_drawing_only(tmp_path, caplog, fi
     assert mast_shapes(model) == [ROD]
     assert len(caplog.records) == 1
     text = caplog.records[0].getMessage()
-    assert f"mast cannot be drawn as the file says: mesh package://robots/{file}" in text
+    assert f"mast cannot be drawn: mesh package://robots/{file}" in text
     assert re.search(complaint, text)
 
 

@@ -80,7 +80,7 @@ def require_photograph(context: LawContext, images: bool) -> None:
     """
     cell = context.cell
     if not images:
-        given = "--no-images, which leaves nothing to recognise the goal in"
+        given = "--no-images, but the goal is recognised in images"
         raise InputError(str(cell.path), "task.goal", given, "images")
     assert isinstance(cell.task, ReachTable)
     if cell.task.goal is not None:

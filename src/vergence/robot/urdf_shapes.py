@@ -16,7 +16,7 @@ _LOG = logging.getLogger(__name__)
 _SCHEMES = ("package", "model")  # of names that begin with that of a package
 _METRES_MAX = 20.0  # no link is larger
 _NAMED = 3  # links in a warning
-_INSTEAD = "Shapes that can be drawn, or rods, stand in for them; the arm moves as it should."
+_INSTEAD = "Other shapes or rods are drawn instead; the arm's motion is not affected."
 _SIZES: dict[str, dict[str, int]] = {  # how many numbers the keys of a shape have
     "box": {"size": 3},
     "cylinder": {"radius": 1, "length": 1},
@@ -73,7 +73,7 @@ def report_faults(shapes: Shapes, needed: bool) -> None:
     if needed:
         given = next(iter(faults)) + others
         raise InputError(str(shapes.path), f"shapes of {names}", given, "meshes that can be drawn")
-    text = "%s: %s cannot be drawn as the file says: %s%s. %s"
+    text = "%s: %s cannot be drawn: %s%s. %s"
     _LOG.warning(text, shapes.path.name, names, next(iter(faults)), others, _INSTEAD)
 
 

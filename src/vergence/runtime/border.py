@@ -102,7 +102,7 @@ class Border:
     def _check_clock(self, time: float, elapsed: float) -> Fault | None:
         """Say what is wrong with a clock that went backwards, far ahead, or hardly at all."""
         if 0.0 <= elapsed < np.inf and self._behind > _FROZEN_S:
-            return clock_error(f"the driver's clock stands at {time:.3f} s while set-points go on")
+            return clock_error(f"the driver's clock stays at {time:.3f} s while set-points go out")
         if 0.0 <= elapsed < np.inf and self._at_rest():
             return None
         return clock_error(

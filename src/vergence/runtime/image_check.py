@@ -44,7 +44,7 @@ class ImageCheck:
     def check(self, frame: Frame, sample: Sample) -> Fault | bool:
         """Say what is wrong with a frame; if nothing is, whether it is new."""
         if frame.camera not in self._cameras:
-            return bad_sample(f"an image of {frame.camera!r}, which is no camera of the driver")
+            return bad_sample(f"an image of {frame.camera!r}, which is not a camera of the driver")
         age = sample.time - frame.time
         if not age >= -EARLY_S:
             reason = f"an image of {frame.camera} is stamped {-age:.3g} s in the future"

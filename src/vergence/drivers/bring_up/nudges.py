@@ -84,7 +84,12 @@ def _joint_finding(
     elif abs(share - 1.0) > _MOVED:
         note = "it moved by another amount: degrees for radians, a gear, or a brake"
     return Finding(
-        f"{joint_name} moves as told", float(share), "of the move", "0.75 to 1.25", not note, note
+        f"{joint_name} moves as commanded",
+        float(share),
+        "of the move",
+        "0.75 to 1.25",
+        not note,
+        note,
     )
 
 
