@@ -165,8 +165,9 @@ def _invite(server: "Server", options: "WatchOptions") -> None:
         _say("Only this machine can reach it; --host opens it to others.", options)
     else:
         warn(
-            f"It listens on {server.host}: anyone who reaches it can watch and control the run, without "
-            f"password or encryption. Safer: `ssh -L {server.port}:localhost:{server.port} THIS-MACHINE`."
+            f"It listens on {server.host}: anyone who reaches it can watch and control the run, "
+            "without password or encryption. Safer: "
+            f"`ssh -L {server.port}:localhost:{server.port} THIS-MACHINE`."
         )
     if options.browser and _has_screen():
         import webbrowser
