@@ -134,7 +134,7 @@ class TaskSequence:
             started.driver.take_up(cell.task)
             if not self._images:  # what they show is of the task before
                 started.frames = {
-                    name: replace(frame, truth=started.driver.first_frame(name).truth)
+                    name: replace(started.driver.first_frame(name), time=frame.time)
                     for name, frame in frames.items()
                 }
         try:
