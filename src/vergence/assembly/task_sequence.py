@@ -131,12 +131,7 @@ class TaskSequence:
         cell, started, time = self._cells[self._number], self._first.driver, self._begun
         started.frames = dict(frames)
         if isinstance(started.driver, SimulatedDriver):
-            started.driver.take_up(cell.task)
-            if not self._images:  # what they show is of the task before
-                started.frames = {
-                    name: replace(started.driver.first_frame(name), time=frame.time)
-                    for name, frame in frames.items()
-                }
+            started.frames = started.driver.take_up(cell.task, frames)
         try:
             with self._naming(self._number):
                 parts = task_parts(cell, started, self._images, self._first.context.model)

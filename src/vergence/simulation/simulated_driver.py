@@ -116,10 +116,21 @@ class SimulatedDriver:
         )
         self._before_motion = list(self._queue)
 
-    def take_up(self, task: Task) -> None:
-        """Tell the truth from now on of what another task of the cell looks at."""
+    def take_up(self, task: Task, frames: Mapping[str, Frame]) -> dict[str, Frame]:
+        """Tell the truth from now on of what another task of the cell looks at.
+
+        Args:
+            task: the next one.
+            frames: taken at rest before it, by camera.
+
+        Returns:
+            The frames, which without images show what the next task looks at.
+        """
         self._curve = _curve_of(task)
         self.look_for(self._features_of(task, images=bool(self._renderers)))
+        if self._renderers:
+            return dict(frames)
+        return {name: replace(self._frame(name), time=f.time) for name, f in frames.items()}
 
     def restart_cameras(self) -> None:
         """Begin again with what the cameras see now; to be called before the first `step`."""
