@@ -16,8 +16,8 @@ import numpy as np
 from bench_known_object import CAMERA, IMAGES, PACKAGE, QUADS, SIDE, cube, real_images, start
 from harness import Block, Missing, Peer, measured, row
 from peer_programs import BUILT, NO_VISP, Program, program
-from vergence.app.tracking import ObjectFollower
 from vergence.arrays import FloatArray, ImageArray
+from vergence.estimation.object_follower import ObjectFollower
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import EdgeTracker
 

@@ -25,6 +25,7 @@ PAPERS = (
     "mezouar2001",
     "guarantees",
     "honesty",
+    "region",
     "photograph",
     "defaults",
 )

@@ -45,7 +45,7 @@ def test_a_turn_that_does_not_show_is_not_corrected_and_the_rest_is() -> None:
 def test_its_variance_is_that_of_the_prediction_up_to_a_bound_and_told_as_unknown_there() -> None:
     rng = np.random.default_rng(1)
     belief, motions = turning(rng)
-    axis = motions[3:, 0]
+    axis, none = motions[3:, 0], np.zeros((6, 6))
     for size in (0.1, 10.0):
         known = replace(belief, covariance=size * belief.covariance)
         predicted = axis @ known.covariance[3:6, 3:6] @ axis
@@ -53,7 +53,7 @@ def test_its_variance_is_that_of_the_prediction_up_to_a_bound_and_told_as_unknow
         assert axis @ after.covariance[3:6, 3:6] @ axis == pytest.approx(
             min(predicted, MOST_RAD**2)
         )
-        told = told_covariance(after, motions, np.zeros((6, 6)))
+        told = told_covariance(after, motions, none, none)
         expected = predicted if predicted < MOST_RAD**2 else UNKNOWN_RAD**2
         assert axis @ told[3:6, 3:6] @ axis == pytest.approx(expected)
         shown = shown_covariance(after, motions)

@@ -178,3 +178,14 @@ def test_a_list_of_features_is_a_model_without_edges() -> None:
     model = ObjectModel.from_corners("marks", SIGNS * HALF)
     assert len(model.corners) == 8
     assert not len(model.edges)
+
+
+def test_a_coarsened_ball_is_still_one() -> None:
+    vertices, triangles = ellipsoid((0.1, 0.1, 0.1))
+    ball = ObjectModel.from_mesh("ball", vertices, triangles)
+    coarse = ball.coarsened(1500)
+    assert 300 < len(coarse.triangles) <= 1500
+    radius = np.linalg.norm(coarse.vertices[coarse.triangles].reshape(-1, 3), axis=1)
+    assert radius.min() > 0.097
+    assert radius.max() <= 0.1 + 1e-9
+    assert ball.coarsened(10**6) is ball

@@ -5,10 +5,9 @@ import pytest
 from ball_scene import RADIUS, ball_place, colored_clutter, drawn_ball, outline_of_ball
 from known_scene import CAMERA, box_model
 
-from vergence.app.tracking import ObjectFollower, Sighting
-from vergence.app.tracking.follower import OUTLINE_RULE
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
+from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, free_axes, shown_by_edges
 from vergence.vision.known_object.contour_lines import BEYOND, REACH, read_lines

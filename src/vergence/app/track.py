@@ -13,10 +13,10 @@ from vergence.signals import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from vergence.app.options import TrackOptions
-    from vergence.app.tracking.follower import FollowRule, ObjectFollower, ObjectTracker, Step
     from vergence.app.tracking.footage import Footage, FootageFrame
     from vergence.arrays import ImageArray
     from vergence.camera import Camera
+    from vergence.estimation.object_follower import FollowRule, ObjectFollower, ObjectTracker, Step
     from vergence.vision.known_object import ObjectModel
 
 _NO_SAMPLES: dict[str, Any] = {
@@ -85,9 +85,9 @@ def _follower(
     footage: "Footage",
     first: "FootageFrame",
 ) -> "ObjectFollower":
-    from vergence.app.tracking.follower import ObjectFollower
     from vergence.app.tracking.start import starting_pose
     from vergence.errors import InputError
+    from vergence.estimation.object_follower import ObjectFollower
 
     for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
@@ -114,7 +114,7 @@ def _tracker(
 ) -> "tuple[ObjectTracker, FollowRule]":
     """Return what measures the object, chosen by its model, and when an image counts."""
     from vergence.app.options.track import Modality
-    from vergence.app.tracking.follower import OUTLINE_RULE, FollowRule
+    from vergence.estimation.object_follower import OUTLINE_RULE, FollowRule
     from vergence.vision.known_object import EdgeTracker, SilhouetteTracker, shown_by_edges
 
     by_edges = options.by is Modality.EDGES or (
@@ -159,7 +159,7 @@ class _Run:
         from itertools import chain
 
         from vergence.app.progress import bar
-        from vergence.app.tracking.follower import Sighting
+        from vergence.estimation.object_follower import Sighting
 
         steps: list[Step] = []
         took: list[float] = []
@@ -218,7 +218,7 @@ class _Run:
 
 
 def _summary(steps: "list[Step]", took: list[float], free: str) -> Tracked:
-    from vergence.app.tracking.follower import Sighting
+    from vergence.estimation.object_follower import Sighting
 
     seen = [step for step in steps if step.sighting is Sighting.SEEN]
     widest = np.max([step.deviation for step in seen], axis=0) if seen else np.full(2, np.nan)
@@ -236,7 +236,7 @@ def _summary(steps: "list[Step]", took: list[float], free: str) -> Tracked:
 
 def _outcome(steps: "list[Step]") -> Outcome:
     """Say how it ended: whatever the last image does not show is not held."""
-    from vergence.app.tracking.follower import Sighting
+    from vergence.estimation.object_follower import Sighting
 
     last = steps[-1]
     if last.sighting is Sighting.SEEN:

@@ -16,6 +16,7 @@ from vergence.geometry import se3, so3_exp, so3_log
 
 UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of an angle that may be anything
 MOST_RAD = 0.3  # up to which a turn that does not show is followed by its growing deviation
+_MOST = np.array((MOST_RAD**2, 9.0))  # rad² and rad²/s²
 _FIXED_RAD = 1e-4  # while a measurement is taken in
 _DAMPING = 0.8  # of a speed that does not show, per image
 
@@ -51,7 +52,7 @@ def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Beli
     T = updated.T_world_target
     R = so3_exp(np.ascontiguousarray(back[3:])) @ T[:3, :3]
     speed = turns.T @ updated.velocity[3:]
-    kept = np.minimum(unseen_variance(predicted, motions), MOST_RAD**2)
+    kept = np.minimum(unseen_variance(predicted, motions), _MOST[:, None])
     P = _projected(updated.covariance, motions) + _along(motions, kept)
     return replace(
         updated,
@@ -67,7 +68,9 @@ def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
     return np.ascontiguousarray(0.5 * (P + P.T))
 
 
-def told_covariance(belief: Belief, motions: FloatArray, shared: FloatArray) -> FloatArray:
+def told_covariance(
+    belief: Belief, motions: FloatArray, shared: FloatArray, astray: FloatArray
+) -> FloatArray:
     """Return the covariance (12, 12) of a belief to be told to others.
 
     A turn that has not shown for so long that its deviation reached the bound may be anything.
@@ -76,13 +79,15 @@ def told_covariance(belief: Belief, motions: FloatArray, shared: FloatArray) -> 
         belief: after an image.
         motions: that do not show, (6, K).
         shared: covariance of the pose error that all images have in common, (6, 6).
+        astray: and of what more is wrong while a turn is unknown, (6, 6); in proportion before.
     """
     P = belief.honest_covariance.copy()
     P[:6, :6] += shared
     if not motions.shape[1]:
         return P
-    variance = unseen_variance(belief, motions)
-    unknown = np.where(variance < (0.99 * MOST_RAD) ** 2, variance, UNKNOWN_RAD**2)
+    unknown = unseen_variance(belief, motions)
+    P[:6, :6] += min(float(unknown[0].max()) / MOST_RAD**2, 1.0) * astray
+    unknown[0, unknown[0] > (0.99 * MOST_RAD) ** 2] = UNKNOWN_RAD**2
     return np.ascontiguousarray(_projected(P, motions) + _along(motions, unknown))
 
 
@@ -97,9 +102,10 @@ def shown_covariance(
 
 
 def unseen_variance(belief: Belief, motions: FloatArray) -> FloatArray:
-    """Return the variance of each turn that does not show, (K,), rad²."""
-    turns = motions[3:]
-    return np.asarray(np.einsum("ik,ij,jk->k", turns, belief.covariance[3:6, 3:6], turns))
+    """Return the variances of turns that do not show, and of their speeds, (2, K), rad and s."""
+    turns, P = motions[3:], belief.covariance
+    blocks = np.stack((P[3:6, 3:6], P[9:12, 9:12]))
+    return np.asarray(np.einsum("ik,nij,jk->nk", turns, blocks, turns))
 
 
 def pose_error(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
@@ -117,5 +123,14 @@ def _projected(covariance: FloatArray, motions: FloatArray) -> FloatArray:
 
 
 def _along(motions: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Return F diag(variance) Fᵀ, of pose and velocity alike, (12, 12)."""
-    return np.asarray(np.kron(np.eye(2), (motions * variance) @ motions.T))
+    """Return F diag(variance) Fᵀ, (12, 12).
+
+    Args:
+        motions: F, (6, K).
+        variance: of pose and velocity, (2, K), or one for all.
+    """
+    P = np.zeros((12, 12))
+    for n, own in enumerate(np.broadcast_to(variance, (2, motions.shape[1]))):
+        block = slice(6 * n, 6 * n + 6)
+        P[block, block] = (motions * own) @ motions.T
+    return P

@@ -15,6 +15,7 @@ PAPERS = (
     "photograph",
     "defaults",
     "honesty",
+    "region",
 )
 
 

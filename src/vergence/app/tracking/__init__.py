@@ -1,6 +1,6 @@
 """`vergence track`: a known object in footage of one camera."""
 
-from vergence.app.tracking.follower import FollowRule, ObjectFollower, Sighting, Step
 from vergence.app.tracking.points import track_points
+from vergence.estimation.object_follower import FollowRule, ObjectFollower, Sighting, Step
 
 __all__ = ["FollowRule", "ObjectFollower", "Sighting", "Step", "track_points"]

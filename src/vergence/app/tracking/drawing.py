@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.overlay import DESIRED, FOUND, LOST
-from vergence.app.tracking.follower import ObjectTracker, Sighting, Step
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
+from vergence.estimation.object_follower import ObjectTracker, Sighting, Step
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker
 from vergence.vision.known_object.edge_samples import sample_edges
 from vergence.vision.known_object.silhouette import outline_of

@@ -64,6 +64,11 @@ class EdgeMeasurement(NamedTuple):
         return np.zeros((6, 6))
 
     @property
+    def astray(self) -> FloatArray:
+        """Covariance (6, 6) of what more is wrong while a turn is unknown: none is."""
+        return np.zeros((6, 6))
+
+    @property
     def share(self) -> float:
         """How much of what should be seen was found, 0 … 1."""
         return self.found / self.expected if self.expected else 0.0

@@ -124,7 +124,28 @@ def _turns(vertices: FloatArray, ends: IntArray, vertex: int, edges: list[int]) 
 
 def is_closed(triangles: IntArray) -> bool:
     """Tell whether every edge has two triangles that run along it in opposite directions."""
-    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    forward = np.unique(directed, axis=0)
-    backward = np.unique(directed[:, ::-1], axis=0)
-    return len(forward) == len(directed) and np.array_equal(forward, backward)
+    start = triangles.reshape(-1)
+    end = np.roll(triangles, -1, axis=1).reshape(-1)
+    count = int(triangles.max()) + 1
+    forward, backward = np.unique(start * count + end), np.unique(end * count + start)
+    return len(forward) == len(start) and np.array_equal(forward, backward)
+
+
+def clustered(
+    vertices: FloatArray, triangles: IntArray, step: float
+) -> tuple[FloatArray, IntArray]:
+    """Return a mesh whose vertices in each cube of a grid are merged into their mean.
+
+    Args:
+        vertices: (V, 3), m.
+        triangles: vertices of each, (F, 3).
+        step: side of the cubes, m.
+    """
+    cubes = np.floor(vertices / step).astype(np.int64)
+    _, number, members = np.unique(cubes, axis=0, return_inverse=True, return_counts=True)
+    number = number.reshape(-1)
+    means = np.zeros((len(members), 3))
+    np.add.at(means, number, vertices)
+    merged = number[triangles]
+    apart = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return means / members[:, None], merged[apart]

@@ -32,7 +32,8 @@ def _share_on_edges(model: ObjectModel, turn: FloatArray) -> float:
     T = se3(R, np.array((0.0, 0.0, 3.0 * model.size)) - R @ middle)
     closed = model.closed
     outline = outline_of(T, pack_lens(_CAMERA), model.vertices, model.triangles, closed, 100)
-    assert outline is not None  # it lies before the camera
+    if outline is None:  # thinner than a cell, as a plate is from aside
+        return 1.0
     start, along = model.edges[:, 0], model.edges[:, 1] - model.edges[:, 0]
     ahead = outline.points[:, None] - start
     place = np.clip(np.einsum("nej,ej->ne", ahead, along) / np.sum(along**2, axis=1), 0.0, 1.0)

@@ -1,6 +1,6 @@
 """A rigid object as vision knows it: sharp edges, corners where they meet, a surface that hides."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from vergence.arrays import FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
 from vergence.vision.known_object.mesh import (
+    clustered,
     corner_table,
     is_closed,
     merge_vertices,
@@ -112,6 +113,24 @@ class ObjectModel:
             allowed = "an object with corners, where sharp edges of different directions meet"
             raise InputError(self.name, "faces", given, allowed)
         return self
+
+    def coarsened(self, most: int) -> Self:
+        """Return a model of at most so many triangles, for its outline; itself if it has no more.
+
+        Vertices near each other are merged; edges and corners stay.
+        """
+        coarse, step = self, self.size / 200.0
+        while len(coarse.triangles) > most:
+            places, index = clustered(self.vertices, self.triangles, step)
+            normals = triangle_normals(places, index)
+            coarse = replace(
+                self,
+                vertices=frozen(places),
+                triangles=_frozen_index(index),
+                normals=frozen(normals),
+            )
+            step *= 1.25
+        return coarse
 
     @property
     def size(self) -> float:

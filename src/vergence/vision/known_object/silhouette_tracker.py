@@ -33,8 +33,9 @@ from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.silhouette import Outline, outline_of
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes
-from vergence.vision.known_object.weak_turns import least_shown_of, weak_turns
+from vergence.vision.known_object.weak_turns import USUAL, least_shown_of, weak_turns
 
+_MOST_TRIANGLES = 20_000  # of the mesh that is drawn: half a millisecond
 _INDEPENDENT = 60  # lines that err apart: neighbours share pixels
 _MOST_SCALE = 5  # pixels in a segment; odd
 _FINE = (1, 1)  # scales one after the other, for a pose that is known to some pixels
@@ -44,7 +45,9 @@ _LEARNING_GAPS_PX = (5.0, 2.0, 0.5)  # in the first image the contour is not kno
 _GAP_PX = 0.5  # on both sides of the contour, where pixels show both
 _LEARNED_DEPTH_PX = 18.0
 _FOUND_PX = 2.0  # residual of a line that found the contour
-_ASIDE = 0.03  # of the object's size, by which its origin is wrong while a turn is unknown
+# Of the object's size, by which its origin is wrong while a turn is unknown: across the line of
+# sight, and along it if it is like an ellipsoid.
+_ASIDE, _FARTHER = 0.04, 0.2
 _FORGOTTEN = 0.2  # of the share found, by one image
 _AS_USUAL = 0.85  # of it, with which a narrow search is content
 _BETTER = 1.2  # times as many lines a wide search has to find
@@ -68,6 +71,7 @@ class SilhouetteMeasurement(NamedTuple):
     colors: ColorModel  # of this image, along the lines found
     unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
     shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
+    astray: FloatArray  # (6, 6) and of what more is wrong while a turn is unknown
 
     @property
     def share(self) -> float:
@@ -103,6 +107,7 @@ class SilhouetteTracker:
     learned: float = 0.2  # share of an image in what the colours are taken to be
     bias_px: float = 0.1  # what does not average out along the outline: shading, model, lens
 
+    shape: ObjectModel = field(init=False, repr=False, compare=False)  # coarse enough to be drawn
     closed: bool = field(init=False, repr=False, compare=False)  # whether the mesh is
     least_shown: float = field(init=False, repr=False, compare=False)  # see `least_shown_of`
     size: float = field(init=False, repr=False, compare=False)  # of the model, m
@@ -112,10 +117,12 @@ class SilhouetteTracker:
     def __post_init__(self) -> None:
         if self.channels not in (1, 3):
             raise InputError("SilhouetteTracker", "channels", self.channels, "1 or 3")
-        object.__setattr__(self, "closed", self.model.closed)
+        shape = self.model.coarsened(_MOST_TRIANGLES)
+        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "closed", shape.closed)
         object.__setattr__(self, "size", self.model.size)
-        object.__setattr__(self, "axes", free_axes(self.model))
-        object.__setattr__(self, "least_shown", least_shown_of(self.model, self.axes))
+        object.__setattr__(self, "axes", free_axes(shape))
+        object.__setattr__(self, "least_shown", least_shown_of(shape, self.axes))
 
     @property
     def free(self) -> str:
@@ -197,7 +204,7 @@ class SilhouetteTracker:
 
     def _outline(self, T: FloatArray, lens: FloatArray) -> Outline | None:
         return outline_of(
-            T, lens, self.model.vertices, self.model.triangles, self.closed, self.lines
+            T, lens, self.shape.vertices, self.shape.triangles, self.closed, self.lines
         )
 
     def _look(
@@ -250,8 +257,6 @@ class SilhouetteTracker:
         learned = found & (lines.deep_odds > _LEARNED_ODDS)
         covered = lines.usable & (lines.deep_odds < -_LEARNED_ODDS)
         unseen, shared = self._unseen(T, lens, slopes), _shared_error(slopes, self.bias_px)
-        if unseen.shape[1] > len(self.axes.axes):  # a wrong turn puts the origin wrong, too
-            shared[:3, :3] += (_ASIDE * self.size) ** 2 * np.eye(3)
         expected, count = int(lines.usable.sum()), int(found.sum())
         # The less of the outline is found, the likelier some of it is something else's.
         doubt = (expected / max(count, 1)) ** 3
@@ -268,6 +273,7 @@ class SilhouetteTracker:
             self._counted(pixels, outline, learned, covered, _GAP_PX),
             unseen,
             shared,
+            self._astray(T, unseen),
         )
 
     def _unseen(self, T: FloatArray, lens: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -280,6 +286,21 @@ class SilhouetteTracker:
         half_px = 0.5 * self.size * lens[0] / T[2, 3]
         weak = weak_turns(slopes, free, half_px, self.least_shown)
         return np.hstack((free, weak))
+
+    def _astray(self, T: FloatArray, unseen: FloatArray) -> FloatArray:
+        """Return the covariance of what more is wrong while a turn is unknown, (6, 6).
+
+        Far along a turn that does not show, others go with it: an ellipsoid seen from its end is as
+        round as one that is farther away and seen from aside.
+        """
+        astray = np.zeros((6, 6))
+        if unseen.shape[1] > len(self.axes.axes):
+            astray[:3, :3] = (_ASIDE * self.size) ** 2 * np.eye(3)
+            if self.least_shown > USUAL:
+                ray = T[:3, 3] / np.linalg.norm(T[:3, 3])
+                astray[:3, :3] += (_FARTHER * self.size) ** 2 * np.outer(ray, ray)
+                astray[3:, 3:] = np.pi**2 / 3.0 * np.eye(3)  # of angles that may be anything
+        return astray
 
     def _counted(
         self,
@@ -326,5 +347,5 @@ def _nothing(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
     none = np.zeros((0, 2))
     return SilhouetteMeasurement(
         np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, none,
-        np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)),
+        np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
     )  # fmt: skip

@@ -51,6 +51,11 @@ class Measurement(Protocol):
         ...
 
     @property
+    def astray(self) -> FloatArray:
+        """Covariance (6, 6) of what more is wrong while a turn is unknown."""
+        ...
+
+    @property
     def share(self) -> float:
         """How much of what should be seen was found, 0 … 1."""
         ...
@@ -229,7 +234,7 @@ class ObjectFollower:
             reason,
             belief.T_world_target,
             belief.velocity,
-            told_covariance(belief, self._unseen, self._shared),
+            told_covariance(belief, self._unseen, self._shared, seen.astray),
             self._deviation(),
             seen.unseen,
             seen.share,
