@@ -1,6 +1,7 @@
 """`vergence check`: bring up a robot, and leave a page of what was found."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 _REMINDERS = (
     "Set payload and centre of gravity of camera and bracket on the robot's own panel.",
     "Set the robot's own speed limits and safety planes; vergence's limits do not replace them.",
-    "Kill the client once while the arm moves slowly, and see that the arm stops by itself.",
 )
 
 
@@ -28,7 +28,7 @@ def check(options: "CheckOptions") -> int:
     """Check a robot, print and write what was found; return the exit code."""
     from vergence.assembly import check_driver, open_driver, rehearse
     from vergence.cell import load_cell
-    from vergence.drivers.bring_up import bring_up
+    from vergence.drivers.bring_up import bring_up, killed_client_finding
 
     loaded = load_cell(options.cell, overrides(options.settings))
     check_driver(loaded, options.driver)
@@ -39,12 +39,19 @@ def check(options: "CheckOptions") -> int:
         rates = {name: loaded.cameras[name].rate_hz for name in loaded.watched}
         camera = carried_camera(loaded)
         nudges = np.deg2rad(options.nudge_deg), 1e-3 * options.nudge_mm
+        arm = opened.arms[loaded.task.arm]
         for found in bring_up(opened, loaded.task.arm, rates, camera, *nudges):
             findings.append(found)
             if not options.as_json:
                 say(_words(found))
     finally:
         opened.close()
+    if all(found.holds for found in findings):
+        again = partial(open_driver, loaded, options.driver)
+        by = np.where(arm.sliding, nudges[1], nudges[0])
+        findings.append(killed_client_finding(again, loaded.task.arm, by))
+        if not options.as_json:
+            say(_words(findings[-1]))
     folder = options.out or new_folder(f"check-{loaded.name}")
     page = _write_page(folder, loaded.name, options.driver, findings)
     holds = all(found.holds for found in findings)

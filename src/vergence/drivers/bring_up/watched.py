@@ -68,6 +68,11 @@ class SlowMotion:
         """Where the joints are told to be, (n,)."""
         return self._guard.position
 
+    @property
+    def rate_max(self) -> FloatArray:
+        """How fast each joint is moved at most, (n,), rad/s or m/s."""
+        return self._arm.rate_max
+
     def hold(self) -> None:
         """Step with the set-points at rest, or braking to it."""
         self._step(np.zeros(self._arm.joint_count))
