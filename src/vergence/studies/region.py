@@ -204,6 +204,7 @@ def _errors(images: Sequence[Followed]) -> Any:
             )  # fmt: skip
     axes.set_yticks(range(len(names)), names)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("error of the position (mm)")
     axes.grid(visible=False, axis="y")
     legend(axes)
