@@ -205,6 +205,7 @@ def _errors(images: Sequence[Followed]) -> Any:
     axes.set_yticks(range(len(names)), names)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
     axes.set_xlabel("error of the position (mm)")
     axes.grid(visible=False, axis="y")
     legend(axes)
