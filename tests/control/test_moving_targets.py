@@ -113,7 +113,7 @@ def lag_px(
 
     desired, depth = image(0.0)
     servo, waiting = law(arm, mounting, depth), deque()
-    reference = Reference(0.0, desired, np.zeros_like(desired), depth)
+    reference = Reference(0.0, desired, velocity_px=np.zeros_like(desired), depth_m=depth)
     for k in range(int(seconds / PERIOD)):
         waiting.append((k * PERIOD, image(k * PERIOD)[0]))
         if len(waiting) <= LATENCY:
@@ -145,7 +145,9 @@ def test_a_fixed_camera_keeps_what_slips_in_the_hand_in_its_place(before_a_stand
 
 
 def test_a_planned_path_is_carried_on_to_the_time_of_the_features():
-    reference = Reference(1.0, np.zeros((4, 2)), np.full((4, 2), 3.0), np.ones(4))
+    reference = Reference(
+        1.0, np.zeros((4, 2)), velocity_px=np.full((4, 2), 3.0), depth_m=np.ones(4)
+    )
     np.testing.assert_allclose(reference.at(1.5).points_px, 1.5)
     still = Reference(1.0, np.zeros((4, 2)))
     assert still.at(1.5) is still

@@ -73,7 +73,9 @@ def test_planned_trajectory_is_realised(
 def test_classical_image_based_servoing_fails_from_the_same_start() -> None:
     problem = section6()
     path = OptimisedPlanner().plan(problem)
-    goal = Reference(0.0, path.points_px[-1], np.zeros((9, 2)), path.depth_m[-1])
+    goal = Reference(
+        0.0, path.points_px[-1], velocity_px=np.zeros((9, 2)), depth_m=path.depth_m[-1]
+    )
     law = tracking_law(gain=0.5)
     run = follow(problem, None, law, CAMERA, settle_s=20.0, goal=goal)
     assert not run.succeeded
@@ -90,7 +92,7 @@ def test_lost_points_are_left_out_and_too_few_are_a_fault() -> None:
     law = tracking_law()
     joints = JointState(0.0, section6().q_start, np.zeros(6))
     desired = np.array([[300.0, 200.0], [350.0, 210.0], [340.0, 290.0], [310.0, 280.0]])
-    reference = Reference(0.0, desired, None, np.full(4, 0.7))
+    reference = Reference(0.0, desired, depth_m=np.full(4, 0.7))
     with_three = law.command(view(np.array([True, True, True, False])), reference, joints)
     assert with_three.fault is None
     elsewhere = replace(reference, points_px=desired + [[0, 0], [0, 0], [0, 0], [99, 99]])

@@ -5,7 +5,7 @@ import pytest
 
 from vergence.control import guard
 from vergence.runtime import loop
-from vergence.signals import Setpoint
+from vergence.signals import OutcomeKind, Setpoint
 from vergence.studies import guarantees
 from vergence.studies.guarantees_faults import FAULTS, blind_check, try_fault
 from vergence.studies.guarantees_runs import LAWS, arms, attempt
@@ -22,6 +22,7 @@ def test_random_runs_of_every_law_and_arm_pass_no_limit(known, first):
         excess, outcome = attempt(known, seed).run(1.0)
         assert excess.position <= 0.0, (seed, outcome)
         assert excess.rate <= 1e-12, (seed, outcome)
+        assert outcome.kind is not OutcomeKind.PART_RAISED, (seed, outcome)
 
 
 def test_every_law_meets_every_arm(known):

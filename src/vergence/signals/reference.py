@@ -1,7 +1,7 @@
 """What the servo should reach now."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Self
 
 from vergence.arrays import FloatArray
@@ -13,6 +13,7 @@ class Reference:
 
     time: float  # s
     points_px: FloatArray | None = None  # (M, 2) s*
+    _: KW_ONLY
     velocity_px: FloatArray | None = None  # (M, 2) ds*/dt, px/s
     depth_m: FloatArray | None = None  # (M,) depth of the points as the planner knows it
     desired_depth_m: FloatArray | None = None  # (M,) depth of the points at the goal

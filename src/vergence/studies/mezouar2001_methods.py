@@ -271,7 +271,9 @@ def tracking(law: Law, trajectory: Trajectory) -> Steer:
     def steer(time: float, q: FloatArray, px: FloatArray) -> FloatArray:
         # The command acts over the period that follows: feed forward for its middle.
         here, ahead = trajectory.reference(time), trajectory.reference(time + 0.5 * PERIOD)
-        desired = Reference(time, here.points_px, ahead.velocity_px, here.depth_m)
+        desired = Reference(
+            time, here.points_px, velocity_px=ahead.velocity_px, depth_m=here.depth_m
+        )
         state = JointState(time, q, np.zeros(len(q)))
         return law.command(_seen(time, px), desired, state).velocity
 

@@ -50,4 +50,10 @@ class MovingGoal:
         """Return what the law should aim at."""
         velocity = np.tile(self.velocity_px, (len(self.points_px), 1))
         points = self.points_px + time * velocity
-        return Reference(time, points, velocity, self.depth_m, self.T_camera_target)
+        return Reference(
+            time,
+            points,
+            velocity_px=velocity,
+            depth_m=self.depth_m,
+            T_camera_target=self.T_camera_target,
+        )
