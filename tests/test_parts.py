@@ -57,7 +57,7 @@ def test_an_objective_beside_the_cell_runs_and_is_compared(folder: Path) -> None
         ("law.gian", "1", "did you mean gain?"),
         ("law.kind", "mine:Center", "mine has no Center; its parts: Centre (did you mean Centre?)"),
         ("law.kind", "nowhere:Centre", "but no nowhere.py is in "),
-        ("law.kind", "mine:vg", "is no class"),
+        ("law.kind", "mine:vg", "is not a class"),
         ("law.kind", "pathlib:Path", "declared as nothing"),
         ("law.solver", "mine:Centre", "declared as objective"),
         ("law.kind", "broken:X", "raised ZeroDivisionError"),

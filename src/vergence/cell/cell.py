@@ -41,29 +41,23 @@ class Cell(Table):
     name: Name  # name of the cell; runs are named after it
     duration_s: Duration  # longest duration of a run
     seed: Annotated[int, Field(ge=0, lt=1 << 63)] = 0  # random seed
-    inner_rate_hz: Annotated[float, Field(ge=100, le=1e4)] = (
-        500.0  # rate of the physics, the inner loop and the guard
-    )
+    # Rate of the physics, the inner loop and the guard.
+    inner_rate_hz: Annotated[float, Field(ge=100, le=1e4)] = 500.0
     scene: SceneTable = SceneTable()  # surroundings of the arms
     arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # arms, by name
     cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # cameras, by name
     collision: CollisionTable = CollisionTable()  # collision avoidance
     target: TargetTable  # object that the cameras observe
     task: Task  # what the arm should do
-    tasks: Annotated[
-        tuple[Task, ...], Field(max_length=64)
-    ] = ()  # sequence of tasks, instead of a single one
+    # Sequence of tasks, instead of a single one.
+    tasks: Annotated[tuple[Task, ...], Field(max_length=64)] = ()
     perception: PerceptionTable = PerceptionTable()  # how the target's pose is estimated
-    outputs: dict[Name, OutputTable] = (
-        Field(default_factory=dict, max_length=16)  # outputs of the driver, such as a gripper, by
-        # name
-    )
+    # Outputs of the driver, such as a gripper, by name.
+    outputs: dict[Name, OutputTable] = Field(default_factory=dict, max_length=16)
     driver: DriverTable | None = None  # settings of the real robot; not needed in simulation
     law: Part  # control law
-    laws: dict[Name, Part] = (
-        Field(default_factory=dict, max_length=64)  # other laws by name, for tasks and for
-        # comparison
-    )
+    # Other laws by name, for tasks and for comparison.
+    laws: dict[Name, Part] = Field(default_factory=dict, max_length=64)
     _path: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
 

@@ -33,24 +33,18 @@ class ServoSettings:
     the same table; several stand in `objectives`.
     """
 
-    objectives: tuple[WeightedObjective, ...] = slot(
-        "term", many=True
-    )  # objectives, each with its weight
+    # Objectives, each with its weight.
+    objectives: tuple[WeightedObjective, ...] = slot("term", many=True)
     limits: Limits | None = slot("limits", None)  # limits; the solver's defaults if absent
-    solver: Solver = (
-        slot("solver", QuadraticProgram)  # solver that computes joint rates from the objectives
-    )
+    # Solver that computes joint rates from the objectives.
+    solver: Solver = slot("solver", QuadraticProgram)
     depth_m: float | None = knob(None, "m", above=0, upto=1e3)  # initial depth
     depth: Depth | None = slot("depth", None)  # source of the depth; chosen automatically if absent
-    feed_forward: bool | None = (
-        knob(None)  # feed the target's motion forward; default: if it moves and the kind of depth
-        # allows it
-    )
+    # Feed the target's motion forward; default: if it moves and the kind of depth allows it.
+    feed_forward: bool | None = knob(None)
     prediction: bool = knob(True)  # predict features from their exposure to the present
-    flow_smoothing_s: float = (
-        knob(0.2, "s", least=0, upto=10)  # smoothing time of the target's estimated motion in the
-        # image
-    )
+    # Smoothing time of the target's estimated motion in the image.
+    flow_smoothing_s: float = knob(0.2, "s", least=0, upto=10)
 
     def __post_init__(self) -> None:
         if not self.objectives:

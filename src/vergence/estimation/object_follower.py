@@ -138,9 +138,8 @@ class FollowRule:
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
     least_points: int = 6  # measured, to believe an image; an edge has two
     patience: int = 12  # images in a row without the object, after which it is lost
-    turn_max_rad: float = (
-        0.25  # standard deviation of the rotation beyond which the pose is unknown
-    )
+    # Standard deviation of the rotation beyond which the pose is unknown.
+    turn_max_rad: float = 0.25
     distance_max: float = 0.2  # and of the position, as a share of the distance
 
 

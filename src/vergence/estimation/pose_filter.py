@@ -124,20 +124,14 @@ class PoseFilter:
     covariance grows until points are let in again.
     """
 
-    acceleration_density: float = (
-        knob(0.01, "m²/s³", above=0, upto=1e12)  # spectral density of the target's white-noise
-        # acceleration
-    )
-    angular_acceleration_density: float = (
-        knob(0.25, "rad²/s³", above=0, upto=1e12)  # spectral density of its angular acceleration
-    )
-    gate: float = (
-        knob(13.8, above=0, upto=1e12)  # χ² gate with 2 degrees of freedom; the default rejects
-        # one valid point in a thousand
-    )
-    fading: float = (
-        knob(0.9, above=0, below=1)  # forgetting factor per image of the consistency test
-    )
+    # Spectral density of the target's white-noise acceleration.
+    acceleration_density: float = knob(0.01, "m²/s³", above=0, upto=1e12)
+    # Spectral density of its angular acceleration.
+    angular_acceleration_density: float = knob(0.25, "rad²/s³", above=0, upto=1e12)
+    # χ² gate with 2 degrees of freedom; the default rejects one valid point in a thousand.
+    gate: float = knob(13.8, above=0, upto=1e12)
+    # Forgetting factor per image of the consistency test.
+    fading: float = knob(0.9, above=0, below=1)
 
     def start(
         self,

@@ -75,21 +75,16 @@ class RpyPoseFilter:
     `PoseFilter` has no such place.
     """
 
-    velocity_noise: float = (
-        knob(5e-6, "m²/s²", least=0, upto=1e6)  # velocity noise in Q per frame, section V
-    )
-    angle_rate_noise: float = (
-        knob(2e-5, "rad²/s²", least=0, upto=1e6)  # angular rate noise in Q per frame
-    )
-    frame_period_s: float = (
-        knob(1.0 / 26.0, "s", above=0, upto=1e3)  # frame period for which Q is given
-    )
-    gate: float = (
-        knob(13.8, above=0, upto=1e12)  # gate on the squared Mahalanobis distance of a point
-    )
-    fading: float = (
-        knob(0.9, above=0, below=1)  # forgetting factor per image of the consistency test
-    )
+    # Velocity noise in Q per frame, section V.
+    velocity_noise: float = knob(5e-6, "m²/s²", least=0, upto=1e6)
+    # Angular rate noise in Q per frame.
+    angle_rate_noise: float = knob(2e-5, "rad²/s²", least=0, upto=1e6)
+    # Frame period for which Q is given.
+    frame_period_s: float = knob(1.0 / 26.0, "s", above=0, upto=1e3)
+    # Gate on the squared Mahalanobis distance of a point.
+    gate: float = knob(13.8, above=0, upto=1e12)
+    # Forgetting factor per image of the consistency test.
+    fading: float = knob(0.9, above=0, below=1)
 
     @cached_property
     def noise(self) -> FloatArray:

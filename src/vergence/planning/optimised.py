@@ -47,24 +47,16 @@ class OptimisedPlanner:
     by cell, and a bidirectional tree. The same problem always has the same answer.
     """
 
-    controls: int = (
-        knob(12, least=4, upto=100)  # control points of the spline; twice as many for a path of
-        # the tree
-    )
-    samples: int = (
-        knob(60, least=8, upto=1000)  # samples at which visibility is optimised; it is checked at
-        # eight times as many
-    )
+    # Control points of the spline; twice as many for a path of the tree.
+    controls: int = knob(12, least=4, upto=100)
+    # Samples at which visibility is optimised; it is checked at eight times as many.
+    samples: int = knob(60, least=8, upto=1000)
     smoothing: float = knob(0.005, least=0, upto=1)  # weight of the path's curvature
-    branches: int = (
-        knob(3, least=1, upto=16)  # number of inverse kinematics solutions of the goal to try; if
-        # none leads there, as many again
-    )
+    # Number of inverse kinematics solutions of the goal to try; if none leads there, as many again.
+    branches: int = knob(3, least=1, upto=16)
     waypoints: int = knob(121, least=8, upto=10000)  # way-points of the resulting path
-    tree_samples: int = (
-        knob(4000, least=0, upto=1000000)  # samples before the tree search gives up; 0 for no
-        # tree
-    )
+    # Samples before the tree search gives up; 0 for no tree.
+    tree_samples: int = knob(4000, least=0, upto=1000000)
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return the smoothest path found that keeps every constraint, or what stood in the way.

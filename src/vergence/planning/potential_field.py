@@ -21,17 +21,13 @@ class PotentialFieldPlanner:
 
     step: float = knob(0.02, above=0, upto=1)  # ε, step length in Υ
     steps_max: int = knob(1500, least=1, upto=100000)  # largest number of steps
-    gain_image: float = (
-        knob(0.02, least=0, upto=1e3)  # γ, gain of the repulsion from the image border
-    )
+    # Γ, gain of the repulsion from the image border.
+    gain_image: float = knob(0.02, least=0, upto=1e3)
     gain_joint: float = knob(0.5, least=0, upto=1e3)  # χ, gain of the repulsion from joint limits
-    image_zone_px: float = (
-        knob(100.0, "px", above=0, upto=1e4)  # width of the repulsive zone at the image border
-    )
-    joint_zone: float = (
-        knob(0.2, above=0, upto=1)  # width of the repulsive zone at a joint limit, as a fraction
-        # of half the range
-    )
+    # Width of the repulsive zone at the image border.
+    image_zone_px: float = knob(100.0, "px", above=0, upto=1e4)
+    # Width of the repulsive zone at a joint limit, as a fraction of half the range.
+    joint_zone: float = knob(0.2, above=0, upto=1)
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return a path that keeps every constraint, or what stood in the way.

@@ -47,24 +47,20 @@ _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
 class SceneTable(Table):
     """Surroundings of the arms."""
 
-    model: Path | None = (
-        None  # MJCF file of floor, walls and lights; a plain floor and a lamp if absent
-    )
+    # MJCF file of floor, walls and lights; a plain floor and a lamp if absent.
+    model: Path | None = None
     light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of all lamps
 
 
 class CollisionTable(Table):
     """Collision avoidance of the task's arm, by the law and, as a last resort, the guard."""
 
+    # The arm's own links, other arms, the scene; or a stationary target.
     avoid: Annotated[
         tuple[Literal["self", "arms", "fixtures", "target"], ...], Field(max_length=4)
-    ] = (
-        ("self", "arms", "fixtures")  # the arm's own links, other arms, the scene; or a
-        # stationary target
-    )
-    margin_m: Annotated[float, Field(ge=1e-3, le=1)] = (
-        0.01  # distance kept by the law's limit "collision"; the guard brakes at half of it
-    )
+    ] = ("self", "arms", "fixtures")
+    # Distance kept by the law's limit "collision"; the guard brakes at half of it.
+    margin_m: Annotated[float, Field(ge=1e-3, le=1)] = 0.01
 
 
 class ArmTable(Placement):
@@ -73,12 +69,10 @@ class ArmTable(Placement):
     model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
     body: Text  # last body of the arm; cameras are mounted on it unless they name another
     start_deg: _Joints  # initial joint positions; m for prismatic joints
-    rate_max_deg_s: _JointRates | None = (
-        None  # rate limits, m/s for prismatic joints; default: the model's, or else 180 or 0.5
-    )
-    acceleration_max_deg_s2: _JointRates | None = (
-        None  # acceleration limits, m/s² for prismatic joints; 720 or 2 if absent
-    )
+    # Rate limits, m/s for prismatic joints; default: the model's, or else 180 or 0.5.
+    rate_max_deg_s: _JointRates | None = None
+    # Acceleration limits, m/s² for prismatic joints; 720 or 2 if absent.
+    acceleration_max_deg_s2: _JointRates | None = None
     servo_bandwidth_hz: Rate = 12.0  # bandwidth of the joint servos that model those of the robot
     motion: Part = None  # motion of its own; without one the loop holds it
 
@@ -103,27 +97,25 @@ class CameraTable(Placement):
 
     arm: Text | None = None  # the arm that carries it; fixed in the world if absent
     body: Text | None = None  # which body of that arm; its last if absent
-    radius_m: Length | None = (
-        None  # of a ball around it that must touch nothing; if absent only its arm must not
-    )
+    # Of a ball around it that must touch nothing; if absent only its arm must not.
+    radius_m: Length | None = None
     resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the image
     focal_mm: _Lens | None = None  # of the lens, with pixel_um
     pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
     focal_px: tuple[_Focal, _Focal] | None = None  # instead of focal_mm and pixel_um
     principal_px: Point2 | None = None  # the middle of the image if absent
+    # K1, k2, p1, p2, k3 of OpenCV.
     distortion: tuple[Annotated[float, Field(ge=-1e4, le=1e4)], ...] = Field(
         default=(), max_length=5
-    )  # k1, k2, p1, p2, k3 of OpenCV
+    )
     calibration: Path | None = None  # a camera file, also ROS's, for the six keys above
     rate_hz: Rate = 30.0  # images per second
-    latency_frames: Annotated[int, Field(ge=0, le=1000)] = (
-        0  # from exposure until the image arrives
-    )
+    # From exposure until the image arrives.
+    latency_frames: Annotated[int, Field(ge=0, le=1000)] = 0
     depth: DepthTable | None = None  # of a depth camera; see `law.depth`
     noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
-    blind_s: Annotated[
-        tuple[tuple[Time, Time], ...], Field(max_length=1000)
-    ] = ()  # from when to when its images are black
+    # From when to when its images are black.
+    blind_s: Annotated[tuple[tuple[Time, Time], ...], Field(max_length=1000)] = ()
     calibration_error_m: Distance = 0.0  # of its placement, in simulation
     calibration_error_deg: _Angle = 0.0  # and of its angles
 
@@ -157,9 +149,8 @@ class TargetTable(Placement):
     model: Path  # MJCF or URDF
     carried_by: Text | None = None  # arm to whose last body it is attached
     motion: Part = "stationary"  # motion of its own
-    features: _Features | None = (
-        None  # points in the target's frame, in m; picked in the first image if absent
-    )
+    # Points in the target's frame, in m; picked in the first image if absent.
+    features: _Features | None = None
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":
@@ -173,9 +164,8 @@ class ToolTable(Placement):
 
     model: Path  # MJCF
     camera: Text  # fixed camera that observes the tool
-    features: tuple[Vector3, ...] = Field(
-        min_length=1, max_length=MOST_POINTS
-    )  # x, y, z of each point in the tool's frame
+    # X, y, z of each point in the tool's frame.
+    features: tuple[Vector3, ...] = Field(min_length=1, max_length=MOST_POINTS)
     desired: _Desired = "initial"  # desired points in that camera, as for the task
 
 
@@ -185,21 +175,15 @@ class TrackTable(TaskTable):
     kind: Literal["track"] = "track"
     arm: Text  # arm that moves, or carries the target
     camera: Text  # camera on the arm, or a fixed one
-    feature_count: Annotated[int, Field(ge=1, le=64)] = (
-        1  # number of points to pick, if they are picked
-    )
-    points_px: Annotated[tuple[Point2, ...], Field(max_length=MOST_POINTS)] | None = (
-        None  # (u, v) of the features in the first image; derived from the target's placement if
-        # absent
-    )
-    desired: _Desired = (
-        "initial"  # as at the start, centred in the image, or (u, v) of each point in pixels
-    )
+    # Number of points to pick, if they are picked.
+    feature_count: Annotated[int, Field(ge=1, le=64)] = 1
+    # (u, v) of the features in the first image; derived from the target's placement if absent.
+    points_px: Annotated[tuple[Point2, ...], Field(max_length=MOST_POINTS)] | None = None
+    # As at the start, centred in the image, or (u, v) of each point in pixels.
+    desired: _Desired = "initial"
     tracker: Part = "ssd"  # tracker of the features
-    approach: Literal["direct", "auto"] = (
-        "direct"  # auto: follow a planned path to the `desired` points if they are given and a path
-        # exists
-    )
+    # Auto: follow a planned path to the `desired` points if they are given and a path exists.
+    approach: Literal["direct", "auto"] = "direct"
     tool: ToolTable | None = None  # tool to be kept in place in the image of a second, fixed camera
     tolerance_px: Pixels = 1.0  # an arm at rest with a larger mean error has not reached its goal
     image_timeout_s: Duration = 0.5  # time without an image after which the run ends
@@ -236,29 +220,22 @@ class ReachTable(TaskTable):
     kind: Literal["reach"]
     arm: Text  # arm that moves
     camera: Text  # camera on the arm
-    goal: Path | None = (
-        None  # photograph of the desired view; NAME.camera.yaml beside it gives its camera
-    )
-    goal_deg: _Joints | None = (
-        None  # joints at which it was taken, m if prismatic; a simulation can take the photograph
-        # there
-    )
-    distance_m: Length | None = (
-        None  # approximate distance between camera and object; otherwise estimated while the arm
-        # moves
-    )
+    # Photograph of the desired view; NAME.camera.yaml beside it gives its camera.
+    goal: Path | None = None
+    # Joints at which it was taken, m if prismatic; a simulation can take the photograph there.
+    goal_deg: _Joints | None = None
+    # Approximate distance between camera and object; otherwise estimated while the arm moves.
+    distance_m: Length | None = None
     length: LengthTable | None = None  # known length in the photograph, to set the scale
     matcher: Part = "sift"  # method that recognises the photograph
     tolerance_m: Length = 1e-3  # the goal is reached when certainly within this distance
-    tolerance_deg: Annotated[float, Field(gt=0, le=180)] = (
-        0.2  # the goal is reached when certainly within this angle
-    )
+    # The goal is reached when certainly within this angle.
+    tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 0.2
     planner: Part = "optimised"  # planner of the path in the image
     tracker: Part = "round_marks"  # tracker of the features
     margin_px: Pixels = 10.0  # distance to keep from the border of the image
-    margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = (
-        0.01  # distance to keep from joint limits, as a fraction of half the range
-    )
+    # Distance to keep from joint limits, as a fraction of half the range.
+    margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     camera_speed_m_s: Speed = 0.25  # speed of the camera along the path
     tolerance_px: Pixels = 1.0  # largest mean error of the farthest feature that counts as reached
     image_timeout_s: Duration = 0.5  # time without an image after which the run ends
@@ -273,10 +250,8 @@ class AdvanceTable(TaskTable):
     camera: Text  # camera on the arm, or a fixed one
     distance_m: Coordinate  # distance to move; negative for backwards
     axis: Literal["x", "y", "z"] = "z"  # axis to move along
-    frame: Literal["camera", "flange", "world"] = (
-        "camera"  # frame of the axis, fixed at the start of the task; flange is the arm's last
-        # body
-    )
+    # Frame of the axis, fixed at the start of the task; flange is the arm's last body.
+    frame: Literal["camera", "flange", "world"] = "camera"
     speed_m_s: Speed = 0.1  # highest speed
     tolerance_m: Length = 2e-3  # the end is reached within this distance
     image_timeout_s: Duration = 0.5  # time without an image after which the run ends
@@ -306,9 +281,8 @@ class OutputTable(Placement):
 
     arm: Text  # that carries it
     model: Path | None = None  # MJCF of what it looks like; nothing is drawn if absent
-    reach_m: Length = (
-        0.02  # in simulation, closed it holds a target whose origin is so near, rigidly
-    )
+    # In simulation, closed it holds a target whose origin is so near, rigidly.
+    reach_m: Length = 0.02
 
 
 def _task_kind(value: Any) -> str | None:
@@ -330,31 +304,23 @@ Task = Annotated[
 class PerceptionTable(Table):
     """How the target's pose is estimated, if the task needs it."""
 
-    cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = (
-        None  # cameras to use; all if absent
-    )
+    # Cameras to use; all if absent.
+    cameras: Annotated[tuple[Name, ...], Field(max_length=64)] | None = None
     filter: Part = "pose"  # pose filter: on SE(3), or with the paper's roll-pitch-yaw state
-    selection: Literal["information", "indexes"] = (
-        "information"  # selection of features by information, or by distribution as in
-        # [Lippiello2005]
-    )
-    budget: Annotated[int, Field(ge=3, le=4096)] = (
-        16  # features measured per tick, over all cameras
-    )
-    noise_px: _Noise = (
-        0.5  # standard deviation of a measured point; also simulated if no images are rendered
-    )
-    believed_noise_px: _Noise | None = (
-        None  # standard deviation that the filter uses instead of that stated by each measurement
-    )
+    # Selection of features by information, or by distribution as in [Lippiello2005].
+    selection: Literal["information", "indexes"] = "information"
+    # Features measured per tick, over all cameras.
+    budget: Annotated[int, Field(ge=3, le=4096)] = 16
+    # Standard deviation of a measured point; also simulated if no images are rendered.
+    noise_px: _Noise = 0.5
+    # Standard deviation that the filter uses instead of that stated by each measurement.
+    believed_noise_px: _Noise | None = None
     outliers: Annotated[float, Field(ge=0, lt=1)] = 0.0  # fraction of wrong matches to simulate
     occlusion: bool = True  # whether to predict occlusion by arms and fixtures
-    start_error_m: Distance | None = (
-        None  # uncertainty of the target's initial position; default 0.01 for follow, else 0
-    )
-    start_error_deg: _Angle | None = (
-        None  # uncertainty of its initial orientation; default 2 for follow, else 0
-    )
+    # Uncertainty of the target's initial position; default 0.01 for follow, else 0.
+    start_error_m: Distance | None = None
+    # Uncertainty of its initial orientation; default 2 for follow, else 0.
+    start_error_deg: _Angle | None = None
 
 
 class DriverTable(Table):
@@ -363,14 +329,11 @@ class DriverTable(Table):
     model_config = ConfigDict(extra="allow")
 
     kind: Text  # driver, or module:Class of your own; used only if `--driver` names it
-    stamp_latency_s: dict[Name, Annotated[float, Field(ge=-0.1, le=2)]] = (
-        Field(default_factory=dict, max_length=32)  # by camera name: delay of the time stamps
-        # after exposure; see `vergence calibrate --latency`
+    # By camera name: delay of the time stamps after exposure; see `vergence calibrate --latency`.
+    stamp_latency_s: dict[Name, Annotated[float, Field(ge=-0.1, le=2)]] = Field(
+        default_factory=dict, max_length=32
     )
-    servo_lag_s: Annotated[float, Field(ge=0, le=1)] = (
-        0.0  # delay of the joints behind their set-points; see `vergence calibrate --latency`
-    )
-    cameras: dict[Name, Part] = (
-        Field(default_factory=dict, max_length=32)  # by camera name: source of its images on this
-        # computer
-    )
+    # Delay of the joints behind their set-points; see `vergence calibrate --latency`.
+    servo_lag_s: Annotated[float, Field(ge=0, le=1)] = 0.0
+    # By camera name: source of its images on this computer.
+    cameras: dict[Name, Part] = Field(default_factory=dict, max_length=32)

@@ -42,34 +42,22 @@ class Limits:
     """
 
     order: tuple[Relaxed, ...] = knob(RELAXED)  # highest priority first
-    view_margin_px: float | None = (
-        knob(None, "px", least=0, upto=1e4)  # distance kept from the image border; default 10, or
-        # half of that of a plan
-    )
-    joint_margin: float | None = (
-        knob(None, least=0, below=0.5)  # fraction of each joint's range to keep free; default
-        # 0.01, or half of that of a plan
-    )
-    facing_deg: float = (
-        knob(1.0, "degrees", least=0, below=90)  # smallest angle between a flat target and the
-        # line of sight; part of "view"
-    )
-    clearance_m: float = (
-        knob(0.02, "m", least=0, upto=10)  # distance between lines of sight and obstacles
-    )
-    manipulability_share: float = knob(
-        0.0, least=0, below=1
-    )  # fraction of √det(J Jᵀ) at the start to keep; yields if it alone stops the arm
-    approach_rate_hz: float | None = (
-        knob(None, "1/s", above=0, upto=1e3)  # rate of approach to a limit, relative to the
-        # distance left; default 2, or 8 on a plan
-    )
-    depth_range: tuple[_Share, _Factor] | None = knob(
-        None
-    )  # bounds on the ratio of true to assumed depth
-    own: tuple[Limit, ...] = slot(
-        "limit", (), many=True
-    )  # your own limits, relaxed before all others
+    # Distance kept from the image border; default 10, or half of that of a plan.
+    view_margin_px: float | None = knob(None, "px", least=0, upto=1e4)
+    # Fraction of each joint's range to keep free; default 0.01, or half of that of a plan.
+    joint_margin: float | None = knob(None, least=0, below=0.5)
+    # Smallest angle between a flat target and the line of sight; part of "view".
+    facing_deg: float = knob(1.0, "degrees", least=0, below=90)
+    # Distance between lines of sight and obstacles.
+    clearance_m: float = knob(0.02, "m", least=0, upto=10)
+    # Fraction of √det(J Jᵀ) at the start to keep; yields if it alone stops the arm.
+    manipulability_share: float = knob(0.0, least=0, below=1)
+    # Rate of approach to a limit, relative to the distance left; default 2, or 8 on a plan.
+    approach_rate_hz: float | None = knob(None, "1/s", above=0, upto=1e3)
+    # Bounds on the ratio of true to assumed depth.
+    depth_range: tuple[_Share, _Factor] | None = knob(None)
+    # Your own limits, relaxed before all others.
+    own: tuple[Limit, ...] = slot("limit", (), many=True)
 
     def __post_init__(self) -> None:
         if len(set(self.order)) != len(self.order):

@@ -17,9 +17,8 @@ class CameraVelocity:
     keep in its place it follows that line.
     """
 
-    linear_m_s: tuple[float, ...] = knob(
-        (0.0, 0.0, 0.0), "m/s", live=False
-    )  # velocity along x, y, z
+    # Velocity along x, y, z.
+    linear_m_s: tuple[float, ...] = knob((0.0, 0.0, 0.0), "m/s", live=False)
 
     def __post_init__(self) -> None:
         if len(self.linear_m_s) != _AXES:

@@ -29,13 +29,10 @@ class ImageBased:
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
     interaction: InteractionModel = knob("mean")  # where L is evaluated
-    feature: type[Feature] = slot(
-        "feature", Points, by_class=True
-    )  # feature computed from the image points
-    damping: float = (
-        knob(1e-6, above=0, upto=1, live=False)  # damping of the twist, for directions that the
-        # features leave free
-    )
+    # Feature computed from the image points.
+    feature: type[Feature] = slot("feature", Points, by_class=True)
+    # Damping of the twist, for directions that the features leave free.
+    damping: float = knob(1e-6, above=0, upto=1, live=False)
 
     def quadratic(self, state: CameraState) -> Quadratic:
         """Return the quadratic for this tick."""

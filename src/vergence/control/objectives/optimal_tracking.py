@@ -51,28 +51,23 @@ class OptimalTracking:
     disturbance: R charges only for what u adds to moving along with the target.
     """
 
-    axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(
-        AXES
-    )  # camera axes used for tracking
-    avoidance_axes: tuple[Axis, ...] = knob(
-        ()
-    )  # those of them that are also used for avoidance, along ∇w'
-    Q: float = (
-        knob(2e-6, "1/px²", above=0, upto=1)  # weight of the errors, divided among the features
-    )
+    # Camera axes used for tracking.
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(AXES)
+    # Those of them that are also used for avoidance, along ∇w'.
+    avoidance_axes: tuple[Axis, ...] = knob(())
+    # Weight of the errors, divided among the features.
+    Q: float = knob(2e-6, "1/px²", above=0, upto=1)
+    # Weight of the motion, one number for all axes or one for each.
     R: Annotated[float, Field(gt=0, le=1e9)] | tuple[Annotated[float, Field(gt=0, le=1e9)], ...] = (
-        knob(10.0)  # weight of the motion, one number for all axes or one for each
+        knob(10.0)
     )
-    S: float = (
-        knob(0.0, least=0, upto=1e3)  # weight of 1/w', where w' is the penalised manipulability
-    )
-    penalty: Literal["product", "per_joint"] = knob(
-        "product"
-    )  # penalty for joint limits: eq. (27), or per joint
+    # Weight of 1/w', where w' is the penalised manipulability.
+    S: float = knob(0.0, least=0, upto=1e3)
+    # Penalty for joint limits: eq. (27), or per joint.
+    penalty: Literal["product", "per_joint"] = knob("product")
     penalty_k: float = knob(1e5, above=0, upto=1e9)  # k of the penalty in eq. (27)
-    avoidance_speed_max_m_s: float = (
-        knob(0.5, "m/s", above=0, upto=10)  # highest camera speed for avoidance
-    )
+    # Highest camera speed for avoidance.
+    avoidance_speed_max_m_s: float = knob(0.5, "m/s", above=0, upto=10)
 
     def __post_init__(self) -> None:
         if stray := [axis for axis in self.avoidance_axes if axis not in self.axes]:

@@ -27,17 +27,14 @@ class PositionBased:
     Beside others, the pose error decays at `closed_loop_hz`.
     """
 
-    filter_hz: float = (
-        knob(5.0, "Hz", above=0, upto=100)  # natural frequency of the second-order filter
-    )
+    # Natural frequency of the second-order filter.
+    filter_hz: float = knob(5.0, "Hz", above=0, upto=100)
     damping: float = knob(1.0, above=0, upto=100)  # damping ratio of the filter
-    closed_loop_hz: float = (
-        knob(5.0, "Hz", above=0, upto=100)  # bandwidth with which the tip follows the filter
-    )
+    # Bandwidth with which the tip follows the filter.
+    closed_loop_hz: float = knob(5.0, "Hz", above=0, upto=100)
     # Of redundant joints at their limits, towards the middle of their range.
-    null_space_rate: float = (
-        knob(0.5, "rad/s or m/s", least=0, upto=10)  # gain in the null space of redundant arms
-    )
+    # Gain in the null space of redundant arms.
+    null_space_rate: float = knob(0.5, "rad/s or m/s", least=0, upto=10)
 
     def quadratic(self, state: CameraState) -> Quadratic:
         """Return the quadratic of ½ ‖v_tip - twist‖², at the image rate."""

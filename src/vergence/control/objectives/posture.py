@@ -16,9 +16,8 @@ class Posture:
     """
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
-    position: tuple[float, ...] | None = knob(
-        None
-    )  # desired joint positions, rad or m; the middle of each range if absent
+    # Desired joint positions, rad or m; the middle of each range if absent.
+    position: tuple[float, ...] | None = knob(None)
     strength: float = knob(1e-4, above=0, upto=1e3)  # weight
 
     def quadratic(self, state: CameraState) -> JointQuadratic:

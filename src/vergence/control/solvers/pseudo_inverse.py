@@ -85,10 +85,8 @@ class DampedPseudoInverse:
     Weighting lets metres and radians, slow and fast joints share the work; see `resolve_redundant`.
     """
 
-    singular_below: float = (
-        knob(0.02, least=0, upto=1)  # singular values below this fraction of the largest are
-        # damped
-    )
+    # Singular values below this fraction of the largest are damped.
+    singular_below: float = knob(0.02, least=0, upto=1)
 
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm."""

@@ -48,9 +48,8 @@ class QuadraticProgram:
     """
 
     S: float = knob(0.0, least=0, upto=1e3)  # weight of 1/w', with the penalty per joint
-    avoidance_rate_max: float = (
-        knob(0.5, "rad/s", above=0, upto=100)  # highest joint rate caused by S
-    )
+    # Highest joint rate caused by S.
+    avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100)
     damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, weight of the joint rates
 
     def bind(self, setting: Setting) -> BoundSolver:

@@ -15,10 +15,8 @@ class Gige:
     height: int = knob(480, "px", least=1)  # image height; must match the cell's resolution
     rate_hz: float = knob(30.0, "Hz", above=0.0, upto=1000.0)  # image rate
     exposure_s: float = knob(0.0, "s", least=0.0, upto=1.0)  # exposure time; automatic if 0
-    latency_s: float = (
-        knob(0.0, "s", least=0.0, upto=2.0)  # shortest delay from exposure to arrival; see
-        # `vergence calibrate --latency`
-    )
+    # Shortest delay from exposure to arrival; see `vergence calibrate --latency`.
+    latency_s: float = knob(0.0, "s", least=0.0, upto=2.0)
     python: str = "/usr/bin/python3"  # Python interpreter that has Aravis
 
     def open(self, name: str, clock: Callable[[], float]) -> GigeCamera:

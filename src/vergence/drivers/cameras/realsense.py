@@ -19,10 +19,8 @@ class RealSense:
     rate_hz: int = knob(30, "Hz", least=1)  # a rate that the camera supports at that size
     depth: bool = False  # also measure depth; the cell's camera then needs a table `depth`
     exposure_s: float = knob(0.0, "s", least=0.0, upto=1.0)  # exposure time; automatic if 0
-    latency_s: float = (
-        knob(0.0, "s", least=0.0, upto=2.0)  # shortest delay from exposure to arrival; see
-        # `vergence calibrate --latency`
-    )
+    # Shortest delay from exposure to arrival; see `vergence calibrate --latency`.
+    latency_s: float = knob(0.0, "s", least=0.0, upto=2.0)
 
     def open(self, name: str, clock: Callable[[], float]) -> RealSenseCamera:
         """Open the camera; librealsense takes its images in threads of its own."""

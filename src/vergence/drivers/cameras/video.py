@@ -11,10 +11,8 @@ class Video:
     """A USB camera by its number, a network stream by its address, or a video file."""
 
     source: int | str = 0  # device number, file path, or address of a stream
-    latency_s: float = (
-        knob(0.0, "s", least=0.0, upto=2.0)  # delay from exposure to arrival; see `vergence
-        # calibrate --latency`
-    )
+    # Delay from exposure to arrival; see `vergence calibrate --latency`.
+    latency_s: float = knob(0.0, "s", least=0.0, upto=2.0)
 
     def open(self, name: str, clock: Callable[[], float]) -> VideoCamera:
         """Open the camera; a thread takes its images."""

@@ -21,25 +21,18 @@ class Franka:
 
     address: str  # address of the robot, such as 172.16.0.2
     rate_hz: float = knob(500.0, "Hz", least=50.0, upto=1000.0)  # rate of set-points
-    position_gain: float = (
-        knob(4.0, "1/s", least=0.0, upto=20.0)  # gain of the position feedback to the set-points
-    )
-    jerk_share: float = (
-        knob(0.4, least=0.05, upto=1.0)  # fraction of the robot's jerk limits; a new set-point
-        # may briefly double it
-    )
-    watchdog_s: float = (
-        knob(0.1, "s", least=0.02, upto=2.0)  # time without a new set-point after which the arm
-        # brakes
-    )
+    # Gain of the position feedback to the set-points.
+    position_gain: float = knob(4.0, "1/s", least=0.0, upto=20.0)
+    # Fraction of the robot's jerk limits; a new set-point may briefly double it.
+    jerk_share: float = knob(0.4, least=0.05, upto=1.0)
+    # Time without a new set-point after which the arm brakes.
+    watchdog_s: float = knob(0.1, "s", least=0.02, upto=2.0)
     gripper: str = ""  # name of the output for the robot's hand; the hand is not used if empty
     gripper_speed_m_s: float = knob(0.1, "m/s", least=0.01, upto=0.2)  # opening and closing speed
     gripper_force_n: float = knob(20.0, "N", least=1.0, upto=70.0)  # gripping force
     realtime: bool = True  # require a real-time kernel
-    timeout_s: float = (
-        knob(0.5, "s", above=0.0, upto=10.0)  # longest time that the robot's clock may stand
-        # still
-    )
+    # Longest time that the robot's clock may stand still.
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
     connect_s: float = knob(10.0, "s", above=0.0, upto=60.0)  # time to wait for the robot to answer
 
     def open(self, equipment: Equipment) -> Driver:

@@ -37,44 +37,30 @@ class Ros2:
     address: str = "/usr/bin/python3"  # Python interpreter that has rclpy
     command: Literal["trajectory", "velocity", "position", "twist"] = "trajectory"  # see the guide
     command_topic: str = ""  # topic of the arm's controller; the usual one for command if empty
-    joint_states: str = (
-        "/joint_states"  # topic of the joint states; their time stamps are the driver's clock
-    )
+    # Topic of the joint states; their time stamps are the driver's clock.
+    joint_states: str = "/joint_states"
     joints: tuple[str, ...] = ()  # joint names in ROS, one per joint; those of the model if absent
-    images: dict[str, str] = field(
-        default_factory=dict
-    )  # image topics by camera name; /NAME/image_raw if absent
-    mountings: dict[str, tuple[str, str]] = field(
-        default_factory=dict
-    )  # by camera, TF's names of what carries it and of its optical frame; else the cell's is used
-    image_latency_s: float = (
-        knob(0.0, "s", least=0.0, upto=2.0)  # delay from exposure to an image's time stamp
-    )
+    # Image topics by camera name; /NAME/image_raw if absent.
+    images: dict[str, str] = field(default_factory=dict)
+    # By camera, TF's names of what carries it and of its optical frame; else the cell's is used.
+    mountings: dict[str, tuple[str, str]] = field(default_factory=dict)
+    # Delay from exposure to an image's time stamp.
+    image_latency_s: float = knob(0.0, "s", least=0.0, upto=2.0)
     running: str = ""  # topic of a Bool that is false while the robot accepts no commands
     start: str = ""  # service Trigger that is called before a run, such as to play a program
     stop: str = ""  # service Trigger that is called after it, once the arm is braked
     speed_scale: str = ""  # topic of a Float64 with the speed scaling in percent
     twist_frame: str = ""  # of `twist`: TF's name of the cell's camera, the end effector of Servo
-    position_gain: float = (
-        knob(4.0, "1/s", least=0.0, upto=20.0)  # for `velocity` and `twist`: gain of the position
-        # feedback to the set-points
-    )
-    outputs: dict[str, str] = (
-        field(default_factory=dict)  # by name: topic of Bool, Float64 or Float64MultiArray, or a
-        # SetBool service
-    )
-    output_values: dict[str, tuple[float, float]] = (
-        field(default_factory=dict)  # by name: numbers to publish for the values 0 and 1; 0 and 1
-        # if absent
-    )
-    watchdog_s: float = (
-        knob(0.25, "s", least=0.02, upto=10.0)  # time without a set-point after which the bridge
-        # brakes the arm
-    )
-    timeout_s: float = (
-        knob(0.5, "s", above=0.0, upto=10.0)  # time without joint states after which the robot
-        # counts as silent
-    )
+    # For `velocity` and `twist`: gain of the position feedback to the set-points.
+    position_gain: float = knob(4.0, "1/s", least=0.0, upto=20.0)
+    # By name: topic of Bool, Float64 or Float64MultiArray, or a SetBool service.
+    outputs: dict[str, str] = field(default_factory=dict)
+    # By name: numbers to publish for the values 0 and 1; 0 and 1 if absent.
+    output_values: dict[str, tuple[float, float]] = field(default_factory=dict)
+    # Time without a set-point after which the bridge brakes the arm.
+    watchdog_s: float = knob(0.25, "s", least=0.02, upto=10.0)
+    # Time without joint states after which the robot counts as silent.
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
     connect_s: float = knob(10.0, "s", above=0.0, upto=600.0)  # time to wait for topics to start
 
     def open(self, equipment: Equipment) -> Driver:

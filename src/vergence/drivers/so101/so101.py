@@ -23,32 +23,26 @@ _Sign = Literal[-1, 1]
 class So101:
     """An SO-100, SO-101 or another arm of STS3215 servos on one serial bus."""
 
+    # A module, and the extra that has it.
     package: ClassVar[tuple[str, str]] = (
         "scservo_sdk",
         "so101",
-    )  # a module, and the extra that has it
+    )
 
     address: str = "/dev/ttyACM0"  # serial port of the servo adapter
     baud: int = knob(1_000_000, "baud", least=9600)  # baud rate of the servos
     ids: tuple[_Id, ...] = ()  # servo ids from the base outwards; 1, 2, 3 … if absent
-    zero_ticks: tuple[
-        _Tick, ...
-    ] = ()  # servo position, 0 to 4095, at each joint's zero; 2048 if absent
+    # Servo position, 0 to 4095, at each joint's zero; 2048 if absent.
+    zero_ticks: tuple[_Tick, ...] = ()
     signs: tuple[_Sign, ...] = ()  # -1 for a servo that turns opposite to the model; 1 if absent
-    outputs: dict[str, tuple[_Id, _Tick, _Tick]] = (
-        field(default_factory=dict)  # by name: servo id, and its positions for 0 (open) and 1
-        # (closed)
-    )
-    rate_hz: float = (
-        knob(100.0, "Hz", least=10.0, upto=200.0)  # rate at which the bus is read and written
-    )
-    hottest_deg_c: float = (
-        knob(70.0, "°C", least=30.0, upto=90.0)  # temperature above which the arm is held
-    )
-    timeout_s: float = (
-        knob(0.5, "s", above=0.0, upto=10.0)  # time without an answer after which the robot
-        # counts as silent
-    )
+    # By name: servo id, and its positions for 0 (open) and 1 (closed).
+    outputs: dict[str, tuple[_Id, _Tick, _Tick]] = field(default_factory=dict)
+    # Rate at which the bus is read and written.
+    rate_hz: float = knob(100.0, "Hz", least=10.0, upto=200.0)
+    # Temperature above which the arm is held.
+    hottest_deg_c: float = knob(70.0, "°C", least=30.0, upto=90.0)
+    # Time without an answer after which the robot counts as silent.
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
 
     def open(self, equipment: Equipment) -> Driver:
         """Open the bus and find every servo; they hold their place."""

@@ -15,10 +15,8 @@ class SocketRobot:
     """A robot in another process or on another computer, reached by the project's own protocol."""
 
     address: str = "localhost:5007"  # HOST:PORT, or PORT on this computer
-    timeout_s: float = (
-        knob(2.0, "s", above=0.0, upto=60.0)  # time without a message after which the robot
-        # counts as silent
-    )
+    # Time without a message after which the robot counts as silent.
+    timeout_s: float = knob(2.0, "s", above=0.0, upto=60.0)
     connect_s: float = knob(30.0, "s", above=0.0, upto=600.0)  # time to wait for the robot to start
 
     def open(self, equipment: Equipment) -> Driver:

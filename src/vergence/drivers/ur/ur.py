@@ -34,29 +34,19 @@ class Ur:
 
     address: str  # address of the controller, such as 192.168.1.10
     command: Literal["speedj", "servoj"] = "speedj"  # speedj: joint speeds; servoj: joint positions
-    rate_hz: float = (
-        knob(500.0, "Hz", least=50.0, upto=500.0)  # rate of set-points; 125 for a CB-series
-        # controller
-    )
-    position_gain: float = (
-        knob(4.0, "1/s", least=0.0, upto=20.0)  # for `speedj`: gain of the position feedback to
-        # the set-points
-    )
-    lookahead_s: float = (
-        knob(0.05, "s", least=0.03, upto=0.2)  # for `servoj`: look-ahead time, smooths the motion
-    )
+    # Rate of set-points; 125 for a CB-series controller.
+    rate_hz: float = knob(500.0, "Hz", least=50.0, upto=500.0)
+    # For `speedj`: gain of the position feedback to the set-points.
+    position_gain: float = knob(4.0, "1/s", least=0.0, upto=20.0)
+    # For `servoj`: look-ahead time, smooths the motion.
+    lookahead_s: float = knob(0.05, "s", least=0.03, upto=0.2)
     servo_gain: int = knob(300, least=100, upto=2000)  # for `servoj`: gain
-    watchdog_hz: float = (
-        knob(10.0, "Hz", least=2.0, upto=100.0)  # the robot stops if set-points arrive at a lower
-        # rate
-    )
-    timeout_s: float = (
-        knob(0.5, "s", above=0.0, upto=10.0)  # longest time that the robot's clock may stand
-        # still
-    )
-    outputs: dict[str, _DigitalOutput] = field(
-        default_factory=dict
-    )  # by name: standard 0 to 7, configurable 0 to 7, tool 0 or 1
+    # The robot stops if set-points arrive at a lower rate.
+    watchdog_hz: float = knob(10.0, "Hz", least=2.0, upto=100.0)
+    # Longest time that the robot's clock may stand still.
+    timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
+    # By name: standard 0 to 7, configurable 0 to 7, tool 0 or 1.
+    outputs: dict[str, _DigitalOutput] = field(default_factory=dict)
 
     def open(self, equipment: Equipment) -> Driver:
         """Connect to the controller; nothing moves before the first set-point."""

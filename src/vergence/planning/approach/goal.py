@@ -41,8 +41,7 @@ class ApproachSettings:
     distance_m: float | None = None  # rough distance from camera to object at the goal
     length: KnownLength | None = None  # in the photograph
     margin_px: float = 10.0  # distance to keep from the border of the image
-    margin_joint: float = (
-        0.01  # distance to keep from joint limits, as a fraction of half the range
-    )
+    # Distance to keep from joint limits, as a fraction of half the range.
+    margin_joint: float = 0.01
     camera_speed_m_s: float = 0.25  # on the path
     points: int = 16  # that are followed

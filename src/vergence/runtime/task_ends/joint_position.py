@@ -14,14 +14,10 @@ class JointPosition:
     """Ends the task when a joint is above or below a position."""
 
     joint: str = knob(...)  # name of the joint
-    above_deg: float | None = (
-        knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # the task ends when the joint is above
-        # this position
-    )
-    below_deg: float | None = (
-        knob(None, "°, or m", least=-3.6e4, upto=3.6e4)  # the task ends when the joint is below
-        # this position
-    )
+    # The task ends when the joint is above this position.
+    above_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)
+    # The task ends when the joint is below this position.
+    below_deg: float | None = knob(None, "°, or m", least=-3.6e4, upto=3.6e4)
 
     @model_validator(mode="after")
     def _one_side(self) -> "JointPosition":

@@ -17,15 +17,12 @@ class Reached:
     tolerances say.
     """
 
-    tolerance_px: float = (
-        knob(1.0, "px", above=0, upto=1e4)  # largest error of every feature, for image points
-    )
-    tolerance_m: float = (
-        knob(2e-3, "m", above=0, upto=10)  # largest position error, for a desired pose
-    )
-    tolerance_deg: float = (
-        knob(0.3, "°", above=0, upto=180)  # largest orientation error, for a desired pose
-    )
+    # Largest error of every feature, for image points.
+    tolerance_px: float = knob(1.0, "px", above=0, upto=1e4)
+    # Largest position error, for a desired pose.
+    tolerance_m: float = knob(2e-3, "m", above=0, upto=10)
+    # Largest orientation error, for a desired pose.
+    tolerance_deg: float = knob(0.3, "°", above=0, upto=180)
     time_s: float = knob(0.5, "s", least=0, upto=60)  # time for which this must hold
 
     def bind(self, setting: EndSetting) -> Until:

@@ -64,12 +64,12 @@ class PoseMotion(Waypoints):
     """
 
     times_s: _Times = knob(unit="s")  # times of the way-points, increasing from 0
-    positions_m: Annotated[tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
-        unit="m"
-    )  # one for each time
+    # One for each time.
+    positions_m: Annotated[tuple[Vector3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(unit="m")
+    # One for each time.
     rotations_rpy_deg: Annotated[tuple[Angles3, ...], Field(max_length=_MOST_WAYPOINTS)] = knob(
         unit="°"
-    )  # one for each time
+    )
     speed: float = knob(1.0, least=1e-3, upto=1e3)  # speed factor; the times are divided by it
 
     def __post_init__(self) -> None:
@@ -88,10 +88,11 @@ class JointMotion(Waypoints):
     """The arm moves its joints through way-points, relative to its start."""
 
     times_s: _Times = knob(unit="s")  # times of the way-points, increasing from 0
+    # One row for each time; m for prismatic joints.
     offsets_deg: Annotated[
         tuple[Annotated[tuple[Angle, ...], Field(max_length=64)], ...],
         Field(max_length=_MOST_WAYPOINTS),
-    ] = knob(unit="°")  # one row for each time; m for prismatic joints
+    ] = knob(unit="°")
     speed: float = knob(1.0, least=1e-3, upto=1e3)  # speed factor; the times are divided by it
 
     def __post_init__(self) -> None:

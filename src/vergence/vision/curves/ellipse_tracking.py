@@ -11,13 +11,11 @@ from vergence.vision.curves.ellipse_tracker import POINTS, EllipseTracker
 class EllipseTracking:
     """Follows the image of a circle or a sphere by its edge; see `EllipseTracker`."""
 
-    reach_px: float = (
-        knob(20.0, "px", least=4, upto=200)  # largest motion of the edge between two images
-    )
+    # Largest motion of the edge between two images.
+    reach_px: float = knob(20.0, "px", least=4, upto=200)
     contrast: float = knob(15.0, least=3, upto=255)  # smallest step across the edge, in grey levels
-    least_share: float = (
-        knob(0.4, least=0.25, upto=1)  # smallest fraction of the ellipse that must be in view
-    )
+    # Smallest fraction of the ellipse that must be in view.
+    least_share: float = knob(0.4, least=0.25, upto=1)
 
     def start(self, image: ImageArray, points_px: FloatArray) -> EllipseTracker:
         """Return the tracker of the ellipse around one place, or through five or more.

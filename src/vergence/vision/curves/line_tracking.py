@@ -11,9 +11,8 @@ from vergence.vision.curves.line_tracker import LineTracker, lines_through
 class LineTracking:
     """Follows straight edges, each given by two points on it; see `LineTracker`."""
 
-    reach_px: float = (
-        knob(20.0, "px", least=4, upto=200)  # largest motion of a line between two images
-    )
+    # Largest motion of a line between two images.
+    reach_px: float = knob(20.0, "px", least=4, upto=200)
     length_px: float = knob(240.0, "px", least=32, upto=1e4)  # length of each line that is searched
     contrast: float = knob(15.0, least=3, upto=255)  # smallest step across a line, in grey levels
 

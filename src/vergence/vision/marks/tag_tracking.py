@@ -16,10 +16,8 @@ class TagTracking:
 
     dictionary: str = knob("apriltag_36h11")  # dictionary of the markers, such as aruco_4x4_50
     noise_px: float = knob(0.05, "px", above=0, upto=100)  # smallest standard deviation of a corner
-    away_px: float = (
-        knob(10.0, "px", above=0, upto=1e4)  # largest initial distance between a point and its
-        # corner
-    )
+    # Largest initial distance between a point and its corner.
+    away_px: float = knob(10.0, "px", above=0, upto=1e4)
 
     def __post_init__(self) -> None:
         MarkerDetector(self.dictionary)  # which names those that are known
