@@ -104,4 +104,4 @@ def test_a_recording_that_was_cut_off_is_reported_and_says_so(
 ) -> None:
     (tmp_path / RECORDING).write_bytes(recording[: len(recording) * 3 // 4])
     assert not refused(run("report", tmp_path))
-    assert "The recording was cut off" in (tmp_path / "report.html").read_text()
+    assert "The recording is incomplete" in (tmp_path / "report.html").read_text()

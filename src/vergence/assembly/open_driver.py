@@ -55,10 +55,10 @@ def check_driver(cell: Cell, named: str) -> None:
     kind, address = split_name(named)
     cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
     settings, place = _settings(cell, kind)
-    if package := getattr(cls, "package", None):
-        optional_package(kind, *package)
     if hasattr(cls, "open"):
         _made(cls, kind, settings | ({"address": address} if address else {}), place)
+    if package := getattr(cls, "package", None):
+        optional_package(kind, *package)
     _sources(cell)
 
 

@@ -26,12 +26,11 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     except OSError as error:
         why = Absent(error.strerror or str(error))
         raise InputError(str(path), "", why, "a TOML file") from None
-    if len(data) > _MOST_BYTES:
-        raise InputError(
-            str(path), "", "a longer file", f"a TOML file of at most {_MOST_BYTES} bytes"
-        )
+    needed = f"a TOML file of at most {_MOST_BYTES} bytes"
     if b"\0" in data:
-        raise InputError(str(path), "", Absent("not TOML: not even text"), "a TOML file")
+        raise InputError(str(path), "", Absent("not TOML: not even text"), needed)
+    if len(data) > _MOST_BYTES:
+        raise InputError(str(path), "", "a longer file", needed)
     try:
         text = data.decode()
         values = tomllib.loads(text.replace("\r\n", "\n"))
