@@ -4,7 +4,8 @@ import fcntl
 import json
 import resource
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -42,20 +43,13 @@ def framed(message: bytes) -> bytes:
     return len(message).to_bytes(4, "big") + message
 
 
-@pytest.fixture
-def pair() -> Iterator[Callable[[], tuple[socket.socket, socket.socket]]]:
-    made: list[socket.socket] = []
-
-    def make() -> tuple[socket.socket, socket.socket]:
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            near = socket.create_connection(listener.getsockname())
-            far, _ = listener.accept()
-        made.extend((near, far))
-        return near, far
-
-    yield make
-    for each in made:
-        each.close()
+@contextmanager
+def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        near = socket.create_connection(listener.getsockname())
+        far, _ = listener.accept()
+    with near, far:
+        yield near, far
 
 
 @given(mutants(ANSWER))
@@ -73,46 +67,46 @@ def test_a_set_point_is_one_or_breaks_the_link(message: bytes) -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=5), st.integers(1, 50))
 def test_messages_come_as_they_were_sent_in_whatever_pieces(
-    pair: Callable[[], tuple[socket.socket, socket.socket]], sent: Sequence[bytes], size: int
+    sent: Sequence[bytes], size: int
 ) -> None:
-    near, far = pair()
-    link = Link(near, LONGEST)
-    data = b"".join(map(framed, sent))
-    for start in range(0, len(data), size):
-        far.sendall(data[start : start + size])
-    assert [link.receive(5.0) for _ in sent] == list(sent)
-    assert link.receive(0.0) is None
+    with pair() as (near, far):
+        link = Link(near, LONGEST)
+        data = b"".join(map(framed, sent))
+        for start in range(0, len(data), size):
+            far.sendall(data[start : start + size])
+        assert [link.receive(5.0) for _ in sent] == list(sent)
+        assert link.receive(0.0) is None
 
 
-def test_a_link_works_in_a_process_with_thousands_of_open_files(
-    pair: Callable[[], tuple[socket.socket, socket.socket]],
-) -> None:
+def test_a_link_works_in_a_process_with_thousands_of_open_files() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    near, far = pair()
-    link = Link(socket.socket(fileno=fcntl.fcntl(near, fcntl.F_DUPFD, 2000)), LONGEST)
-    try:
-        assert link.receive(0.01) is None
-        far.sendall(framed(STATE))
-        assert link.receive(5.0) == STATE
-        link.send([STATE], 1.0)
-        assert far.recv(len(STATE) + 4, socket.MSG_WAITALL) == framed(STATE)
-    finally:
-        link.close()
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    with pair() as (near, far):
+        link = Link(socket.socket(fileno=fcntl.fcntl(near, fcntl.F_DUPFD, 2000)), LONGEST)
+        try:
+            assert link.receive(0.01) is None
+            far.sendall(framed(STATE))
+            assert link.receive(5.0) == STATE
+            link.send([STATE], 1.0)
+            assert far.recv(len(STATE) + 4, socket.MSG_WAITALL) == framed(STATE)
+        finally:
+            link.close()
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
     with pytest.raises(LinkBrokenError, match="is closed"):
         link.receive(0.0)
 
 
 @given(mutants(framed(STATE) + framed(bytes(12)) + framed(STATE)))
-def test_whatever_the_robot_says_is_a_state_or_a_silent_driver(
-    pair: Callable[[], tuple[socket.socket, socket.socket]], data: bytes
-) -> None:
-    near, far = pair()
+def test_whatever_the_robot_says_is_a_state_or_a_silent_driver(data: bytes) -> None:
+    with pair() as (near, far):
+        far.sendall(data)
+        far.close()
+        _read_on(near)
+
+
+def _read_on(near: socket.socket) -> None:
     cameras = {"wrist": Camera(4, 3, 5.0, 5.0, 1.5, 1.0)}
     equipment = Equipment("", {"puma": ARM}, cameras, 500.0)
-    far.sendall(data)
-    far.close()
     try:
         driver = SocketDriver(Link(near, LONGEST), equipment, 0.2)
     except DriverSilent:
