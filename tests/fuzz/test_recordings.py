@@ -132,7 +132,7 @@ def changes(draw: st.DrawFn, good: bytes, topics: tuple[str, ...]) -> Change:
     rewritten(good, note)
     mutated = {
         number: draw(mutants(seen[number]))
-        for number in draw(st.sets(st.integers(0, max(len(seen) - 1, 0)), max_size=3))
+        for number in draw(st.lists(st.integers(0, max(len(seen) - 1, 0)), max_size=3))
         if seen
     }
     counts = iter(range(1_000_000))
