@@ -226,7 +226,7 @@ class OptimisedPlanner:
     def _from_tree(
         self, problem: PlanningProblem, view: View, trees: TreeSearch
     ) -> _Candidate | None:
-        path = trees.waypoints(view)
+        path = trees.waypoints(_margin_kept(problem))
         if not len(path):
             return None
         arm, random = problem.arm, np.random.default_rng(0)

@@ -7,7 +7,6 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.planning.problem import PlanningProblem
 from vergence.planning.tree import connect_trees
-from vergence.planning.visibility import View
 from vergence.robot.inverse_kinematics import finite_range
 
 _STEP = 0.15  # longest edge, s at full speed
@@ -36,24 +35,26 @@ class TreeSearch:
         self._problem, self._goals = problem, goals
         self._clearance, self._count = clearance, samples
 
-    def waypoints(self, view: View) -> FloatArray:
-        """Return waypoints (P, n) in a view from the start to one of the goals; none if (0, n)."""
-        return self._connected(view) if self._meet else self._nothing
+    def waypoints(self, margin_px: float) -> FloatArray:
+        """Return waypoints (P, n) from the start to one of the goals; none if (0, n).
+
+        Args:
+            margin_px: to the border of the image.
+        """
+        whole = self._in_whole_image
+        return self._connected(margin_px) if len(whole) and margin_px > 0.0 else whole
 
     @cached_property
-    def _meet(self) -> bool:
-        return len(self._connected(self._problem.view(0.0))) > 0
+    def _in_whole_image(self) -> FloatArray:
+        return self._connected(0.0)
 
-    @property
-    def _nothing(self) -> FloatArray:
-        return np.empty((0, self._problem.arm.joint_count))
-
-    def _connected(self, view: View) -> FloatArray:
-        if self._count == 0:
-            return self._nothing
+    def _connected(self, margin_px: float) -> FloatArray:
         arm, start = self._problem.arm, self._problem.q_start
+        if self._count == 0:
+            return np.empty((0, arm.joint_count))
         low, high = finite_range(arm, start)
         samples = np.random.default_rng(0).uniform(low, high, (self._count, arm.joint_count))
+        view = self._problem.view(margin_px)
         path: FloatArray = connect_trees(
             arm.chain, view, self._clearance, low, high, 1.0 / arm.rate_max,
             start.copy(), self._goals, samples, _STEP,

@@ -43,6 +43,8 @@ class KinematicDriver:
     move a real arm.
     """
 
+    sim_time = True  # it passes in `step` only
+
     def __init__(self, cell: KinematicCell) -> None:
         self._cell = cell
         self._rng = np.random.default_rng(cell.seed)
@@ -60,11 +62,6 @@ class KinematicDriver:
     def cameras(self) -> Mapping[str, Camera]:
         """The camera."""
         return {CAMERA: self._cell.camera}
-
-    @property
-    def sim_time(self) -> bool:
-        """Always: time passes in `step` only."""
-        return True
 
     @property
     def inner_rate_hz(self) -> float:

@@ -34,6 +34,8 @@ class SimulatedDriver:
     the cell states.
     """
 
+    sim_time = True  # it passes in `step` only
+
     def __init__(self, cell: Cell, images: bool = True) -> None:
         choose_renderer(needed=images)
         from vergence.simulation.as_built import as_built
@@ -79,11 +81,6 @@ class SimulatedDriver:
     def cameras(self) -> Mapping[str, Camera]:
         """The cameras by name."""
         return self.world.cameras
-
-    @property
-    def sim_time(self) -> bool:
-        """Always: time passes in `step` only."""
-        return True
 
     @property
     def inner_rate_hz(self) -> float:

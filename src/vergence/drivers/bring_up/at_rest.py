@@ -11,7 +11,7 @@ from vergence.robot import Arm
 
 _RATE_TOLERANCE, _CLOCK_TOLERANCE = 0.05, 0.01
 _GAP_S = 0.05  # between two ticks, from which on set-points come too late
-_NOISE = 0.002  # rad or m by which joints at rest may scatter
+NOISE = 0.002  # rad or m by which joints at rest may scatter
 _OLD_S = 0.3  # an image that arrives later than this is of little use
 
 
@@ -62,8 +62,8 @@ def joint_findings(seen: Watched, arm: Arm) -> Iterator[Finding]:
         "motion of joints at rest",
         1e3 * noise,
         "mrad or mm",
-        f"at most {1e3 * _NOISE:g}",
-        noise <= _NOISE,
+        f"at most {1e3 * NOISE:g}",
+        noise <= NOISE,
         "a payload that is not set, or noisy encoders",
     )
     q = seen.position[-1]

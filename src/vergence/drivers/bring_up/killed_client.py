@@ -8,6 +8,7 @@ from time import monotonic, sleep
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.drivers.bring_up.at_rest import NOISE
 from vergence.drivers.bring_up.finding import Finding
 from vergence.drivers.bring_up.watched import SlowMotion, watch
 from vergence.errors import DriverSilent, VergenceError
@@ -15,7 +16,7 @@ from vergence.runtime.driver import Driver
 
 _FARTHEST = 10.0  # nudges that the arm may be driven, if nobody kills the program
 _STOPS_S = 1.0  # at the speed of the test: how far the arm may go on
-_REST_S, _NOISE = 0.5, 0.002  # s, and rad or m by which joints at rest may scatter in that time
+_REST_S = 0.5  # in which it has to be at rest
 _OPENS_S, _RECONNECTS_S, _AGAIN_S = 60.0, 15.0, 0.5
 
 Opened = Callable[[], Driver]
@@ -53,13 +54,13 @@ def killed_client_finding(opened: Opened, arm: str, by: FloatArray) -> Finding:
         seen = watch(driver, arm, 2.0 * _REST_S, lambda: driver.step({}))
     finally:
         driver.close()
-    rests = np.ptp(seen.position[seen.time > seen.time[-1] - _REST_S], axis=0).max() <= _NOISE
+    rests = np.ptp(seen.position[seen.time > seen.time[-1] - _REST_S], axis=0).max() <= NOISE
     return _judged(np.abs(seen.position[-1] - last), rate, bool(rests))
 
 
 def _judged(travel: FloatArray, rate: FloatArray, rests: bool) -> Finding:
     """Judge how far the joints (n,) went on, at the rates (n,) of the test."""
-    seconds = float((travel / np.maximum(rate, 1e-9)).max()) if len(travel) else 0.0
+    seconds = float((travel / np.maximum(rate, 1e-9)).max())
     if not rests:
         return _finding(seconds, False, "it still moves: give the robot a watchdog of its own")
     far = "it stopped late: shorten the robot's watchdog" if seconds > _STOPS_S else ""

@@ -4,9 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.errors import ShapeError
+from vergence.vision.image import grey_image
 from vergence.vision.matching.matcher import Matches
 
+NO_TEXTURE = "no texture that could be recognised"
 _NOTHING = np.zeros((0, 2))
 
 
@@ -21,6 +24,22 @@ class ImageFeatures(NamedTuple):
 def no_features(reason: str) -> ImageFeatures:
     """Return the features of an image that has none."""
     return ImageFeatures(_NOTHING, np.zeros((0, 1), np.float32), reason)
+
+
+def searched_image(image: ImageArray, mask: BoolArray | None) -> tuple[ImageArray | None, str]:
+    """Return grey levels to look for features in, or None and why there are none.
+
+    Args:
+        image: grey, (height, width).
+        mask: where features may be, (height, width); None for everywhere.
+
+    Raises:
+        ShapeError: if the mask has not the size of the image.
+    """
+    grey, reason = grey_image(image)
+    if grey is not None and mask is not None and np.shape(mask) != grey.shape:
+        raise ShapeError("mask", np.shape(mask), grey.shape)
+    return grey, reason
 
 
 def nearest_features(

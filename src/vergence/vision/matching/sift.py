@@ -6,10 +6,14 @@ import numpy as np
 from pydantic import Field
 
 from vergence.arrays import BoolArray, ImageArray
-from vergence.errors import ShapeError
 from vergence.parts import knob, part
-from vergence.vision.image import grey_image
-from vergence.vision.matching.image_features import ImageFeatures, nearest_features, no_features
+from vergence.vision.matching.image_features import (
+    NO_TEXTURE,
+    ImageFeatures,
+    nearest_features,
+    no_features,
+    searched_image,
+)
 from vergence.vision.matching.matcher import Matches
 
 _ROWS_PX = 480  # an image with more is searched at a smaller size
@@ -48,11 +52,9 @@ class Sift:
         """
         import cv2
 
-        grey, reason = grey_image(image)
+        grey, reason = searched_image(image, mask)
         if grey is None:
             return no_features(reason)
-        if mask is not None and np.shape(mask) != grey.shape:
-            raise ShapeError("mask", np.shape(mask), grey.shape)
         size = self.size * min(1.0, _ROWS_PX / min(grey.shape))
         if size < 1.0:
             grey = np.asarray(
@@ -66,8 +68,7 @@ class Sift:
         detector = cv2.SIFT.create(nfeatures=self.features, enable_precise_upscale=True)
         points, descriptors = detector.detectAndCompute(grey, shown)
         if descriptors is None or len(points) < 2:
-            reason = "no texture that could be recognised"
-            return no_features(reason)
+            return no_features(NO_TEXTURE)
         scale = np.array(image.shape[::-1]) / np.array(grey.shape[::-1])
         centres = np.array([point.pt for point in points], dtype=np.float64)
         return ImageFeatures((centres + 0.5) * scale - 0.5, descriptors)

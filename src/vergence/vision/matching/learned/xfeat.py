@@ -6,10 +6,14 @@ import numpy as np
 from pydantic import Field
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.errors import ShapeError
 from vergence.parts import knob, part
-from vergence.vision.image import grey_image
-from vergence.vision.matching.image_features import ImageFeatures, nearest_features, no_features
+from vergence.vision.matching.image_features import (
+    NO_TEXTURE,
+    ImageFeatures,
+    nearest_features,
+    no_features,
+    searched_image,
+)
 from vergence.vision.matching.learned.xfeat_network import CELL_PX, SIDE_PX
 from vergence.vision.matching.learned.xfeat_weights import require_xfeat, run_xfeat
 from vergence.vision.matching.matcher import Matches
@@ -49,14 +53,12 @@ class XFeat:
         Raises:
             ShapeError: if the mask has not the size of the image.
         """
-        grey, reason = grey_image(image)
+        grey, reason = searched_image(image, mask)
         if grey is None:
             return no_features(reason)
-        if mask is not None and np.shape(mask) != grey.shape:
-            raise ShapeError("mask", np.shape(mask), grey.shape)
         searched = _fitted(grey)
         if float(searched.std()) < 1.0:
-            return no_features("no texture that could be recognised")
+            return no_features(NO_TEXTURE)
         descriptors, places, reliability = run_xfeat((searched - searched.mean()) / searched.std())
         points, score = _keypoints(places)
         score = score * _sampled(reliability, points)[:, 0]
@@ -68,7 +70,7 @@ class XFeat:
         best = np.argsort(-score, kind="stable")[: self.features]
         best = best[score[best] > 0]
         if len(best) < 2:
-            return no_features("no texture that could be recognised")
+            return no_features(NO_TEXTURE)
         described = _sampled(_normal(descriptors, 0), points[best])
         return ImageFeatures(points_px[best], _normal(described, 1).astype(np.float32))
 
