@@ -366,12 +366,33 @@ def test_a_studys_checks_decide_the_exit_code(
         True,
     )
     [check] = answer["checks"]
-    assert list(check) == ["name", "paper", "measured", "unit", "holds", "note"]
+    assert list(check) == [
+        *("name", "paper", "bound", "measured", "unit", "holds", "note", "spread"),
+    ]
     assert check["holds"] is holds
+    assert check["spread"] is None
     page = Path(answer["report"]).read_text(encoding="utf-8")
     assert "How it drifts." in page
     assert "over &lt;all&gt; of it" in page
     assert "quick" in page
+
+
+def test_several_seeds_tell_with_how_many_a_check_holds(
+    command: Command, capsys: object, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _pid: {0})
+    options = ("--seeds", "3", "--out", "study")
+    assert command("reproduce", "nelson1995", *options, "--json") == 1 - holds
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["seed"], answer["seeds"]) == (0, 3)
+    [check] = answer["checks"]
+    held = 3 if holds else 0
+    assert check["spread"] == {"seeds": 3, "held": held, "median": 0.25, "low": 0.25, "high": 0.25}
+    page = Path(answer["report"]).read_text(encoding="utf-8")
+    assert f"{held} of 3</span>" in page
+    assert "seeds 0 to 2" in page
+    assert command("reproduce", "nelson1995", *options) == 1 - holds
+    assert f"{held} of 3" in capsys.readouterr().out
 
 
 def test_run_folders_never_collide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import compress
 
 from vergence.studies import Check
 
-HEADINGS = ("check", "expected", "measured", "unit", "holds", "note")
+HEADINGS = ("check", "claim", "bound", "measured", "median (range)", "unit", "holds", "note")
+NUMBERS = ("measured", "median (range)")
 
 
 def as_json(check: Check) -> Mapping[str, object]:
@@ -13,31 +15,55 @@ def as_json(check: Check) -> Mapping[str, object]:
     return {
         "name": check.name,
         "paper": check.paper,
+        "bound": check.bound,
         "measured": float(check.measured),
         "unit": check.unit,
         "holds": bool(check.holds),
         "note": check.note,
+        "spread": check.spread._asdict() if check.spread else None,
     }
 
 
-def cells(check: Check) -> tuple[str, ...]:
+def table(checks: Sequence[Check]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return headings and rows of the checks' table, without the columns that are empty."""
+    rows = [_cells(check) for check in checks]
+    filled = [any(cells) for cells in zip(*rows, strict=True)]
+    headings = tuple(compress(HEADINGS, filled))
+    return headings, [tuple(compress(cells, filled)) for cells in rows]
+
+
+def _cells(check: Check) -> tuple[str, ...]:
     """Return a check as words, in the order of `HEADINGS`."""
-    holds = "yes" if check.holds else "NO"
-    return (check.name, check.paper, f"{check.measured:.4g}", check.unit, holds, check.note)
+    holds, spread = "yes" if check.holds else "NO", ""
+    if check.spread:
+        seeds, held, median, low, high = check.spread
+        holds = f"{held} of {seeds}"
+        spread = f"{median:.3g} ({low:.3g} … {high:.3g})"
+    measured = f"{check.measured:.4g}"
+    return (check.name, check.paper, check.bound, measured, spread, check.unit, holds, check.note)
 
 
 def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
-    head = "".join(f'<th scope="col">{heading}</th>' for heading in HEADINGS)
-    rows = "\n".join(_html_row(check) for check in checks)
-    return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>'
-
-
-def _html_row(check: Check) -> str:
-    name, paper, measured, unit, holds, note = map(escape, cells(check))
-    kind = "good" if check.holds else "bad"
-    return (
-        f'<tr><th scope="row">{name}</th><td>{paper}</td><td class="number">{measured}</td>'
-        f'<td class="unit">{unit}</td><td><span class="badge {kind}">{holds}</span></td>'
-        f'<td class="note">{note}</td></tr>'
+    headings, rows = table(checks)
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
+    body = "\n".join(
+        _html_row(headings, cells, check.holds) for cells, check in zip(rows, checks, strict=True)
     )
+    return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>'
+
+
+_KINDS = {**dict.fromkeys(NUMBERS, "number"), "unit": "unit", "note": "note"}
+
+
+def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str:
+    row = []
+    for heading, cell in zip(headings, map(escape, cells), strict=True):
+        if heading == "check":
+            row.append(f'<th scope="row">{cell}</th>')
+        elif heading == "holds":
+            row.append(f'<td><span class="badge {"good" if holds else "bad"}">{cell}</span></td>')
+        else:
+            kind = f' class="{_KINDS[heading]}"' if heading in _KINDS else ""
+            row.append(f"<td{kind}>{cell}</td>")
+    return f"<tr>{''.join(row)}</tr>"

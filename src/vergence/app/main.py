@@ -182,16 +182,24 @@ def reproduce(
     ],
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Use exact projections instead of images: under a minute."),
+        typer.Option("--quick", help="Use exact projections instead of images: about a minute."),
     ] = False,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            help="Number of seeds, from --seed on; tells with how many of them each check holds.",
+            min=1,
+            max=1000,
+        ),
+    ] = 1,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Repeat a paper's experiments, with figures and a table of its claims and our results."""
     from vergence.app.reproduce import reproduce as command
 
-    raise typer.Exit(command(paper, quick, seed, out, as_json))
+    raise typer.Exit(command(paper, quick, seed, seeds, out, as_json))
 
 
 @app.command(

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 QUICK = "quick: on exact projections instead of images"
 
 
-def reproduce(paper: str, quick: bool, seed: int, out: Path | None, in_json: bool) -> int:
+def reproduce(
+    paper: str, quick: bool, seed: int, seeds: int, out: Path | None, in_json: bool
+) -> int:
     """Repeat a paper's experiments, write a page about them; return the exit code.
 
     Raises:
@@ -25,8 +27,8 @@ def reproduce(paper: str, quick: bool, seed: int, out: Path | None, in_json: boo
     from vergence.app.study_page import write_study_page
 
     folder = out or new_folder(paper)
-    result = _study(paper, folder, quick, seed)
-    remark = QUICK if quick else ""
+    result = _study(paper, folder, quick, seed, seeds)
+    remark = _remark(result, quick)
     report = write_study_page(folder, result, remark)
     if in_json:
         from vergence.app.check import as_json
@@ -37,6 +39,7 @@ def reproduce(paper: str, quick: bool, seed: int, out: Path | None, in_json: boo
             "paper": paper,
             "quick": quick,
             "seed": seed,
+            "seeds": seeds,
             "checks": checks,
         }
         emit({**answer, "report": report})
@@ -45,7 +48,12 @@ def reproduce(paper: str, quick: bool, seed: int, out: Path | None, in_json: boo
     return SUCCESS if result.holds else FAILURE
 
 
-def _study(paper: str, folder: Path, quick: bool, seed: int) -> "StudyResult":
+def _remark(result: "StudyResult", quick: bool) -> str:
+    seeds = f"seeds {result.seed} to {result.seed + result.seeds - 1}" if result.seeds > 1 else ""
+    return "; ".join(filter(None, (QUICK if quick else "", seeds)))
+
+
+def _study(paper: str, folder: Path, quick: bool, seed: int, seeds: int) -> "StudyResult":
     """Run the study with a progress bar."""
     from vergence.app.progress import bar
     from vergence.studies import reproduce
@@ -56,7 +64,7 @@ def _study(paper: str, folder: Path, quick: bool, seed: int) -> "StudyResult":
         def show(part: str, share: float) -> None:
             progress.update(task, description=part, completed=share)
 
-        return reproduce(paper, quick=quick, seed=seed, folder=folder, progress=show)
+        return reproduce(paper, quick=quick, seed=seed, seeds=seeds, folder=folder, progress=show)
 
 
 def _tell(result: "StudyResult", report: Path, remark: str) -> None:
@@ -64,14 +72,18 @@ def _tell(result: "StudyResult", report: Path, remark: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from vergence.app.check import HEADINGS, cells
+    from vergence.app.check import NUMBERS, table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for heading in HEADINGS[:-1]:  # the notes would not fit; they are in the report
-        right = heading == "measured"
-        table.add_column(heading, justify="right" if right else "left", no_wrap=heading == "check")
-    for check in result.checks:
-        table.add_row(*cells(check)[:-1])
+    headings, rows = table(result.checks)
+    shown = [
+        k for k, heading in enumerate(headings) if heading != "note"
+    ]  # too long: in the report
+    drawn = Table(box=box.SIMPLE_HEAD)
+    for heading in (headings[k] for k in shown):
+        right = heading in NUMBERS
+        drawn.add_column(heading, justify="right" if right else "left", no_wrap=heading == "check")
+    for cells in rows:
+        drawn.add_row(*(cells[k] for k in shown))
     say(f"{result.title}{f' ({remark})' if remark else ''}")
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    Console(width=None if sys.stdout.isatty() else 120).print(drawn)
     say(f"  report  {report}")

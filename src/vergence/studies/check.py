@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from vergence.drawing import save
 from vergence.errors import InputError, nearest
@@ -11,16 +11,28 @@ from vergence.errors import InputError, nearest
 Progress = Callable[[str, float], None]  # what is being done, and the share done so far
 
 
+class Spread(NamedTuple):
+    """What a check measured when its study was repeated with several seeds."""
+
+    seeds: int
+    held: int  # seeds with which the check holds
+    median: float
+    low: float  # the range
+    high: float
+
+
 @dataclass(frozen=True, slots=True)
 class Check:
     """One claim of a paper, measured."""
 
     name: str
-    paper: str  # what the paper says, and when the check holds
-    measured: float
+    paper: str  # what the paper says
+    measured: float  # with the first seed
     unit: str
-    holds: bool
+    holds: bool  # with every seed
     note: str = ""
+    bound: str = ""  # within which the check holds, where the paper's words give none
+    spread: Spread | None = None  # over several seeds
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +59,7 @@ class StudyResult:
     checks: tuple[Check, ...]
     figures: tuple[Figure, ...]
     seed: int = 0  # of what is drawn by chance
+    seeds: int = 1  # how many were tried, from that one on
 
     def figure(self, number: int | str) -> Figure:
         """Return a figure by its number in the paper, or by the name of its file.

@@ -15,13 +15,13 @@ Result = TypeVar("Result")
 def processes(
     workers: int | None = None,
 ) -> AbstractContextManager[ProcessPoolExecutor | None]:
-    """Return a pool of processes; None, which means this one, for one worker.
+    """Return a pool of processes; None, which means this one, for one worker and in a worker.
 
     Args:
         workers: how many; as many as there are cores if None.
     """
     workers = workers or len(os.sched_getaffinity(0))
-    if workers == 1:
+    if workers == 1 or parent_process() is not None:
         return nullcontext()
     return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin_worker)
 
@@ -31,6 +31,7 @@ def try_all(
     count: int,
     pool: ProcessPoolExecutor | None = None,
     progress: Callable[[float], None] = lambda _share: None,
+    at_once: int = 2,
 ) -> list[Result]:
     """Return the results of cases 0 … count - 1, in order.
 
@@ -39,9 +40,10 @@ def try_all(
         count: how many.
         pool: see `processes`.
         progress: told the share done.
+        at_once: cases that a process is given at a time.
     """
     results = []
-    ongoing = pool.map(case, range(count), chunksize=2) if pool else map(case, range(count))
+    ongoing = pool.map(case, range(count), chunksize=at_once) if pool else map(case, range(count))
     for result in ongoing:
         results.append(result)
         progress(len(results) / count)
