@@ -26,6 +26,8 @@ from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
 from vergence.places import built_in_cells  # noqa: E402
 from vergence.runtime.recording import Recording  # noqa: E402
+from vergence.signals import Setpoint  # noqa: E402
+from vergence.simulation import SimulatedDriver  # noqa: E402
 from vergence.simulation.world import World  # noqa: E402
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -91,6 +93,49 @@ def gallery(*names: str) -> None:
         pair = np.hstack([cv2.resize(image, (400, 300), interpolation=3) for image in both])
         path = str(DOCS / "images" / "cells" / f"{name}.jpg")
         cv2.imwrite(path, pair, [cv2.IMWRITE_JPEG_QUALITY, 84])
+
+
+DEFECTS = {  # what each panel of the image is called, and its `imaging`; stronger than usual
+    "ideal": None,
+    "exposure_s = 0.025": {"exposure_s": 0.025},
+    "readout_s = 0.033": {"readout_s": 0.033},
+    "auto_exposure_s = 0.3": {"auto_exposure_s": 0.3},
+    "vignetting = 0.7": {"vignetting": 0.7},
+    "full_well_electrons = 500": {"full_well_electrons": 500},
+    "jpeg_quality = 10": {"jpeg_quality": 10},
+    "real_camera": "real_camera",
+}
+
+
+def imaging() -> None:
+    """What each key of a camera's `imaging` does to an image of a fast board."""
+    panels = []
+    for title, table in DEFECTS.items():
+        blind = [[0.1, 0.38]] if "auto" in title else []  # to which the exposure adjusts
+        image = film_of({"imaging": table, "blind_s": blind})[280:, :300]
+        panel = cv2.cvtColor(cv2.resize(image, None, fx=1.2, fy=1.2), cv2.COLOR_GRAY2BGR)
+        cv2.rectangle(panel, (0, 0), (359, 24), (40, 36, 32), -1)
+        cv2.putText(panel, title, (8, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.5, WHITE, 1, cv2.LINE_AA)
+        panels.append(cv2.copyMakeBorder(panel, 3, 3, 3, 3, 0, value=(128, 128, 128)))
+    grid = np.vstack([np.hstack(panels[i : i + 2]) for i in range(0, len(panels), 2)])
+    cv2.imwrite(str(DOCS / "images" / "imaging.jpg"), grid, [cv2.IMWRITE_JPEG_QUALITY, 82])
+
+
+def film_of(camera: dict):
+    """Return the last image of the Puma's camera at rest, just after it was blind."""
+    motion = {"kind": "line", "velocity_m_s": [0.4, 0.0, 0.0], "distance_m": 1.0}
+    cell = load_cell("puma560").replace(cameras={"wrist": camera}, target={"motion": motion})
+    driver = SimulatedDriver(cell)
+    arms = driver.read().joints
+    at_rest = {name: Setpoint(arm.position, 0 * arm.position) for name, arm in arms.items()}
+    frames = []
+    try:
+        while driver.time < 0.5:
+            driver.step(at_rest)
+            frames += driver.read().frames
+    finally:
+        driver.close()
+    return next(frame.image for frame in frames if frame.time > 0.39)
 
 
 def decoded(jpeg: bytes):
@@ -169,6 +214,7 @@ def screenshot(address: str, size: tuple[int, int], name: str, wait_ms: int = 0)
 if __name__ == "__main__":
     own_arm()
     own_object()
+    imaging()
     report()
     watch()
     gallery()

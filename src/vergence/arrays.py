@@ -10,6 +10,7 @@ from vergence.errors import InputError, ShapeError
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+Float32Array: TypeAlias = NDArray[np.float32]
 DepthArray: TypeAlias = NDArray[np.float32]  # m along the optical axis, (height, width)
 ImageArray: TypeAlias = NDArray[np.uint8]  # grey, (height, width)
 

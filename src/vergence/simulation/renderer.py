@@ -3,15 +3,17 @@
 import importlib
 import os
 import sys
+from collections.abc import Callable
 from ctypes.util import find_library
 from typing import Any
 
 import numpy as np
 
-from vergence.arrays import BoolArray, DepthArray, ImageArray
+from vergence.arrays import BoolArray, DepthArray, Float32Array, FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.cell.schema import DepthTable
+from vergence.cell.schema import CameraTable, DepthTable
 from vergence.errors import RenderingError
+from vergence.simulation.sensor import Sensor
 
 # Mesa's software renderer then reads one size of a texture for each pixel instead of blending two:
 # an image takes two thirds of the time, and a tracked point drifts by 0.028 px instead of 0.024
@@ -19,7 +21,6 @@ from vergence.errors import RenderingError
 _SOFTWARE = ("LP_PERF", "no_mip_linear")
 _CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo settles on it, when imported
 _BLOTCH_PX = 24  # side of a place without depth
-_NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the image
 
 
 def choose_renderer(needed: bool = True) -> None:
@@ -47,15 +48,22 @@ def choose_renderer(needed: bool = True) -> None:
 
 
 class CameraRenderer:
-    """Takes grey images with one camera of a world, with distortion and sensor noise.
+    """Takes grey images with one camera of a world, with distortion and what its sensor does.
 
     Shadows and multisampling stay off: an image then costs a few milliseconds on a CPU. MuJoCo
     draws without distortion, an image wide enough for all that the camera sees; each pixel of
     the camera's own image is then looked up in that one.
+
+    Args:
+        model: MuJoCo's.
+        name: of the camera in it.
+        camera: its lens.
+        table: of the camera in its cell.
+        rng: draws the noise.
     """
 
     def __init__(
-        self, model: Any, name: str, camera: Camera, noise_grey: float, rng: np.random.Generator
+        self, model: Any, name: str, camera: Camera, table: CameraTable, rng: np.random.Generator
     ) -> None:
         import mujoco
 
@@ -73,27 +81,43 @@ class CameraRenderer:
         self._name, self._shape = name, (camera.height, camera.width)
         self._lookup = _lookup(camera, drawn) if camera.distorted else None
         self._rng = rng
-        shape = (camera.height + _NOISE_POOL, camera.width + _NOISE_POOL)
-        self._noise = rng.normal(0, noise_grey, shape).astype(np.int16) if noise_grey else None
+        self._sensor = Sensor(self._shape, table, rng)
 
-    def take(self, data: Any, blind: bool = False) -> ImageArray:
-        """Return the image (height, width) of the world as it stands, black if blind."""
-        import cv2
+    def take(self, data: Any, blind: bool = False, settled: bool = True) -> ImageArray:
+        """Return the image (height, width) of the world as it stands, black if blind.
 
-        grey = np.zeros(self._shape, dtype=np.uint8) if blind else self._draw(data)
-        if self._noise is not None:
-            # A fresh window of one pool: drawing normal deviates would cost more than the image.
-            row, column = self._rng.integers(0, _NOISE_POOL, 2)
-            window = self._noise[row : row + grey.shape[0], column : column + grey.shape[1]]
-            grey = cv2.add(grey, window, dtype=cv2.CV_8U)
-        return np.asarray(grey, dtype=np.uint8)
+        Args:
+            data: MuJoCo's, of the world.
+            blind: whether no light comes in.
+            settled: whether the automatic exposure is adjusted to the scene, see `Sensor.read`.
+        """
+        light = np.zeros(self._shape, dtype=np.uint8) if blind else self.draw(data)
+        return self._sensor.read(light, settled)
 
-    def _draw(self, data: Any) -> Any:
+    def take_moving(
+        self, world_at: Callable[[float], Any], moments: FloatArray, weights: FloatArray
+    ) -> ImageArray:
+        """Return the image (height, width) that a moving world gives.
+
+        Args:
+            world_at: returns MuJoCo's data of the world at a moment.
+            moments: that are rendered, (J,).
+            weights: by how much each counts in each row, (J, height).
+        """
+        light: Float32Array = np.zeros(self._shape, dtype=np.float32)
+        for moment, rows in zip(moments.tolist(), weights, strict=True):
+            light += rows.astype(np.float32)[:, None] * self.draw(world_at(moment))
+        return self._sensor.read(light, settled=False)
+
+    def draw(self, data: Any) -> ImageArray:
+        """Return the light (height, width) of the world as it stands, in grey levels."""
         import cv2
 
         self._renderer.update_scene(data, self._name)
         grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
-        return grey if self._lookup is None else cv2.remap(grey, *self._lookup, cv2.INTER_LINEAR)
+        if self._lookup is not None:
+            grey = cv2.remap(grey, *self._lookup, cv2.INTER_LINEAR)
+        return np.asarray(grey, dtype=np.uint8)
 
     def depth(self, data: Any, sensor: DepthTable) -> DepthArray:
         """Return the depth (height, width), m, of the world as it stands; NaN where unknown."""

@@ -3,13 +3,14 @@
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import Camera, image_tick
 from vergence.cell.cell import Cell
-from vergence.cell.schema import FollowTable, Task, TrackTable
+from vergence.cell.schema import FollowTable, ImagingTable, Task, TrackTable
 from vergence.errors import InputError
 from vergence.features import inverse_depth_plane
 from vergence.geometry import se3_inverse, transform_points
@@ -19,7 +20,17 @@ from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
 from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
 from vergence.simulation.motion import target_pose
 from vergence.simulation.renderer import CameraRenderer, choose_renderer
+from vergence.simulation.row_weights import row_weights
 from vergence.vision import CurveTracking
+
+
+class _Exposing(NamedTuple):
+    """An image whose shutter is still open for some rows."""
+
+    middle: int  # tick
+    complete: int  # tick
+    arrival: int  # tick, at the earliest
+    frame: Frame  # without its image
 
 
 class SimulatedDriver:
@@ -29,6 +40,9 @@ class SimulatedDriver:
     running before the simulation begins: the first `read` delivers what they exposed one latency
     before, at a time below zero. With `images` off frames carry no image, only the truth, for
     perception that is exact by construction.
+
+    Where a camera's `imaging` gives its shutter a duration, its time of exposure is the middle of
+    it, and the image arrives no sooner than the shutter has closed.
 
     Target and cameras are where `as_built` has them: off the cell's placements by the errors that
     the cell states.
@@ -40,6 +54,7 @@ class SimulatedDriver:
         choose_renderer(needed=images)
         from vergence.simulation.as_built import as_built
         from vergence.simulation.gripper import Gripper
+        from vergence.simulation.shutter import Shutter
         from vergence.simulation.world import World
 
         self.cell = cell
@@ -59,12 +74,20 @@ class SimulatedDriver:
                     self.world.model,
                     name,
                     self.world.cameras[name],
-                    table.noise_grey,
+                    table,
                     np.random.default_rng([cell.seed, 2, number]),
                 )
                 for number, (name, table) in enumerate(cell.cameras.items())
                 if name in cell.watched
             }
+        self._imaging = {n: table.imaging or ImagingTable() for n, table in cell.cameras.items()}
+        self._drops = {
+            name: np.random.default_rng([cell.seed, 7, number])
+            for number, name in enumerate(cell.cameras)
+        }
+        self._exposing: list[_Exposing] = []
+        longest_s = max((self._imaging[name].open_s for name in self._renderers), default=0.0)
+        self._shutter = Shutter(self.world, longest_s, cell.inner_rate_hz) if longest_s else None
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self.world.move_target(self._pose(0.0))
         self.world.update()
@@ -106,9 +129,15 @@ class SimulatedDriver:
         self._features = np.array(features, dtype=np.float64)
         if self._tick:
             self._queue.clear()
+            self._exposing.clear()
             return
         self._queue = deque(
-            (arrival, replace(frame, truth=self._truth(frame.camera, self._is_blind(frame.camera))))
+            (
+                arrival,
+                replace(
+                    frame, truth=self._truth(frame.camera, self._is_blind(frame.camera, self.time))
+                ),
+            )
             for arrival, frame in self._before_motion
         )
         self._before_motion = list(self._queue)
@@ -132,6 +161,9 @@ class SimulatedDriver:
     def restart_cameras(self) -> None:
         """Begin again with what the cameras see now; to be called before the first `step`."""
         self._queue.clear()
+        self._exposing.clear()
+        if self._shutter is not None:
+            self._shutter.begin(self._tick)
         self._exposed = dict.fromkeys(self._exposed, 0)
         for name, table in self.cell.cameras.items():
             if table.latency_frames:
@@ -196,7 +228,12 @@ class SimulatedDriver:
         self._tick += 1
         self.world.move_target(self._target_pose())
         self.world.step()
+        if self._shutter is not None:
+            self.world.update()
+            self._carry_target()
+            self._shutter.remember(self._tick)
         self._expose()
+        self._complete()
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -245,24 +282,61 @@ class SimulatedDriver:
                 self._carry_target()
                 fresh = True
             arrival = self._tick_of(self._exposed[name] + table.latency_frames, table.rate_hz)
+            first = not self._exposed[name]
             self._exposed[name] += 1
-            self._queue.append((arrival, self._frame(name)))
+            if first:  # nothing has moved yet
+                self._queue.append((arrival, self._frame(name)))
+            elif not self._is_dropped(name):
+                self._take(name, arrival)
+
+    def _take(self, name: str, arrival: int) -> None:
+        """Take an image now, or begin to."""
+        if self._shutter is None or name not in self._renderers or not self._imaging[name].open_s:
+            self._queue.append((arrival, self._frame(name, settled=False)))
+            return
+        complete = self._tick + self._shutter.ticks_after(self._imaging[name])
+        frame = self._frame(name, shown=False)
+        self._exposing.append(_Exposing(self._tick, complete, arrival, frame))
+
+    def _complete(self) -> None:
+        """Render the images whose shutter has closed."""
+        for one in [one for one in self._exposing if one.complete <= self._tick]:
+            self._exposing.remove(one)
+            frame = replace(one.frame, image=self._moving_image(one))
+            self._queue.append((max(one.arrival, self._tick), frame))
+
+    def _moving_image(self, one: _Exposing) -> ImageArray:
+        name = one.frame.camera
+        renderer, imaging, shutter = self._renderers[name], self._imaging[name], self._shutter
+        assert shutter is not None
+        if self._is_blind(name, one.frame.time):
+            return renderer.take(self.world.data, blind=True, settled=False)
+        moments = shutter.moments(name, one.middle, imaging)
+        seconds = (moments - one.middle) / self.inner_rate_hz
+        weights = row_weights(seconds, self.cameras[name].height, imaging)
+        return renderer.take_moving(shutter.at, moments, weights)
+
+    def _is_dropped(self, name: str) -> bool:
+        return bool(self._drops[name].random() < self._imaging[name].dropped)
 
     def _tick_of(self, image: int, rate_hz: float) -> int:
         return image_tick(image, self.inner_rate_hz, rate_hz)
 
-    def _frame(self, camera: str) -> Frame:
-        blind = self._is_blind(camera)
+    def _frame(self, camera: str, settled: bool = True, shown: bool = True) -> Frame:
+        """Return what a camera sees now, its image only if shown; see `Sensor.read`."""
+        blind = self._is_blind(camera, self.time)
         renderer = self._renderers.get(camera)
-        image = None if renderer is None else renderer.take(self.world.data, blind)
+        image = None
+        if renderer is not None and shown:
+            image = renderer.take(self.world.data, blind, settled)
         joints = {name: self.world.joint_position(name) for name in self.arms}
         sensor, depth = self.cell.cameras[camera].depth, None
         if sensor is not None and renderer is not None:
             depth = renderer.depth(self.world.data, sensor)
         return Frame(camera, self.time, image, joints, self._truth(camera, blind), depth)
 
-    def _is_blind(self, camera: str) -> bool:
-        return any(a <= self.time < b for a, b in self.cell.cameras[camera].blind_s)
+    def _is_blind(self, camera: str, time: float) -> bool:
+        return any(a <= time < b for a, b in self.cell.cameras[camera].blind_s)
 
     def _features_of(self, task: Task, images: bool) -> FloatArray:
         """Return the points (M, 3) of the target that a task follows, where they are known.

@@ -69,6 +69,7 @@ class Studio:
         from vergence.simulation.renderer import choose_renderer
 
         choose_renderer(needed=False)
+        from vergence.simulation.sensor import Sensor
         from vergence.simulation.world import World
 
         cell = load_cell(name_or_path)
@@ -90,6 +91,8 @@ class Studio:
             self.world.arm_to_target() if self.fixed else self.world.arm_to_camera(self.name)
         )
         self._start = self.world.joint_position(self.arm)
+        table, size = self._cell.cameras[self.name], (self.camera.height, self.camera.width)
+        self._sensor = Sensor(size, table, self._noise) if table.imaging else None
 
     @property
     def truth(self) -> Truth:
@@ -139,7 +142,9 @@ class Studio:
         import cv2
 
         size = (self.camera.width, self.camera.height)
-        fine = cv2.resize(renderer.take(self.world.data), size, interpolation=cv2.INTER_AREA)
+        fine = cv2.resize(renderer.draw(self.world.data), size, interpolation=cv2.INTER_AREA)
+        if self._sensor is not None:
+            return self._sensor.read(np.asarray(fine, dtype=np.uint8))
         noisy = fine + self._noise.normal(0.0, noise_grey, fine.shape)
         return np.asarray(np.clip(np.round(noisy), 0, 255), dtype=np.uint8)
 
@@ -159,7 +164,9 @@ class Studio:
         }
         self.world = World(self._cell.replace(cameras={self.name: lens}))
         fine = self.world.cameras[self.name]
-        return CameraRenderer(self.world.model, self.name, fine, 0.0, self._noise)
+        table = self._cell.cameras[self.name]
+        ideal = table.model_copy(update={"noise_grey": 0.0, "imaging": None})
+        return CameraRenderer(self.world.model, self.name, fine, ideal, self._noise)
 
     @property
     def noise_grey(self) -> float:

@@ -10,6 +10,7 @@ from vergence.cell.schema.base import (
     TaskTable,
     Vector3,
 )
+from vergence.cell.schema.imaging import ImagingTable
 from vergence.cell.schema.tables import (
     AdvanceTable,
     ArmTable,
@@ -40,6 +41,7 @@ __all__ = [
     "DriverTable",
     "Duration",
     "FollowTable",
+    "ImagingTable",
     "LengthTable",
     "Name",
     "Part",
@@ -62,6 +64,7 @@ __all__ = [
 # What stands at a place in the file, or is the kind of what stands there.
 TABLES: dict[str, type[Table]] = {
     "depth": DepthTable,
+    "imaging": ImagingTable,
     "Placement": Placement,  # by pydantic's name: it has no kind
     "scene": SceneTable,
     "arms": ArmTable,

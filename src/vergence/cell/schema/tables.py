@@ -28,6 +28,8 @@ from vergence.cell.schema.base import (
     Time,
     Vector3,
 )
+from vergence.cell.schema.imaging import Imaging
+from vergence.errors import InputError
 from vergence.parts import kind_of
 
 _MOST_WAYPOINTS = 1000
@@ -114,6 +116,8 @@ class CameraTable(Placement):
     latency_frames: Annotated[int, Field(ge=0, le=1000)] = 0
     depth: DepthTable | None = None  # of a depth camera; see `law.depth`
     noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
+    # How its images differ from ideal ones, in simulation: a table, or "real_camera".
+    imaging: Imaging | None = None
     # From when to when its images are black.
     blind_s: Annotated[tuple[tuple[Time, Time], ...], Field(max_length=1000)] = ()
     calibration_error_m: Distance = 0.0  # of its placement, in simulation
@@ -124,6 +128,15 @@ class CameraTable(Placement):
         by_lens = self.focal_mm is not None and self.pixel_um is not None
         if by_lens == (self.focal_px is not None):
             raise ValueError("either focal_mm and pixel_um, or focal_px, or calibration")
+        return self
+
+    @model_validator(mode="after")
+    def _open_for_a_period(self) -> "CameraTable":
+        for key in ("exposure_s", "readout_s"):
+            given = getattr(self.imaging, key, 0.0)
+            if given * self.rate_hz > 1.0 + 1e-9:
+                allowed = f"at most {1.0 / self.rate_hz:.4g}, the time between images"
+                raise InputError("", f"imaging.{key}", given, allowed)
         return self
 
     @field_validator("blind_s")
