@@ -82,7 +82,7 @@ def one_tick(chain, limits, q, desired, features, solids, R, settings, avoidance
     twist = least_squares_kernel(L, error, np.ones(len(L)), R)
     n = len(q)
     rest, none = np.zeros(n), np.empty((0, 0))
-    task = Task(twist.H, twist.g, none, np.empty(0), rest)
+    task = Task(twist.H, twist.g, none, np.empty(0), rest, np.full(n, 1e-6))
     scene = Scene(
         features, solids, none, np.eye(4), np.empty((0, n)), np.empty(0),
         np.empty(0, dtype=np.int64),
@@ -113,7 +113,7 @@ def arguments(tick: Tick) -> tuple[Any, ...]:
     arm, R = tick.arm, np.full(6, 1e-6)
     limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
     before = (arm.chain, limits, tick.q, tick.desired, tick.features, tick.solids, R)
-    return (*before, tick.settings, Avoidance(1e-3, 0.5, 50.0, 1e-6))
+    return (*before, tick.settings, Avoidance(1e-3, 0.5, 50.0))
 
 
 def from_python(tick: Tick) -> Callable[[], object]:

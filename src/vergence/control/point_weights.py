@@ -22,3 +22,15 @@ def point_weights(covariance_px: FloatArray) -> FloatArray:
     weight /= np.linalg.eigvalsh(weight).max()
     roots: FloatArray = np.linalg.cholesky(weight).transpose(0, 2, 1)
     return roots
+
+
+def row_variance(roots: FloatArray, covariance: FloatArray) -> float:
+    """Return the mean variance of weighted rows.
+
+    Args:
+        roots: R of each point, (M, 2, 2).
+        covariance: of each point, (M, 2, 2).
+    """
+    if not len(roots):
+        return 0.0
+    return float(np.einsum("mij,mjk,mik->m", roots, covariance, roots).mean() / 2.0)

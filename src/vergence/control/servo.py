@@ -20,7 +20,7 @@ from vergence.control.objectives import (
     OptimalTracking,
     TrackingSetup,
 )
-from vergence.control.point_weights import point_weights
+from vergence.control.point_weights import point_weights, row_variance
 from vergence.control.solvers import (
     Obstacles,
     Problem,
@@ -285,6 +285,9 @@ class Servo:
                 velocity = camera.normalize_velocity(reference.velocity_px, desired)[found]
             desired = desired[found]
         at_goal = reference.desired_depth_m
+        covariance_px = view.covariance_px[found]
+        weights = point_weights(covariance_px)
+        covariance = camera.normalize_covariance(covariance_px, points[found])
         return CameraState(
             self._mountings[name],
             points[found],
@@ -299,7 +302,8 @@ class Servo:
             T_camera_target=reference.T_camera_target,
             time=joints.time,
             depth_share=share,
-            weights=point_weights(view.covariance_px[found]),
+            weights=weights,
+            variance=row_variance(weights, covariance),
             **self._pose(name, joints.position),
         )
 
@@ -325,7 +329,7 @@ class Servo:
         self, states: Mapping[str, CameraState], joints: JointState, rates: FloatArray | None
     ) -> JointCommand:
         """Sum the objectives and solve for joint rates; `rates` (n,) go into the null space."""
-        H, g = np.zeros((6, 6)), np.zeros(6)
+        H, g, variance = np.zeros((6, 6)), np.zeros(6), 0.0
         H_joints, g_joints = NO_JOINTS
         for objective, weight, camera in self._terms:
             state = states.get(camera)
@@ -346,6 +350,7 @@ class Servo:
                     g_joints + weight * quadratic.g,
                 )
                 continue
+            variance += weight * quadratic.variance
             if state.A is None:
                 H, g = H + weight * quadratic.H, g + weight * quadratic.g
             else:
@@ -371,6 +376,7 @@ class Servo:
             A,
             _PLAN_WEIGHT if rates is not None and rates.any() else 0.0,
             float("nan") if first is None else first.depth_share,
+            variance,
         )
         return command_of(self._solver.solve(problem), A, self._solver.names)
 

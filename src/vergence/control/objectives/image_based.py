@@ -60,7 +60,10 @@ class ImageBased:
             L = np.ascontiguousarray(
                 self._interaction(now.interaction, goal.interaction), dtype=np.float64
             )
-        result: Quadratic = least_squares_kernel(L, rows, np.ones(len(L)), np.full(6, self.damping))
+        damping = np.full(6, self.damping)
+        result: Quadratic = least_squares_kernel(L, rows, np.ones(len(L)), damping)
+        if self.feature is Points:
+            return result._replace(variance=self.gain**2 * state.variance)
         return result
 
     def twist(self, features: Points, desired: Points) -> FloatArray:
@@ -70,8 +73,8 @@ class ImageBased:
             features: as they are.
             desired: as they should be.
         """
-        H, g = self.quadratic(state_of(features, desired))
-        v_camera: FloatArray = np.linalg.solve(H, g).astype(np.float64)
+        quadratic = self.quadratic(state_of(features, desired))
+        v_camera: FloatArray = np.linalg.solve(quadratic.H, quadratic.g).astype(np.float64)
         return v_camera
 
     def _interaction(

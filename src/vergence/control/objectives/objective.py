@@ -19,6 +19,7 @@ class Quadratic(NamedTuple):
 
     H: FloatArray  # (6, 6) positive semi-definite
     g: FloatArray  # (6,)
+    variance: float = 0.0  # that noise of the image gives the rows that H and g are made of
 
 
 class JointQuadratic(NamedTuple):
@@ -51,6 +52,7 @@ class CameraState:
         time: now, s.
         depth_share: largest standard deviation of a depth, a share of it; NaN if unknown.
         weights: roots (M, 2, 2) of what the rows of each feature weigh; all alike if None.
+        variance: of a row of a feature, weighted, by the noise of the image; normalized.
     """
 
     mounting: CameraMounting | None
@@ -71,6 +73,7 @@ class CameraState:
     time: float = 0.0
     depth_share: float = float("nan")
     weights: FloatArray | None = None
+    variance: float = 0.0
 
     @property
     def camera(self) -> Camera:

@@ -27,7 +27,6 @@ class Avoidance(NamedTuple):
     S: float  # on 1/w', [Nelson1995] eq. (28)
     rate_max: float  # the joint rates it alone may cause, ‖q̇‖, rad/s
     penalty_k: float  # steepness of the joint penalty, taken joint by joint
-    damping: float  # on the joint rates, so that the program has one solution
 
 
 class Task(NamedTuple):
@@ -38,6 +37,7 @@ class Task(NamedTuple):
     H_joints: FloatArray  # (n, n) of the joint rates; (0, 0) for none
     g_joints: FloatArray  # (n,); (0,) for none
     null_space_rates: FloatArray  # (n,) desired where the objectives leave a choice
+    damping: FloatArray  # (n,) μ, what they weigh; above 0, so that there is one solution
 
 
 class Scene(NamedTuple):
@@ -78,7 +78,7 @@ def constrained_rates(
 ) -> ConstrainedRates:
     """Return the joint rates that serve the objectives best within every limit.
 
-    Minimise ½ vᵀ H v - gᵀ v + ½ q̇ᵀ H_q q̇ - g_qᵀ q̇ + μ/2 ‖q̇ - q̇_null‖² + S/2 · 1/w'(q + T q̇)
+    Minimise ½ vᵀ H v - gᵀ v + ½ q̇ᵀ H_q q̇ - g_qᵀ q̇ + ½ Σ μ (q̇ - q̇_null)² + S/2 · 1/w'(q + T q̇)
     with v = J q̇, the last term linearised, subject to the rows of `constraint_rows` and a user's
     own. If the program is not solved, the arm brakes as fast as it may.
 
@@ -97,9 +97,9 @@ def constrained_rates(
     arm = posture(chain, q, 1e-3)
     P, slope_P = limit_penalty(q, limits[0], limits[1], avoidance.penalty_k, True)
     slope, w, J = determinant_slope(chain, q, arm), P * arm.det_JJt, arm.J
-    H, g = joint_objective(task.H, task.g, J, avoidance.damping)
+    H, g = joint_objective(task.H, task.g, J, task.damping)
     for i in range(n):
-        g[i] += avoidance.damping * task.null_space_rates[i]
+        g[i] += task.damping[i] * task.null_space_rates[i]
     if len(task.g_joints):
         H += task.H_joints
         g += task.g_joints
@@ -148,9 +148,9 @@ def constrained_rates(
 
 @njit(cache=True, error_model="numpy")
 def joint_objective(
-    H_twist: FloatArray, g_twist: FloatArray, J: FloatArray, damping: float
+    H_twist: FloatArray, g_twist: FloatArray, J: FloatArray, damping: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return Jᵀ H J + μ I (n, n) and Jᵀ g (n,): a twist objective in joint rates."""
+    """Return Jᵀ H J + diag(μ) (n, n) and Jᵀ g (n,): a twist objective in joint rates."""
     n = J.shape[1]
     H, g, HJ = np.zeros((n, n)), np.zeros(n), np.zeros(6)
     for j in range(n):
@@ -163,5 +163,5 @@ def joint_objective(
             for r in range(6):
                 H[i, j] += J[r, i] * HJ[r]
             H[j, i] = H[i, j]
-        H[j, j] += damping
+        H[j, j] += damping[j]
     return H, g

@@ -35,6 +35,7 @@ _APPROACH_RATE_HZ = 2.0
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
 _DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
+_UNSTEADY = 0.5  # share of the highest change of rates in a period that noise may cause
 _STALL_S = 0.5  # at rest, before the limit on manipulability yields
 _STOPS_HERE = 0.25  # of a pair's margin that braking may use up and need not be looked at
 _YIELD_RATE = 2.0  # 1/s, at which it does
@@ -79,9 +80,9 @@ class BoundProgram:
         self.view = self.settings.view_low, self.settings.view_high
         arm = setting.arm
         self._joint_limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
-        self._avoidance = Avoidance(
-            program.S, program.avoidance_rate_max, _PENALTY_K, program.damping
-        )
+        self._avoidance = Avoidance(program.S, program.avoidance_rate_max, _PENALTY_K)
+        self._damping = program.damping
+        self._steady = _UNSTEADY * setting.period_s * arm.acceleration_max
         sees = "occlusion" in self._limits.order and not setting.mounting.is_fixed
         self._obstacles = setting.obstacles if sees else None
         self._clearance = setting.clearance if "collision" in self._limits.order else None
@@ -105,18 +106,26 @@ class BoundProgram:
             problem.q,
             problem.velocity,
             Task(problem.H, problem.g, problem.H_joints, problem.g_joints,
-                 problem.null_space_rates),
+                 problem.null_space_rates, self._damping_of(problem)),
             scene,
             self._setting.period_s,
             self._with_depths(problem.depth_share),
-            self._avoidance._replace(
-                damping=max(self._avoidance.damping, problem.null_space_weight)
-            ),
+            self._avoidance,
         )  # fmt: skip
         self._yield_at_rest(answer)
         if self._clearance is None or near is None:
             return Solution(*answer)
         return Solution(*answer, clearance=self._clearance.least(near))
+
+    def _damping_of(self, problem: Problem) -> FloatArray:
+        """Return what the joint rates weigh, (n,): more, the more the noise would change them.
+
+        Near a singularity, a little noise asks for rates that no joint can follow. This is the
+        most likely answer if the rates that are asked for are of the order of those that can be
+        reached at once.
+        """
+        damping: FloatArray = problem.variance / self._steady**2
+        return damping + max(self._damping, problem.null_space_weight)
 
     def _with_depths(self, share: float) -> ConstraintSettings:
         """Return the settings with bounds on the depth from its deviation, where that is known."""

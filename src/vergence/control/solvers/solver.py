@@ -30,6 +30,7 @@ class Problem(NamedTuple):
     A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
     null_space_weight: float = 0.0  # μ of ‖q̇ - q̇_null‖² at least
     depth_share: float = float("nan")  # largest deviation of a depth, a share; NaN if unknown
+    variance: float = 0.0  # that noise gives the rows of which H and g are made
 
 
 class Solution(NamedTuple):
