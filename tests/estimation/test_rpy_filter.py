@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-from estimation_scene import BOX, HAND, WALL, moving, pose_error, project, view
+from estimation_scene import BOX, CAMERA, HAND, WALL, moving, pose_error, project, view
 
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, RpyPoseFilter
 from vergence.estimation.rpy_belief import twist_jacobian
 from vergence.estimation.rpy_filter import predict_rpy, rpy_rows
 from vergence.estimation.target_filter import state_of
+from vergence.estimation.view import together
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3, se3_inverse
 
 STEP = 1e-6
@@ -88,6 +89,25 @@ def test_follows_the_target_with_two_cameras_within_the_papers_centimetre():
     expected = state_of(belief)
     assert expected.covariance.shape == (12, 12)
     assert np.linalg.norm(expected.velocity) < 0.2
+
+
+def test_a_wrong_corner_that_a_rough_start_lets_pass_does_not_throw_it_off():
+    # Five corners in two images, one of them 80 px wrong: within what a start off by 3 cm and 6°
+    # allows, so that only the other four can tell.
+    rng = np.random.default_rng(8)
+    filter_, truth = RpyPoseFilter(), moving(0.4)
+    wall = view(rng, 0.0, truth, WALL, "wall", noise_px=0.5, features=[0, 3, 5])
+    hand = view(rng, 0.0, truth, HAND, "hand", noise_px=0.5, features=[1, 6])
+    wrong = wall.measured.copy()
+    wrong[1, 0] += 80.0 / CAMERA.fx
+    seen = together([wall._replace(measured=wrong), hand])
+    rough = truth.copy()
+    rough[:3, 3] += 0.01
+    update = filter_.update(filter_.start(0.0, rough), seen)
+    assert update.squares[1] < filter_.gate
+    assert update.kept.tolist() == [True, False, True, True, True]
+    error = pose_error(update.belief.T_world_target, truth)
+    assert np.linalg.norm(error[:3]) < 0.003
 
 
 def passing_pitch(time):

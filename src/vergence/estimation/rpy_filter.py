@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.information import compress, joseph_update, keep_rows
-from vergence.estimation.measurement import mahalanobis_squared, whitened_rows
+from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
 from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
 from vergence.estimation.target_filter import (
     Update,
@@ -70,7 +70,8 @@ class RpyPoseFilter:
     State w = (o, φ, ϑ, ψ, rates), eq. (7) to (18), with these corrections: the noise of a
     measurement is in normalized coordinates (the paper gives px²: divide by the focal length in
     pixels, squared); the zero block of (14) has 6 columns; the Joseph form replaces (12b); points
-    pass a gate, since without one a single wrong corner throws the filter off its target. Angles
+    pass a gate, against the prediction and against all other points, since without one a single
+    wrong corner throws the filter off its target. Angles
     are never wrapped inside. Near pitch ±90° the state is singular and the estimate unreliable:
     `PoseFilter` has no such place.
     """
@@ -136,17 +137,35 @@ class RpyPoseFilter:
         w, P = belief.vector, belief.vector_covariance
         rows = rpy_rows(w, seen.poses, seen.points, seen.measured, seen.covariance)
         squares = mahalanobis_squared(rows, P)
-        kept = np.isfinite(squares) & (squares <= self.gate)
+        within = np.isfinite(squares) & (squares <= self.gate)
+        if not within.any():
+            disagreeing = fading_share(belief.disagreeing, 0, seen.size)
+            belief = replace(belief, disagreeing=disagreeing, doubts=belief.doubts + seen.images)
+            return unused(belief, seen.size, Verdict.CONTRADICTED)._replace(squares=squares)
+        kept, correction, corrected, square = self._correct(rows, P, within)
         count = int(np.count_nonzero(kept))
         disagreeing = fading_share(belief.disagreeing, count, seen.size)
-        belief = replace(belief, disagreeing=disagreeing)
-        if not count:
-            doubting = replace(belief, doubts=belief.doubts + seen.images)
-            return unused(doubting, seen.size, Verdict.CONTRADICTED)._replace(squares=squares)
-        rows = keep_rows(rows, kept)
-        rest = compress(rows)
-        correction, P, square = joseph_update(P, rows)
         fading = self.fading**seen.images
-        consistency = belief.consistency.add(square + rest, 2 * count, fading)
-        after = RpyBelief(seen.time, w + correction, P, consistency, seen.time, 0, disagreeing)
+        consistency = belief.consistency.add(square, 2 * count, fading)
+        after = RpyBelief(
+            seen.time, w + correction, corrected, consistency, seen.time, 0, disagreeing
+        )
         return Update(after, Verdict.USED, kept, squares)
+
+    def _correct(
+        self, rows: FloatArray, P: FloatArray, kept: BoolArray
+    ) -> tuple[BoolArray, FloatArray, FloatArray, float]:
+        """Return the points kept, the correction, P after it, and the innovation squared.
+
+        A point must also agree with what the prediction and all other points say together: while
+        the pose is uncertain, as at the start, the prediction alone lets wrong corners pass.
+        """
+        while True:
+            used = keep_rows(rows, kept)
+            rest = compress(used)
+            correction, updated, square = joseph_update(P, used)
+            alone = deletion_squares(rows, kept, correction, updated)
+            worst = int(np.argmax(alone))
+            if alone[worst] <= self.gate:
+                return kept, correction, updated, square + rest
+            kept[worst] = False

@@ -30,8 +30,8 @@ def draw(out: Path, trials: Mapping[str, Trial]) -> tuple[Figure, ...]:
         ),
         "figure_07": (
             _pose_errors(hybrid),
-            "Figure 7: error of the slave's end effector relative to the object, both cameras, the "
-            "paper's settings.",
+            "Figure 7: error of the slave's end effector relative to the estimated object, both "
+            "cameras, the paper's settings.",
         ),
         "figure_07_ours": (
             _pose_errors(ours),
@@ -63,8 +63,8 @@ def _target_errors(trial: Trial) -> Any:
 
 
 def _pose_errors(trial: Trial) -> Any:
-    errors = trial.errors.between(trial.moving_from / 2)
-    return _errors(errors.time, errors.camera_m, errors.camera_rad)
+    errors = trial.hand.between(trial.moving_from / 2)
+    return _errors(errors.time, errors.metres, errors.radians)
 
 
 def _errors(time: FloatArray, metres: FloatArray, radians: FloatArray) -> Any:
