@@ -137,6 +137,8 @@ def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: o
         (["run", "puma560", "--set", "duration_s"], "key=value"),
         (["report", "nowhere"], "recording.mcap"),
         (["reproduce", "nelson1996"], "did you mean nelson1995?"),
+        (["reproduce", "defaults", "--imaging", "real_camera"], "only studies that render images"),
+        (["reproduce", "region", "--imaging", "realcamera"], "did you mean real_camera?"),
         (["rnu"], "Did you mean 'run'?"),
         (["bench", "contrl"], "did you mean control?"),
         (["plan", "gantry", "--planner", "potential"], "did you mean potential_field?"),

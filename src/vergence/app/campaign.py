@@ -25,11 +25,17 @@ class Running:
 
     folder: Path  # where results go, and are resumed from
     options: "CampaignOptions"
+    images: bool  # whether they are rendered
+
+    @property
+    def features(self) -> str:
+        """Say what features were."""
+        return "tracked in rendered images" if self.images else "exact projections"
 
     @property
     def motion(self) -> str:
         """Say how arms moved."""
-        if self.options.physics:
+        if self.options.physics or self.images:
             return "arms moved in simulated physics"
         return (
             "single-arm, single-camera cells follow commands perfectly; all others run in MuJoCo "
@@ -45,11 +51,12 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
     """
     from vergence.app.output import new_folder
     from vergence.app.run import overrides
-    from vergence.experiments import CellSource
+    from vergence.experiments import CellSource, renders
 
     source = CellSource.of(options.cell, overrides(options.settings), None)
-    folder = options.out or new_folder(f"{source.load().name}-{command}")
-    return source, Running(folder, options)
+    cell = source.load()
+    folder = options.out or new_folder(f"{cell.name}-{command}")
+    return source, Running(folder, options, renders(cell))
 
 
 def names_in(option: str, text: str) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _REMARK = (
     "All laws have the same random {drawn}, with the target in view at the start, and the same "
-    "goal. Features are exact projections; the cell's rate and acceleration limits apply; {motion}."
+    "goal. Features are {features}; the cell's rate and acceleration limits apply; {motion}."
 )
 _LAG = (
     "The target moves, so laws without feed-forward end with a steady lag; --tolerance-px allows "
@@ -43,7 +43,9 @@ def compare(options: "CompareOptions") -> int:
     trials = start_trials(cell, laws, options.starts, options.seed, sampling)
     found = Comparison(run(source, trials, how))
     data = write_table(how.folder / "compare.csv", found.runs)
-    remark = _REMARK.format(drawn=", ".join(sampling.vary), motion=how.motion)
+    remark = _REMARK.format(
+        drawn=", ".join(sampling.vary), features=how.features, motion=how.motion
+    )
     report = _write_page(source, found, how, remark)
     if options.as_json:
         drawn = {"starts": options.starts, "seed": options.seed}

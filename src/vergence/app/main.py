@@ -193,13 +193,20 @@ def reproduce(
             max=1000,
         ),
     ] = 1,
+    imaging: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Imaging of all simulated cameras, such as real_camera. Default: the cells' own.",
+        ),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Repeat a paper's experiments, with figures and a table of its claims and our results."""
     from vergence.app.reproduce import reproduce as command
 
-    raise typer.Exit(command(paper, quick, seed, seeds, out, as_json))
+    raise typer.Exit(command(paper, quick, seed, seeds, imaging, out, as_json))
 
 
 @app.command(

@@ -126,8 +126,8 @@ def _write_page(
     verb = "does" if len(laws) == 1 else "do"
     title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
-        f"{len(results)} runs on exact projections; {how.motion}; converged: every feature within "
-        f"{how.options.tolerance_px:g} px at the end."
+        f"{len(results)} runs; features are {how.features}; {how.motion}; converged: every "
+        f"feature within {how.options.tolerance_px:g} px at the end."
     )
     return write_page(how.folder, "vergence map", title, remark, parts), image
 

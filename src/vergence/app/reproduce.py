@@ -6,29 +6,40 @@ from typing import TYPE_CHECKING
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.errors import InputError, nearest
+from vergence.studies.rendered import RENDERED, check_imaging
 from vergence.studies.reproduce import PAPERS
 
 if TYPE_CHECKING:
     from vergence.studies import StudyResult
 
 QUICK = "quick: on exact projections instead of images"
+FEWER = "quick: fewer and shorter runs"
 
 
 def reproduce(
-    paper: str, quick: bool, seed: int, seeds: int, out: Path | None, in_json: bool
+    paper: str,
+    quick: bool,
+    seed: int,
+    seeds: int,
+    imaging: str | None,
+    out: Path | None,
+    in_json: bool,
 ) -> int:
     """Repeat a paper's experiments, write a page about them; return the exit code.
 
     Raises:
-        InputError: if there is no such paper.
+        InputError: if there is no such paper, or it has no images for an imaging.
     """
     if paper not in PAPERS:
         raise InputError("paper", "", paper, nearest(paper, PAPERS))
     from vergence.app.study_page import write_study_page
 
+    if imaging is not None:
+        check_imaging(paper, imaging, quick)
+
     folder = out or new_folder(paper)
-    result = _study(paper, folder, quick, seed, seeds)
-    remark = _remark(result, quick)
+    result = _study(paper, folder, quick, seed, seeds, imaging)
+    remark = _remark(paper, result, quick, imaging)
     report = write_study_page(folder, result, remark)
     if in_json:
         from vergence.app.check import as_json
@@ -40,6 +51,7 @@ def reproduce(
             "quick": quick,
             "seed": seed,
             "seeds": seeds,
+            "imaging": imaging,
             "checks": checks,
         }
         emit({**answer, "report": report})
@@ -48,12 +60,16 @@ def reproduce(
     return SUCCESS if result.holds else FAILURE
 
 
-def _remark(result: "StudyResult", quick: bool) -> str:
+def _remark(paper: str, result: "StudyResult", quick: bool, imaging: str | None) -> str:
     seeds = f"seeds {result.seed} to {result.seed + result.seeds - 1}" if result.seeds > 1 else ""
-    return "; ".join(filter(None, (QUICK if quick else "", seeds)))
+    images = f"imaging {imaging}" if imaging else ""
+    shorter = FEWER if RENDERED.get(paper) else QUICK
+    return "; ".join(filter(None, (shorter if quick else "", seeds, images)))
 
 
-def _study(paper: str, folder: Path, quick: bool, seed: int, seeds: int) -> "StudyResult":
+def _study(
+    paper: str, folder: Path, quick: bool, seed: int, seeds: int, imaging: str | None
+) -> "StudyResult":
     """Run the study with a progress bar."""
     from vergence.app.progress import bar
     from vergence.studies import reproduce
@@ -64,7 +80,15 @@ def _study(paper: str, folder: Path, quick: bool, seed: int, seeds: int) -> "Stu
         def show(part: str, share: float) -> None:
             progress.update(task, description=part, completed=share)
 
-        return reproduce(paper, quick=quick, seed=seed, seeds=seeds, folder=folder, progress=show)
+        return reproduce(
+            paper,
+            quick=quick,
+            seed=seed,
+            seeds=seeds,
+            imaging=imaging,
+            folder=folder,
+            progress=show,
+        )
 
 
 def _tell(result: "StudyResult", report: Path, remark: str) -> None:

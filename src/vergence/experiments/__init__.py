@@ -4,6 +4,7 @@ from vergence.experiments.campaign import run_campaign
 from vergence.experiments.comparison import Comparison, compare
 from vergence.experiments.executor import Executor, WorkersLostError
 from vergence.experiments.goal import Goal
+from vergence.experiments.kinematic import renders
 from vergence.experiments.presets import OWN, PRESETS, law_table, usual_laws
 from vergence.experiments.region import heading_trials, place_trials
 from vergence.experiments.results_file import RESULTS, ResultsFile
@@ -33,6 +34,7 @@ __all__ = [
     "heading_trials",
     "law_table",
     "place_trials",
+    "renders",
     "run_campaign",
     "run_trial",
     "run_trials",

@@ -11,6 +11,7 @@ from vergence.assembly import assemble_parts
 from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
+from vergence.experiments.kinematic import renders
 from vergence.geometry import matrix_to_rpy, transform_points
 from vergence.signals import Outcome
 from vergence.simulation import SimulatedDriver
@@ -33,11 +34,12 @@ class Goal:
         Raises:
             InputError: if the cell cannot be run as it is written.
         """
-        driver = SimulatedDriver(cell, images=False)
+        images = renders(cell)
+        driver = SimulatedDriver(cell, images)
         try:
             if isinstance(cell.task, ReachTable):
                 return cls._of_image(cell, cell.task, driver)
-            parts = assemble_parts(cell, driver, images=False)
+            parts = assemble_parts(cell, driver, images)
             assert not isinstance(parts, Outcome)
             reference = parts.planner.reference(0.0)
             if reference.T_camera_target is not None:

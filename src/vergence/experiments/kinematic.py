@@ -35,11 +35,17 @@ def is_ideal(cell: Cell) -> bool:
         and len(cell.arms) == len(cell.cameras) == 1
         and camera.arm == cell.task.arm
         and not camera.blind_s
+        and not renders(cell)
         and cell.target.features is not None
         and not isinstance(cell.task.tracker, CurveTracking)
         and cell.target.carried_by is None
         and cell.arms[cell.task.arm].motion is None
     )
+
+
+def renders(cell: Cell) -> bool:
+    """Tell whether a cell's runs look through rendered images: a camera says how bad they are."""
+    return any(cell.cameras[name].imaging is not None for name in cell.watched)
 
 
 def is_quick(cell: Cell) -> bool:

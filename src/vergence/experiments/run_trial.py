@@ -11,7 +11,7 @@ from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
 from vergence.experiments.evaluation import TrueTracks, trial_result
-from vergence.experiments.kinematic import KinematicRuns, is_ideal
+from vergence.experiments.kinematic import KinematicRuns, is_ideal, renders
 from vergence.experiments.source import CellSource
 from vergence.experiments.stays_clear import stays_clear
 from vergence.experiments.trial import Ending, Trial, TrialResult
@@ -27,7 +27,10 @@ def run_trials(
     physics: bool = False,
     threads: int | None = 1,
 ) -> list[TrialResult]:
-    """Run trials on exact projections; the same arguments give the same results anywhere.
+    """Run trials; the same arguments give the same results anywhere.
+
+    Features are exact projections, unless a camera's `imaging` says how bad its images are: then
+    these are rendered, and the features are tracked in them.
 
     Where the cell is one arm with one camera it moves exactly as it is told: in the batch kernel
     if that knows the law, else in the loop. The kernel knows neither bodies nor surfaces: a run on
@@ -77,7 +80,7 @@ def run_trial(
 
 
 def _in_physics(cell: Cell, trial: Trial, tolerance_px: float) -> TrialResult:
-    return _result(run_cell(cell, images=False), trial, cell.task.camera, tolerance_px)
+    return _result(run_cell(cell, images=renders(cell)), trial, cell.task.camera, tolerance_px)
 
 
 def _in_loop(run: KinematicRun, trial: Trial, tolerance_px: float) -> TrialResult:

@@ -23,28 +23,29 @@ class Sensor:
     where N is the electrons of a white pixel and σ the read noise [EMVA2021].
 
     Args:
-        shape: rows and columns.
+        shape: of its images: rows, columns, and channels if they are in colour.
         table: of the camera.
         rng: draws the noise.
     """
 
     def __init__(
-        self, shape: tuple[int, int], table: CameraTable, rng: np.random.Generator
+        self, shape: tuple[int, ...], table: CameraTable, rng: np.random.Generator
     ) -> None:
         self._imaging = table.imaging or ImagingTable()
         self._read_noise, self._period, self._rng = table.noise_grey, 1.0 / table.rate_hz, rng
         self._ideal = table.imaging is None
         self._gain = 0.0  # none yet
-        pool = (shape[0] + _NOISE_POOL, shape[1] + _NOISE_POOL)
+        pool = (shape[0] + _NOISE_POOL, shape[1] + _NOISE_POOL, *shape[2:])
         self._pool: Any = None
         if self._ideal and self._read_noise:
             self._pool = rng.normal(0, self._read_noise, pool).astype(np.int16)
         elif not self._ideal and (self._read_noise or self._imaging.full_well_electrons):
             self._pool = rng.standard_normal(pool, np.float32)
-        self._lens = _transmission(shape, self._imaging.vignetting)
+        lens = _transmission(shape[:2], self._imaging.vignetting)
+        self._lens = lens.reshape(*lens.shape, *(1 for _ in shape[2:]))
 
     def read(self, light: ImageArray | Float32Array, settled: bool = True) -> ImageArray:
-        """Return the image (height, width).
+        """Return the image (height, width), or with channels.
 
         Args:
             light: on the sensor, (height, width), 0 … 255.
@@ -69,7 +70,7 @@ class Sensor:
         """Return a fresh window of one pool: to draw deviates would cost more than the image."""
         assert self._pool is not None
         row, column = self._rng.integers(0, _NOISE_POOL, 2)
-        rows, columns = (side - _NOISE_POOL for side in self._pool.shape)
+        rows, columns = (side - _NOISE_POOL for side in self._pool.shape[:2])
         return self._pool[row : row + rows, column : column + columns]
 
     def _deviation(self, signal: Float32Array, gain: float) -> Float32Array:
@@ -99,10 +100,10 @@ class Sensor:
         if not quality:
             return grey
         _, data = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, quality])
-        return np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+        return np.asarray(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), dtype=np.uint8)
 
 
-def _transmission(shape: tuple[int, int], lost: float) -> Float32Array:
+def _transmission(shape: tuple[int, ...], lost: float) -> Float32Array:
     """Return the fraction of the light that reaches each pixel, 1 - lost (r / r_corner)²."""
     rows, columns = ((np.arange(side) - (side - 1) / 2) / max((side - 1) / 2, 1) for side in shape)
     aspect = shape[1] / shape[0]

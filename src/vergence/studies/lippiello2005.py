@@ -24,13 +24,18 @@ from vergence.studies.lippiello2005_trials import (
     start,
 )
 from vergence.studies.processes import processes, try_all
+from vergence.studies.rendered import with_imaging
 
 TITLE = "Lippiello, Siciliano and Villani (2005): eye-in-hand and eye-to-hand cameras together"
 NOISE_PX = 1.0  # of the exact projections of a quick study
 
 
 def reproduce(
-    out: Path, quick: bool, progress: Progress = lambda _what, _share: None, seed: int = 0
+    out: Path,
+    quick: bool,
+    progress: Progress = lambda _what, _share: None,
+    seed: int = 0,
+    imaging: str | None = None,
 ) -> StudyResult:
     """Run section V and what follows from it, on every core; write the figures.
 
@@ -39,8 +44,9 @@ def reproduce(
         quick: exact projections with noise instead of rendered images.
         progress: told what is being done.
         seed: of the cell.
+        imaging: of the cameras, see `ImagingTable`.
     """
-    cell = load_cell("lippiello2005", seed=seed)
+    cell = with_imaging(load_cell("lippiello2005", seed=seed), imaging)
     if quick:
         cell = cell.replace(perception={"noise_px": NOISE_PX})
     jobs = _jobs(cell, not quick)

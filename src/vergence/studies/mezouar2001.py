@@ -31,6 +31,7 @@ from vergence.studies.mezouar2001_trials import (
 )
 from vergence.studies.processes import processes
 from vergence.studies.reach_scene import Scene
+from vergence.studies.rendered import with_imaging
 
 TITLE = "Mezouar and Chaumette (2001): trajectories in the image inside view and joint limits"
 COUNTS = {"random": 200, "random_roll": 100, "perturbed": 100}
@@ -43,6 +44,7 @@ def reproduce(
     quick: bool,
     progress: Progress = lambda _what, _share: None,
     seed: int = 0,
+    imaging: str | None = None,
     *,
     counts: Mapping[str, int] | None = None,
     workers: int | None = None,
@@ -54,10 +56,11 @@ def reproduce(
         quick: exact projections instead of rendered images, fewer random starts.
         progress: told what is being done.
         seed: of the cell, the random starts and the wrong beliefs.
+        imaging: of the camera, see `ImagingTable`.
         counts: random starts and wrong beliefs to try, instead of the usual numbers.
         workers: processes for those; see `processes`.
     """
-    cell = load_cell("gantry", seed=seed)
+    cell = with_imaging(load_cell("gantry", seed=seed), imaging)
     counts = counts or (COUNTS_QUICK if quick else COUNTS)
     progress("planning", 0.0)
     section = plan_section6(cell, not quick)

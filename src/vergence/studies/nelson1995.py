@@ -12,6 +12,7 @@ from vergence.control import OptimalTracking
 from vergence.signals import OutcomeKind
 from vergence.studies import nelson1995_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, bisect_threshold, within
+from vergence.studies.rendered import with_imaging
 from vergence.studies.trial import Trial, Trials
 
 TITLE = "Nelson and Khosla (1995): singularity and joint limit avoidance while tracking"
@@ -25,7 +26,9 @@ STRATEGIES: Mapping[str, Mapping[str, Any]] = {
 WINDOW_PX = 32.0  # the search range of the tracker
 
 
-def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
+def reproduce(
+    out: Path, quick: bool, progress: Progress, seed: int = 0, imaging: str | None = None
+) -> StudyResult:
     """Run section 5 and what follows from it; write the figures.
 
     Args:
@@ -33,8 +36,9 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
         quick: exact projections instead of rendered images.
         progress: told what is being done.
         seed: of the cell.
+        imaging: of the camera, see `ImagingTable`.
     """
-    cell = load_cell("puma560", seed=seed)
+    cell = with_imaging(load_cell("puma560", seed=seed), imaging)
     trials = {}
     for i, (strategy, law) in enumerate(STRATEGIES.items()):
         for j, sign in enumerate((1, -1)):

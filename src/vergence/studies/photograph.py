@@ -23,7 +23,9 @@ TRIALS, QUICK = 200, 20
 COMPARED, COMPARED_QUICK = 40, 2  # of the trials, by each of the other methods
 
 
-def reproduce(out: Path, quick: bool, progress: Progress, seed: int) -> StudyResult:
+def reproduce(
+    out: Path, quick: bool, progress: Progress, seed: int, imaging: str | None = None
+) -> StudyResult:
     """Run the trials and hold them against what is promised."""
     counts = dict.fromkeys(Method, COMPARED_QUICK if quick else COMPARED)
     counts[Method.OPTIMISED] = QUICK if quick else TRIALS
@@ -32,7 +34,9 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int) -> StudyRes
     with processes() as pool:
         for method, count in counts.items():
             told = partial(_tell, progress, method, sum(map(len, found.values())), count, total)
-            found[method] = try_all(partial(run_trial, seed, method), count, pool, told)
+            found[method] = try_all(
+                partial(run_trial, seed, method, imaging=imaging), count, pool, told
+            )
     return result_of(found, out, seed)
 
 

@@ -14,6 +14,7 @@ from vergence.geometry import se3_inverse, so3_log, transform_points
 from vergence.signals import Outcome, OutcomeKind
 from vergence.simulation import SimulatedDriver
 from vergence.studies.photograph_methods import Method, without_plan
+from vergence.studies.rendered import with_imaging
 
 SCENES = {"clutter": "table.xml", "plane": "../puma560/board.xml", "parcel": "box.xml"}
 ARM, CAMERA = "ur5", "wrist"
@@ -66,7 +67,7 @@ class TrialResult(NamedTuple):
     time_s: float
 
 
-def run_trial(seed: int, method: Method, number: int) -> TrialResult:
+def run_trial(seed: int, method: Method, number: int, imaging: str | None = None) -> TrialResult:
     """Take a photograph, run the loop from a start, and compare where the camera ends."""
     planner = "potential_field" if method is Method.POTENTIAL_FIELD else "optimised"
     trial = Trial.drawn(seed, number)
@@ -77,6 +78,7 @@ def run_trial(seed: int, method: Method, number: int) -> TrialResult:
         target={"model": SCENES[trial.scene]},
         task={"planner": planner},
     )
+    cell = with_imaging(cell, imaging)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "goal.png"
         _take_photograph(cell, trial, path)

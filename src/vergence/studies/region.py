@@ -44,7 +44,9 @@ class Followed(NamedTuple):
     hidden: float  # share of the object behind the occluder
 
 
-def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
+def reproduce(
+    out: Path, quick: bool, progress: Progress, seed: int = 0, imaging: str | None = None
+) -> StudyResult:
     """Follow every object through a film of each condition, on every core.
 
     Args:
@@ -52,13 +54,14 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
         quick: two objects in short films.
         progress: told what is being done.
         seed: of colours, clutter, motion and first pose.
+        imaging: of the camera, see `ImagingTable`.
     """
     objects = list(OBJECTS)[: _QUICK_OBJECTS if quick else None]
     films = [(name, condition) for name in objects for condition in CONDITIONS]
     frames = QUICK_FRAMES if quick else FRAMES
     with processes() as pool:
         tried = try_all(
-            partial(_follow, films, frames, seed),
+            partial(_follow, films, frames, seed, imaging),
             len(films),
             pool,
             lambda share: progress(f"{len(films)} films of {frames} images", share),
@@ -69,29 +72,34 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
 
 
 def _follow(
-    films: Sequence[tuple[str, str]], frames: int, seed: int, number: int
+    films: Sequence[tuple[str, str]], frames: int, seed: int, imaging: str | None, number: int
 ) -> list[Followed]:
     name, condition = films[number]
     kind = list(OBJECTS).index(name)
-    return follow_film(name, condition, frames, np.random.default_rng([seed, kind]))
+    return follow_film(name, condition, frames, np.random.default_rng([seed, kind]), imaging)
 
 
 def follow_film(
-    name: str, condition: str, frames: int, random: np.random.Generator
+    name: str,
+    condition: str,
+    frames: int,
+    random: np.random.Generator,
+    imaging: str | None = None,
 ) -> list[Followed]:
-    """Follow an object through a film until it is lost."""
+    """Follow an object through a film until it is lost; `imaging` is that of the camera."""
     mesh = OBJECTS[name]()
     tracker = SilhouetteTracker(ObjectModel.from_mesh(name, *mesh))
     hidden, light = CONDITIONS[condition]
     offset = np.repeat(_START, 3) * random.normal(size=6)
     follower: ObjectFollower | None = None
     images = []
-    for k, frame in enumerate(film(mesh, int(random.integers(2**31)), frames, hidden, light)):
+    shown = film(mesh, int(random.integers(2**31)), frames, hidden, light, imaging)
+    for frame in shown:
         if follower is None:
             T = frame.T_camera_target.copy()
             T[:3] = np.column_stack((so3_exp(offset[3:].copy()) @ T[:3, :3], T[:3, 3] + offset[:3]))
             follower = ObjectFollower(tracker, CAMERA, T, 0.0, 1.0 / RATE_HZ, OUTLINE_RULE)
-        step = follower.follow(frame.image, k / RATE_HZ)
+        step = follower.follow(frame.image, frame.time)
         error = pose_error(step.T_camera_target, frame.T_camera_target)
         turn = _shown_turn(tracker, step, frame.T_camera_target)
         images.append(

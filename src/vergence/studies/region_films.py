@@ -1,19 +1,25 @@
 """Films of an object in clutter and changing light, something passing before it; with truth."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
+from vergence.cell.schema import CameraTable
 from vergence.geometry import matrix_to_quaternion, se3, so3_exp
+from vergence.simulation.row_weights import row_weights
+from vergence.simulation.sensor import Sensor
 from vergence.studies.region_objects import Mesh
 
 WIDTH, HEIGHT, FOCAL_PX = 640, 480, 600.0
 CAMERA = Camera(WIDTH, HEIGHT, FOCAL_PX, FOCAL_PX, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
 RATE_HZ = 30.0
+_SHAPE = HEIGHT, WIDTH, 3
 _NOISE = 2.0  # grey values
+_MOMENTS = 8  # of one image whose shutter is open for a while
 _CLUTTER = 45  # bodies behind the object
 _DISTANCE = 0.45  # of the object, m
 _NEARER = 0.75  # of the object's distance, at which the occluder passes
@@ -26,9 +32,12 @@ class FilmFrame(NamedTuple):
     image: ImageArray  # (height, width, 3) blue, green, red
     T_camera_target: FloatArray  # (4, 4)
     hidden: float  # share of the object's pixels behind the occluder
+    time: float  # s, of exposure
 
 
-def film(mesh: Mesh, seed: int, count: int, hidden: float, light: float) -> Iterator[FilmFrame]:
+def film(
+    mesh: Mesh, seed: int, count: int, hidden: float, light: float, imaging: str | None = None
+) -> Iterator[FilmFrame]:
     """Yield the images of a film.
 
     The camera is fixed at the world's origin and looks along z; y points down.
@@ -36,40 +45,98 @@ def film(mesh: Mesh, seed: int, count: int, hidden: float, light: float) -> Iter
     Args:
         mesh: of the object.
         seed: of its colours, clutter and motion.
-        count: images.
+        count: images, with those that are dropped.
         hidden: how much of the object's width the occluder covers, 0 … 1; it passes over it.
         light: by which share the light changes, 0 … 1.
+        imaging: of the camera, see `ImagingTable`; ideal with noise if None.
     """
     import mujoco
 
     random = np.random.default_rng(seed)
     width = float(np.median(np.ptp(mesh[0], axis=0)))
     model = _world(mesh, random, 0.5 * hidden * width)
-    data = mujoco.MjData(model)
-    swing = _swing(random)
-    lamps, ambient = model.light_diffuse.copy(), model.vis.headlight.ambient.copy()
+    stage = _Stage(model, _swing(random), width, count / RATE_HZ, light)
+    camera = _BadCamera(seed, imaging) if imaging is not None else None
     renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
     for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
         renderer.scene.flags[flag] = 0
     try:
         for k in range(count):
             t = k / RATE_HZ
-            T = _pose(t, swing)
-            data.mocap_pos[_OBJECT] = T[:3, 3]
-            data.mocap_quat[_OBJECT] = matrix_to_quaternion(np.ascontiguousarray(T[:3, :3]))
-            data.mocap_pos[_OCCLUDER] = _passing(k / count, T, width)
-            bright = 1.0 + light * np.sin(2.5 * t)
-            model.light_diffuse[:], model.vis.headlight.ambient[:] = (
-                bright * lamps,
-                bright * ambient,
-            )
-            mujoco.mj_forward(model, data)
-            renderer.update_scene(data, "camera")
-            image = renderer.render()[:, :, ::-1] + random.normal(0.0, _NOISE, (HEIGHT, WIDTH, 3))
-            pixels = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-            yield FilmFrame(pixels, T, _hidden_share(renderer, model, data))
+            if camera is None:
+                image = stage.render(renderer, t) + random.normal(0.0, _NOISE, _SHAPE)
+                pixels = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+            elif camera.drops():
+                continue
+            else:
+                pixels = camera.take(partial(stage.render, renderer), t)
+            T = stage.at(t)
+            yield FilmFrame(pixels, T, _hidden_share(renderer, model, stage.data), t)
     finally:
         renderer.close()
+
+
+class _Stage:
+    """The scene at any time of the film."""
+
+    def __init__(
+        self, model: Any, swing: FloatArray, width: float, length_s: float, light: float
+    ) -> None:
+        import mujoco
+
+        self.data = mujoco.MjData(model)
+        self._model, self._swing, self._width = model, swing, width
+        self._length_s, self._light = length_s, light
+        self._lamps = model.light_diffuse.copy(), model.vis.headlight.ambient.copy()
+
+    def at(self, t: float) -> FloatArray:
+        """Move everything to where it is at a time; return the object's pose, (4, 4)."""
+        import mujoco
+
+        T = _pose(t, self._swing)
+        self.data.mocap_pos[_OBJECT] = T[:3, 3]
+        self.data.mocap_quat[_OBJECT] = matrix_to_quaternion(np.ascontiguousarray(T[:3, :3]))
+        self.data.mocap_pos[_OCCLUDER] = _passing(t / self._length_s, T, self._width)
+        bright = 1.0 + self._light * np.sin(2.5 * t)
+        self._model.light_diffuse[:] = bright * self._lamps[0]
+        self._model.vis.headlight.ambient[:] = bright * self._lamps[1]
+        mujoco.mj_forward(self._model, self.data)
+        return T
+
+    def render(self, renderer: Any, t: float) -> ImageArray:
+        """Return what an ideal camera sees at a time, (height, width, 3)."""
+        self.at(t)
+        renderer.update_scene(self.data, "camera")
+        image: ImageArray = renderer.render()[:, :, ::-1]
+        return image
+
+
+class _BadCamera:
+    """Takes images as a real camera does."""
+
+    def __init__(self, seed: int, imaging: str) -> None:
+        values = {"focal_px": (FOCAL_PX, FOCAL_PX), "rate_hz": RATE_HZ, "noise_grey": _NOISE}
+        table = CameraTable.model_validate({**values, "imaging": imaging})
+        assert table.imaging is not None
+        self._imaging, self._fresh = table.imaging, True
+        self._random = np.random.default_rng([seed, 1])
+        self._sensor = Sensor(_SHAPE, table, self._random)
+
+    def drops(self) -> bool:
+        """Tell whether an image is lost; never the first."""
+        lost = bool(self._random.random() < self._imaging.dropped)
+        return lost and not self._fresh
+
+    def take(self, render: Callable[[float], ImageArray], t: float) -> ImageArray:
+        """Return the image (height, width, 3) exposed about a time."""
+        half = self._imaging.open_s / 2
+        moments = np.linspace(-half, half, _MOMENTS) if half else np.zeros(1)
+        weights = row_weights(moments, HEIGHT, self._imaging).astype(np.float32)
+        light = np.zeros(_SHAPE, dtype=np.float32)
+        for moment, rows in zip(moments.tolist(), weights, strict=True):
+            light += rows[:, None, None] * render(t + moment)
+        settled, self._fresh = self._fresh, False
+        return self._sensor.read(light, settled)
 
 
 def _world(mesh: Mesh, random: np.random.Generator, half: float) -> Any:
