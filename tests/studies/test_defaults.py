@@ -12,7 +12,10 @@ from vergence.planning import Path
 from vergence.robot import goal_configurations
 from vergence.runtime.arrival import Arrival
 from vergence.studies import defaults_run
-from vergence.studies.defaults import CHOICES, STARTS_SEED, camera_arm, draw
+from vergence.studies.defaults import STARTS_SEED, camera_arm, draw
+from vergence.studies.defaults_checks import better
+from vergence.studies.defaults_choices import CHOICES, DEFAULT, EVERY
+from vergence.studies.defaults_moving import AMPLITUDE_M, Drift, keep
 from vergence.studies.defaults_run import End, TrueScene, follow, plan, serve
 from vergence.studies.reach_scene import Scene
 
@@ -114,3 +117,32 @@ def test_a_name_for_what_holds_an_arm_is_tried(monkeypatch: pytest.MonkeyPatch) 
     assert (finish.end, finish.reason) == (End.STALLED, "joint margin")
     monkeypatch.setattr(Arrival, "active", ())  # so that a local minimum is claimed
     assert serve(held, CHOICES[0], np.random.default_rng(1)).end is End.UNNAMED
+
+
+def test_a_moving_target_is_followed_only_if_its_motion_is_fed_forward(scene: Scene) -> None:
+    drift = Drift(np.array([1.0, 0.0, 0.0]), period_s=8.0)
+    fed, not_fed = (
+        keep(scene, DEFAULT, fed_forward, drift, np.random.default_rng(0))
+        for fed_forward in (None, False)
+    )
+    assert fed.kept
+    assert fed.rms_px < 1.0
+    assert not not_fed.kept
+    assert drift.moved(scene, 2.0).T_world_target[0, 3] == pytest.approx(
+        scene.T_world_target[0, 3] + AMPLITUDE_M
+    )
+
+
+def test_a_choice_is_better_only_beyond_chance() -> None:
+    default = np.zeros((20, 1), dtype=np.bool_)
+    luck, clearly = default.copy(), default.copy()
+    luck[:3] = clearly[:9] = True
+    assert better(np.hstack((default, luck))) == 0
+    assert better(np.hstack((default, luck, clearly))) == 1
+    assert better(np.hstack((clearly, default))) == 0
+
+
+def test_every_combination_is_tried_once_and_the_default_first() -> None:
+    assert EVERY[0] == DEFAULT
+    assert len(set(EVERY)) == len(EVERY) == 48
+    assert set(CHOICES) < set(EVERY)

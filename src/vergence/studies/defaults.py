@@ -2,10 +2,8 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +14,11 @@ from vergence.planning import Path as CameraPath
 from vergence.planning import PlanFailure, proves_no_path
 from vergence.robot import Arm
 from vergence.simulation import SimulatedDriver
-from vergence.studies.check import Check, Figure, Progress, StudyResult
-from vergence.studies.defaults_run import Choice, End, Finish, follow, plan, plan_again, serve
+from vergence.studies.check import Figure, Progress, StudyResult
+from vergence.studies.defaults_checks import PLAN_WORST_S, checks_of
+from vergence.studies.defaults_choices import CHOICES, EVERY, MOVING, Tried
+from vergence.studies.defaults_moving import Drift, keep
+from vergence.studies.defaults_run import NOISE_PX, End, follow, plan, plan_again, serve
 from vergence.studies.figure_files import save_figures
 from vergence.studies.guarantees_random import CAMERA, SQUARE
 from vergence.studies.processes import processes, try_all
@@ -28,34 +29,10 @@ CELLS = ("ur5", "panda", "gantry")
 STARTS, STARTS_QUICK = 300, 4
 STARTS_SEED = 11
 TILT_DEG = 80.0  # up to which start and goal see the target obliquely
-NOISE_PX = 0.3  # on every second start
 PROOF_CELLS = 256
-REACHED, PLAN_WORST_S = 0.97, 1.0  # what the defaults have to come to
+EVERY_NTH, MOVING_NTH = 20, 10  # pairs of starts with every combination, and with a moving target
 
 _WIDTH = 7.6  # inches
-
-DEFAULT = Choice("mean", "from_features", 0.0, 0.01)
-# One setting changed at a time: what the others are worth beside the default.
-CHOICES = (
-    DEFAULT,
-    replace(DEFAULT, interaction="current"),
-    replace(DEFAULT, interaction="desired"),
-    replace(DEFAULT, depth="from_motion"),
-    replace(DEFAULT, depth="carried"),
-    replace(DEFAULT, depth="held"),
-    replace(DEFAULT, manipulability_share=0.2),
-    replace(DEFAULT, joint_margin=0.03),
-)
-
-
-class Tried(NamedTuple):
-    """What came of one start."""
-
-    planned: Finish  # by a plan, or the default without one where no plan was found
-    plan_s: float  # CPU time of the plan
-    served: tuple[Finish, ...]  # without a plan, one for each of `CHOICES`
-    infeasible: bool  # proved
-    noisy: bool
 
 
 def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
@@ -90,13 +67,7 @@ def study(out: Path, count: int, progress: Progress, seed: int = 0) -> StudyResu
                     f"{count} starts of {name}", (k + done) / len(CELLS)
                 ),
             )
-    reached = (
-        _reached(name, [one for one in tried if one.noisy is noisy], noisy)
-        for name, tried in found.items()
-        for noisy in (False, True)
-    )
-    checks = (*reached, *_others(found))
-    return StudyResult(TITLE, checks, _figures(out, found), seed)
+    return StudyResult(TITLE, checks_of(found), _figures(out, found), seed)
 
 
 def camera_arm(cell: str) -> Arm:
@@ -135,65 +106,27 @@ def attempt(arm: Arm, seed: int, index: int) -> Tried:
     ours = plan_again(scene, ours, randoms[-1], noise)
     hopeless = all(end.end is not End.REACHED for end in (ours, *served))
     infeasible = hopeless and proves_no_path(scene.problem(), PROOF_CELLS)
-    return Tried(ours, found.cpu_s, served, infeasible, noise > 0.0)
+    tried = Tried(ours, found.cpu_s, served, infeasible, noise > 0.0)
+    return _try_more(tried, scene, [seed, index], noise)
 
 
-def _reached(name: str, tried: Sequence[Tried], noisy: bool) -> Check:
-    feasible = [one for one in tried if not one.infeasible]
-    share = sum(one.planned.end is End.REACHED for one in feasible) / len(feasible)
-    missed = Counter(
-        f"{one.planned.end.value}{': ' * bool(one.planned.reason)}{one.planned.reason}"
-        for one in feasible
-        if one.planned.end is not End.REACHED
-    )
-    return Check(
-        f"defaults.reached{'_noisy' * noisy}.{name}",
-        f"{REACHED} of the feasible starts, by image and pose"
-        + f", {NOISE_PX} px of noise in the images of start, goal and run" * noisy,
-        share,
-        "",
-        share >= REACHED,
-        f"{len(tried)} starts, {len(tried) - len(feasible)} left out as proved infeasible; "
-        f"without a plan: {_served(feasible)}"
-        + "".join(f"; {count} × {what}" for what, count in missed.items()),
-    )
-
-
-def _served(tried: Sequence[Tried]) -> str:
-    shares = (
-        sum(one.served[k].end is End.REACHED for one in tried) / len(tried)
-        for k in range(len(CHOICES))
-    )
-    return ", ".join(f"{c.name}: {share:.2f}" for c, share in zip(CHOICES, shares, strict=True))
-
-
-def _others(found: Mapping[str, Sequence[Tried]]) -> tuple[Check, ...]:
-    tried = [one for some in found.values() for one in some]
-    ours = [end for one in tried for end in (one.planned, one.served[0])]
-    behind = sum(end.end is End.BEHIND for end in ours)
-    unnamed = sum(end.end is End.UNNAMED for end in ours)
-    worst = max(one.plan_s for one in tried)
-    median = float(np.median([one.plan_s for one in tried]))
-    return (
-        Check(
-            "defaults.behind", "none passes behind a flat target: 0", behind, "runs", behind == 0
-        ),
-        Check(
-            "defaults.stalled_unnamed",
-            "every stall names what holds it, and a trial without limits bears it out: 0",
-            unnamed,
-            "runs",
-            unnamed == 0,
-        ),
-        Check(
-            "defaults.plan_worst_s",
-            f"at most {PLAN_WORST_S:g} s of CPU time for a plan",
-            worst,
-            "s",
-            worst <= PLAN_WORST_S,
-            f"median {median:.3f} s",
-        ),
-    )
+def _try_more(tried: Tried, scene: Scene, seed: Sequence[int], noise_px: float) -> Tried:
+    """Add every combination, or a moving target, for some of the starts with and without noise."""
+    pair = seed[-1] // 2
+    if pair % (EVERY_NTH // 2) == 0:
+        randoms = np.random.default_rng([*seed, 2]).spawn(len(EVERY))
+        every = (
+            serve(scene, choice, random, noise_px)
+            for choice, random in zip(EVERY, randoms, strict=True)
+        )
+        tried = tried._replace(every=tuple(every))
+    if pair % (MOVING_NTH // 2) == 0:
+        drift = Drift.drawn(np.random.default_rng([*seed, 3]))
+        kept = (
+            keep(scene, *how, drift, np.random.default_rng([*seed, 4]), noise_px) for how in MOVING
+        )
+        tried = tried._replace(moving=tuple(kept))
+    return tried
 
 
 def _figures(out: Path, found: Mapping[str, Sequence[Tried]]) -> tuple[Figure, ...]:

@@ -46,6 +46,7 @@ from vergence.runtime.stages import Planner
 from vergence.signals import ImagePoints, JointState, Observation, Reference
 from vergence.studies.reach_scene import Scene
 
+NOISE_PX = 0.3  # on every second start
 RATE_HZ, INNER = 30.0, 4  # images a second, and set-points an image
 LONGEST_S = 20.0  # given to a law
 REACHED_PX, REACHED_M, REACHED_DEG = 1.0, 1e-3, 0.1
@@ -86,14 +87,12 @@ class Choice:
     depth: str  # of `DEPTHS`
     manipulability_share: float
     joint_margin: float
-    planned: bool = False
 
     @property
     def name(self) -> str:
         """The choice on one line."""
-        how = "planned, " if self.planned else ""
         limits = f"w' {self.manipulability_share:g}, margin {self.joint_margin:g}"
-        return f"{how}{self.interaction} L, {self.depth}, {limits}"
+        return f"{self.interaction} L, {self.depth}, {limits}"
 
 
 class Finish(NamedTuple):
@@ -165,9 +164,23 @@ def _pose_deviation(scene: Scene, noise_px: float) -> tuple[float, float]:
     return float(np.sqrt(position)), float(np.sqrt(angle))
 
 
-def servo_of(scene: Scene, choice: Choice, believed_m: FloatArray, limited: bool = True) -> Servo:
-    """Make the servo of a choice: what `run` makes of a cell with these settings."""
-    depth = DEPTHS[choice.depth]
+def servo_of(
+    scene: Scene,
+    choice: Choice,
+    believed_m: FloatArray,
+    limited: bool = True,
+    motion: MotionSettings | None = None,
+) -> Servo:
+    """Make the servo of a choice: what `run` makes of a cell with these settings.
+
+    Args:
+        scene: arm, camera and features.
+        choice: of the settings.
+        believed_m: depth of the features at the start, (M,).
+        limited: whether limits are kept.
+        motion: of the target; stationary if None.
+    """
+    still = MotionSettings(feed_forward=False, depth=DEPTHS[choice.depth])
     limits = Limits(
         manipulability_share=choice.manipulability_share, joint_margin=choice.joint_margin
     )
@@ -178,12 +191,11 @@ def servo_of(scene: Scene, choice: Choice, believed_m: FloatArray, limited: bool
         limits=limits if limited else None,
         solver=None if limited else PseudoInverse(),
         depth_m=believed_m,
-        situation=_situation(scene, depth),
+        situation=_situation(scene, still if motion is None else motion),
     )
 
 
-def _situation(scene: Scene, depth: Depth) -> Situation:
-    motion = MotionSettings(feed_forward=False, depth=depth)
+def _situation(scene: Scene, motion: MotionSettings) -> Situation:
     return Situation(1.0 / RATE_HZ, motion, features={"": scene.marks})
 
 
@@ -226,7 +238,7 @@ def drive(
         px, _, broken = true.look(q)
         if broken is not None:
             return true.finish(q, broken, time, "")
-        view = _measured(px + noise_px * random.standard_normal(px.shape), noise_px, time)
+        view = measured(px + noise_px * random.standard_normal(px.shape), noise_px, time)
         reference = planner.reference(time)
         command = law.command(Observation(time, (view,)), reference, JointState(time, q, rates))
         if command.fault is not None:
@@ -239,7 +251,7 @@ def drive(
         if rests and not arrival.falls:
             if arrival.reached:
                 return true.finish(q, End.OFF, time, "")
-            mean = Observation(time, (_measured(np.mean(seen, axis=0), noise_px, time),))
+            mean = Observation(time, (measured(np.mean(seen, axis=0), noise_px, time),))
             wish = free.command(mean, reference, JointState(time, q, rates)).velocity
             # Without limits an arm that they hold would move, and one held otherwise would not.
             moves = (np.abs(wish) > slow * arm.rate_max).any() or _nears(scene, q, wish)
@@ -264,17 +276,24 @@ def _nears(scene: Scene, q: FloatArray, rates: FloatArray) -> bool:
     return bool(fall > _NOTICEABLE * error(0.0))
 
 
-def _measured(px: FloatArray, noise_px: float, time: float) -> ImagePoints:
+def measured(px: FloatArray, noise_px: float, time: float) -> ImagePoints:
+    """Return points (M, 2) as an image with so much noise tells them."""
     covariance = np.tile(max(noise_px, 1e-3) ** 2 * np.eye(2), (len(px), 1, 1))
     return ImagePoints("", time, px, covariance, np.ones(len(px), dtype=np.bool_), ("",) * len(px))
+
+
+def believed_depth(scene: Scene, random: np.random.Generator) -> FloatArray:
+    """Return the depth that the points (M,) are believed to have at the start, m."""
+    _, depth, _ = TrueScene(scene).look(scene.q_start)
+    believed: FloatArray = depth * np.exp(random.uniform(*np.log(BELIEF)))
+    return believed
 
 
 def serve(
     scene: Scene, choice: Choice, random: np.random.Generator, noise_px: float = 0.0
 ) -> Finish:
     """Serve a start without a plan; the depth at the start is believed wrong by a factor."""
-    _, depth, _ = TrueScene(scene).look(scene.q_start)
-    believed = depth * np.exp(random.uniform(*np.log(BELIEF)))
+    believed = believed_depth(scene, random)
     goal = transform_points(se3_inverse(scene.T_world_goal.copy()), scene.points_world)
     known = goal[:, 2].copy() if choice.depth == "from_features" else None
     reference = Reference(0.0, scene.goal_px, desired_depth_m=known)
@@ -355,7 +374,9 @@ def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: floa
             limits=kept,
             solver=solver,
             depth_m=path.depth_m[0],
-            situation=_situation(scene, DepthFromFeatures()),
+            situation=_situation(
+                scene, MotionSettings(feed_forward=False, depth=DepthFromFeatures())
+            ),
         )
         for kept, solver in ((limits, QuadraticProgram()), (None, PseudoInverse()))
     )
