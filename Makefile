@@ -15,7 +15,7 @@ PYTEST_ARGS ?=
 # Images are rendered without a screen.
 export MUJOCO_GL ?= egl
 
-.PHONY: help setup drivers test-drivers test-images test-browser demo test docs bench peers format clean
+.PHONY: help setup drivers test-drivers test-images test-browser demo test docs bench footage peers format clean
 .PHONY: check kernels wheel test-wheel lint lint-format lint-rules lint-types lint-page bounds fuzz soak
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "make lint     formatting, lints and types only"
 	@echo "make format   format the code and apply the safe fixes"
 	@echo "make bench    run the benchmarks, peers beside us"
+	@echo "make footage  measure perception on real images, beside ViSP and OpenCV (3 minutes)"
 	@echo "make peers    build and install what the benchmarks compare us with (ViSP, Python packages)"
 	@echo "make setup    only set up: the virtual environment, the renderer, the first kernels"
 	@echo "make clean    remove everything that was built, the virtual environment too"
@@ -119,6 +120,9 @@ check: lint docs test test-drivers test-wheel
 
 bench: setup
 	$(BIN)/python benchmarks/run.py
+
+footage: setup test-images
+	$(BIN)/python benchmarks/footage.py
 
 peers:
 	@scripts/make-peers

@@ -9,17 +9,15 @@ declared lost both count against the tracker.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness import Missing, Peer, calls, measured, row
+from harness import Peer, calls, measured, row
+from real_images import INSTALL, sequence
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision import SsdTracker, pick_features
 
-IMAGES = Path("/usr/share/visp-images-data/ViSP-images")
-PACKAGE = "visp-images-data"
 RIGHT_PX = 1.5
 MARGIN_PX = 16
 
@@ -50,14 +48,6 @@ def checked(
     inside = (there >= MARGIN_PX).all(axis=1)
     inside &= (there < np.array(before.shape[::-1]) - MARGIN_PX).all(axis=1)
     return there, found & found_back & inside & (np.linalg.norm(back - points, axis=1) < 0.5)
-
-
-def sequence(name: str) -> list[ImageArray]:
-    """The images of a sequence, in order; none if they are not installed."""
-    import cv2
-
-    paths = sorted((IMAGES / name).glob("*.p?m"))
-    return [np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8) for path in paths]
 
 
 class Case(NamedTuple):
@@ -178,10 +168,9 @@ def speed_rows() -> list[dict[str, Any]]:
 
 def run() -> list[dict[str, Any]]:
     rows = speed_rows()
-    if not (IMAGES / "cube").is_dir():
-        missing = Missing("real images", f"apt install {PACKAGE}")
+    if not sequence("cube"):
         none = measured("SSD tracker: right on real images", float("nan"), "%")
-        return [*rows, none | {"peer": f"{missing.name} not installed ({missing.advice})"}]
+        return [*rows, none | {"peer": INSTALL}]
     for name, starts in (("cube", range(0, 69, 3)), ("mire-2", range(0, 490, 10))):
         rows += [right_row(name, starts, gaps) for gaps in ((1,), (2, 3, 5, 7, 10))]
     return rows

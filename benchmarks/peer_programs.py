@@ -51,6 +51,15 @@ class Program:
         self._process.stdin.write(f"{line}\n")
         return self._answer()
 
+    def end(self) -> None:
+        """Ends the program."""
+        self._process.terminate()
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            stream.close()
+        atexit.unregister(self._process.terminate)
+
     def seconds_per_call(self, case: str, count: int) -> float:
         return float(self.ask(f"{case} {count}"))
 

@@ -3,8 +3,8 @@
 //   visp_track serve CONFIG MODEL POSE IMAGE...
 //       CONFIG, MODEL, POSE: ViSP's XML, CAO and starting pose. Says which ViSP it is, then answers
 //       each line `CASE STEP` (CASE: edges, or edges_points for edges and KLT; STEP: every
-//       how-manieth image) with the CPU seconds per image, and the pose in each of those images as
-//       six numbers: t, and the rotation vector.
+//       how-manieth image) with the CPU seconds per image, and for each of those images seven
+//       numbers: the pose, as t and the rotation vector, and 1 if it says that it is lost, else 0.
 #include <ctime>
 #include <fstream>
 #include <iostream>
@@ -61,6 +61,7 @@ void track(const Task &task, int kind, size_t step) {
     const vpPoseVector numbers(pose);
     for (unsigned i = 0; i < 6; ++i)
       poses << ' ' << numbers[i];
+    poses << ' ' << lost;
     if (lost)
       tracker.initFromPose(task.images[k], pose);
   }

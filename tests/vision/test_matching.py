@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench_vision import IMAGES, PACKAGE
+from real_images import IMAGES, PACKAGE
 from vergence.camera import Camera
 from vergence.cell import load_cell
 from vergence.errors import ShapeError

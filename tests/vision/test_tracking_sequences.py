@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench_vision import IMAGES, PACKAGE, evaluate
+from bench_vision import evaluate
+from real_images import IMAGES, PACKAGE
 from vergence.vision import SsdTracker, pick_features
 
 SIZE = 900  # texture, px

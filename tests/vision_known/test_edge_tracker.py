@@ -90,7 +90,7 @@ def test_only_edges_that_are_seen_are_expected() -> None:
     assert len(np.unique(samples.edge)) == 9  # of a box that shows three faces
 
 
-@pytest.mark.parametrize("light", [0.35, 1.0])
+@pytest.mark.parametrize("light", [0.1, 0.35, 1.0])
 def test_one_image_gives_the_pose_from_a_rough_one(light: float) -> None:
     rng = np.random.default_rng(1)
     tracker = EdgeTracker(MODEL)

@@ -125,6 +125,14 @@ def test_a_marker_is_found_with_its_number_and_corners() -> None:
     assert found.covariance_px.shape == (1, 4, 2, 2)
 
 
+@pytest.mark.parametrize("light", [0.2, 0.07])
+def test_a_marker_in_the_dark_is_found(light: float) -> None:
+    dark = light * marker_image(23, QUAD) + np.random.default_rng(0).normal(0, 1.5, (240, 320))
+    marks = MarkerDetector("apriltag_36h11").detect(np.clip(np.rint(dark), 0, 255).astype(np.uint8))
+    assert marks.ids.tolist() == [23]
+    np.testing.assert_allclose(marks.corners_px[0], QUAD, atol=0.6)
+
+
 def test_a_window_keeps_the_pixels_of_the_image() -> None:
     detector, image = MarkerDetector("apriltag_36h11"), marker_image(7, QUAD)
     whole, part = detector.detect(image), detector.detect(image, (80, 40, 230, 190))

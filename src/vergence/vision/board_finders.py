@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
+from vergence.vision.brightness import brightened
 
 _ROOM = 0.35  # of the least distance of two corners: half a window for refining one
 _FEWEST_CORNERS = 8  # of a ChArUco board, for an image to count
@@ -75,16 +76,25 @@ def chessboard_size(image: ImageArray) -> tuple[int, int] | None:
 
 def _is_grid(corners: FloatArray) -> bool:
     """Whether corners (R, C, 2) lie as those of a flat board, but for some distortion."""
+    y, x = np.mgrid[: corners.shape[0], : corners.shape[1]]
+    return _on_plane(np.column_stack((x.ravel(), y.ravel())), corners.reshape(-1, 2))
+
+
+def _on_plane(grid: FloatArray, pixels: FloatArray) -> bool:
+    """Whether corners (N, 2) of a board lie in an image as a plane has them, in the same order.
+
+    Args:
+        grid: the corners on the board, (N, 2), neighbours one or √2 apart.
+        pixels: where they are in the image, (N, 2).
+    """
     import cv2
 
-    y, x = np.mgrid[: corners.shape[0], : corners.shape[1]]
-    grid = np.column_stack((x.ravel(), y.ravel())).astype(np.float32)
-    H, _ = cv2.findHomography(grid, corners.reshape(-1, 2).astype(np.float32))
+    H, _ = cv2.findHomography(grid.astype(np.float32), pixels.astype(np.float32))
     if H is None:
         return False
-    expected = np.asarray(cv2.perspectiveTransform(grid[None], H)).reshape(corners.shape)
-    step = np.hypot(*np.diff(corners, axis=1).reshape(-1, 2).T).min()
-    return bool(np.hypot(*(expected - corners).reshape(-1, 2).T).max() < _BENT * step)
+    flat = np.asarray(cv2.perspectiveTransform(grid[None].astype(np.float64), H))[0]
+    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2) + np.diag(np.full(len(pixels), np.inf))
+    return bool(np.linalg.norm(flat - pixels, axis=1).max() < _BENT * apart.min())
 
 
 def charuco_board(
@@ -125,7 +135,10 @@ def find_charuco(image: ImageArray, boards: tuple[Any, ...], columns: int) -> Co
 
 
 def find_circles(image: ImageArray, columns: int, rows: int, *, asymmetric: bool) -> Corners | None:
-    """Find the centres of a grid of dark circles; None where not all of them are seen."""
+    """Find the centres of a grid of dark circles; None where not all of them are seen.
+
+    OpenCV's finders may find all circles and put them in a wrong order: that is no grid.
+    """
     import cv2
 
     kind = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
@@ -133,12 +146,15 @@ def find_circles(image: ImageArray, columns: int, rows: int, *, asymmetric: bool
     options.minArea, options.maxArea = _SMALLEST_CIRCLE_PX, image.size / (columns * rows)
     options.minDistBetweenBlobs = 3.0
     detector = cv2.SimpleBlobDetector.create(options)
+    y, x = (part.ravel() for part in np.mgrid[:rows, :columns])
+    grid = np.column_stack((2 * x + y % 2 if asymmetric else x, y))
+    bright = brightened(image, smooth=True)
     for flags in (kind | cv2.CALIB_CB_CLUSTERING, kind):
         found, centers = cv2.findCirclesGrid(
-            image, (columns, rows), flags=flags, blobDetector=detector
+            bright, (columns, rows), flags=flags, blobDetector=detector
         )
-        if found:
-            pixels = np.asarray(centers, dtype=np.float64).reshape(-1, 2)
+        pixels = np.asarray(centers, dtype=np.float64).reshape(-1, 2) if found else None
+        if pixels is not None and _on_plane(grid, pixels):
             return Corners(slice(None), pixels)
     return None
 

@@ -9,6 +9,7 @@ from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
 from vergence.errors import Absent, InputError
+from vergence.vision.brightness import brightened
 from vergence.vision.known_object.corner_extractor import require_image
 from vergence.vision.known_object.edge_kernel import learn_edges, measure_edges
 from vergence.vision.known_object.edge_measurement import (
@@ -36,7 +37,7 @@ class EdgeTracker:
     """
 
     model: ObjectModel
-    contrast: float = 5.0  # least step of an edge, grey values
+    contrast: float = 5.0  # least step of an edge, grey values of an image that is not dark
     candidates: int = 5  # steps kept across each place
     least_reach_px: float = 7.0  # how far to search, at least
     most_reach_px: float = 24.0  # and at most
@@ -99,7 +100,7 @@ class EdgeTracker:
             self.bias_px,
         )
         seen: EdgeMeasurement = measure_edges(
-            np.ascontiguousarray(image),
+            np.ascontiguousarray(brightened(image)),
             pack_lens(camera),
             np.ascontiguousarray(T_camera_target),
             np.ascontiguousarray(pose_covariance),

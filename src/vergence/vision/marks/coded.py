@@ -7,7 +7,10 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.errors import InputError, nearest
+from vergence.vision.brightness import brightened
 from vergence.vision.marks.tag_corners import refined_corners
+
+_CELL_MARGIN = 0.3  # of a cell, next to its neighbours, that blur spoils and is not read
 
 DICTIONARIES = {
     "apriltag_16h5": "DICT_APRILTAG_16h5",
@@ -53,6 +56,7 @@ class MarkerDetector:
         known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[self.dictionary]))
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_MARGIN
         object.__setattr__(self, "_detector", cv2.aruco.ArucoDetector(known, parameters))
 
     def detect(
@@ -69,7 +73,9 @@ class MarkerDetector:
             image = image[top : max(window[3], top), left : max(window[2], left)]
         if not image.size:
             return _marks([], None, self.noise_px)
-        corners, ids, _ = self._detector.detectMarkers(np.ascontiguousarray(image))
+        corners, ids, _ = self._detector.detectMarkers(
+            np.ascontiguousarray(brightened(image, smooth=True))
+        )
         marks = _marks(corners, ids, self.noise_px)
         for k in range(len(marks.ids)):
             marks.corners_px[k], marks.covariance_px[k] = refined_corners(
