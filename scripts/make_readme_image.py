@@ -15,7 +15,7 @@ from matplotlib.figure import Figure  # noqa: E402
 from vergence.assembly import run_cell  # noqa: E402
 from vergence.cell import load_cell  # noqa: E402
 from vergence.drawing import SETTINGS, curve  # noqa: E402
-from vergence.studies.nelson1995 import STRATEGIES, moving  # noqa: E402
+from vergence.studies.nelson1995_runs import STRATEGIES, moving  # noqa: E402
 
 OUT = Path(__file__).parents[1] / "docs" / "images" / "puma560.png"
 SHOWN_S = 16.0

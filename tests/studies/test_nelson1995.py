@@ -5,7 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from vergence.cell import load_cell
 from vergence.studies import nelson1995
+from vergence.studies import nelson1995_limits as limits
+from vergence.studies import nelson1995_runs as runs
 from vergence.studies.check import bisect_threshold, within
 
 
@@ -24,7 +27,10 @@ def test_every_claim_of_the_paper_holds(result):
 
 def test_every_check_of_the_paper_is_there(result):
     names = {check.name.split(".")[0] for check in result.study.checks}
-    assert names == {"two_axis", "four_axis", "avoidance", "stability", "headings", "speed"}
+    assert names == {
+        *("two_axis", "four_axis", "avoidance", "figure15", "misprint", "stability", "headings"),
+        "speed",
+    }
     assert all(np.isfinite(check.measured) for check in result.study.checks)
 
 
@@ -40,21 +46,32 @@ def test_progress_only_goes_forward(result):
     assert result.told[-1] <= 1.0
 
 
-def test_wrong_sign_of_the_first_entry_of_B_fails_the_checks(monkeypatch):
-    """[Nelson1995] eq. (13) as printed: two-axis tracking cannot hold the feature."""
-    from vergence.control import Servo
+def measured(result, name):
+    return next(check.measured for check in result.study.checks if check.name == name)
 
-    right = Servo.command
 
-    def mirrored(self, observation, reference, joints):
-        command = right(self, observation, reference, joints)
-        return type(command)(-command.velocity, -command.v_camera)
+def test_without_avoidance_only_the_ratio_of_Q_and_R_counts(result):
+    """S = 0: u = -(BᵀQB + R)⁻¹BᵀQe is the same for kQ and R as for Q and R/k."""
+    factor, least = (
+        measured(result, f"stability.{name}") for name in ("q_factor_unstable", "r_unstable")
+    )
+    assert factor * least == pytest.approx(10.0, rel=0.03)
 
-    monkeypatch.setattr(Servo, "command", mirrored)
-    cell = nelson1995.load_cell("puma560").replace(law=nelson1995.STRATEGIES["two_axis"])
-    trial = nelson1995.run(nelson1995.moving(cell, 1), True)
-    assert not trial.outcome.succeeded
-    assert trial.camera.time[-1] < 4.0
+
+def test_two_axes_lag_by_as_much_more_as_their_gain_is_lower(result):
+    """A ramp of v px an image lags by v/g, g = a/(R + a) with a = Q B Bᵀ, [Nelson1995] eq. (17)."""
+    cell = load_cell("puma560")
+    camera = runs.run(cell.replace(duration_s=0.2), True).run.cameras["wrist"]
+    focal, depth = 16.0 / 0.011, float(camera.true_depth_m[0, 0])
+    two, four = 2e-6 * (focal / depth) ** 2, 2e-6 * focal**2 * (1 + 1 / depth**2)
+    ratio = (four / (10.0 + four)) / (two / (10.0 + two))
+    assert measured(result, "figure15.two_over_four_axis_error") == pytest.approx(ratio, rel=0.03)
+
+
+def test_a_strategy_that_does_not_track_fails_its_checks(monkeypatch):
+    monkeypatch.setattr(limits, "moving", lambda cell, *_, **__: cell.replace(duration_s=0.5))
+    check = limits.misprint(load_cell("puma560"), True)
+    assert not check.holds
 
 
 def test_thresholds_are_bracketed():
