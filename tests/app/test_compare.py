@@ -9,8 +9,9 @@ from pathlib import Path
 import cv2
 import pytest
 
-from vergence.app.campaign import reasons_table
+from vergence.app.campaign import prepare, reasons_table
 from vergence.app.main import main
+from vergence.app.options.campaign import CompareOptions
 from vergence.experiments import (
     Ending,
     Executor,
@@ -181,3 +182,19 @@ def test_a_run_that_ends_off_the_goal_says_how_far_off() -> None:
     table = reasons_table([result], "{law}")
     assert "the farthest feature is 12.3 px off at the end" in table
     assert "in view" not in table
+
+
+@pytest.mark.parametrize(
+    ("command_name", "settings", "stated", "tolerance_px"),
+    [
+        ("compare", [], None, 5.0),
+        ("compare", ['target.motion={kind="stationary"}'], None, 2.0),
+        ("compare", [], 3.0, 3.0),
+        ("map", [], None, 2.0),
+    ],
+)
+def test_a_target_that_moves_may_be_followed_with_some_lag(
+    tmp_path: Path, command_name: str, settings: list[str], stated: float, tolerance_px: float
+) -> None:
+    options = CompareOptions(cell="ur5", settings=settings, out=tmp_path, tolerance_px=stated)
+    assert prepare(command_name, options)[1].tolerance_px == tolerance_px

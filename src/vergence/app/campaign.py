@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from vergence.experiments import CellSource, Trial, TrialResult
 
 
+_OF_STATIONARY_PX, _OF_MOVING_PX = 2.0, 5.0  # tolerances, by what the target does
+
+
 @dataclass(frozen=True, slots=True)
 class Running:
     """How a campaign is run."""
@@ -26,6 +29,7 @@ class Running:
     folder: Path  # where results go, and are resumed from
     options: "CampaignOptions"
     images: bool  # whether they are rendered
+    tolerance_px: float  # largest final error of a converged run
 
     @property
     def features(self) -> str:
@@ -52,11 +56,17 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
     from vergence.app.output import new_folder
     from vergence.app.run import overrides
     from vergence.experiments import CellSource, renders
+    from vergence.parts import kind_of
 
     source = CellSource.of(options.cell, overrides(options.settings), None)
     cell = source.load()
     folder = options.out or new_folder(f"{cell.name}-{command}")
-    return source, Running(folder, options, renders(cell))
+    tolerance_px = options.tolerance_px
+    if tolerance_px is None:
+        # A map makes the target rest where it is to be found; a comparison lets it move on.
+        moves = command == "compare" and kind_of(cell.target.motion) != "stationary"
+        tolerance_px = _OF_MOVING_PX if moves else _OF_STATIONARY_PX
+    return source, Running(folder, options, renders(cell), tolerance_px)
 
 
 def names_in(option: str, text: str) -> tuple[str, ...]:
@@ -91,7 +101,7 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
                     trials,
                     how.folder,
                     executor=Executor(how.options.workers, how.options.scheduler),
-                    tolerance_px=how.options.tolerance_px,
+                    tolerance_px=how.tolerance_px,
                     physics=how.options.physics,
                     progress=show,
                 )

@@ -27,8 +27,8 @@ _REMARK = (
     "goal. Features are {features}; the cell's rate and acceleration limits apply; {motion}."
 )
 _LAG = (
-    "The target moves, so laws without feed-forward end with a steady lag; --tolerance-px allows "
-    "for it."
+    "The target moves, so every law lags behind it, and most those without feed-forward; "
+    "--tolerance-px says how far is allowed."
 )
 
 
@@ -48,12 +48,13 @@ def compare(options: "CompareOptions") -> int:
     )
     report = _write_page(source, found, how, remark)
     if options.as_json:
-        drawn = {"starts": options.starts, "seed": options.seed}
+        drawn = {"starts": options.starts, "seed": options.seed, "tolerance_px": how.tolerance_px}
         rows = [_as_json(score) for score in found.scores]
         files = {"run": how.folder, "data": data, "report": report}
         emit({"command": "compare", "cell": cell.name, **drawn, "laws": rows, **files})
         return SUCCESS
     _tell(found)
+    say(f"  converged: every feature within {how.tolerance_px:g} px at the end")
     say(f"  report  {report}")
     say(f"  data    {data}")
     return SUCCESS
@@ -95,7 +96,7 @@ def _write_page(
         markup.section(
             "Result",
             tables,
-            f"<p>Converged: every feature within {how.options.tolerance_px:g} px at the end. Time "
+            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end. Time "
             f"until then and the camera's path are medians over the runs that converged.{lag}</p>",
             markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),

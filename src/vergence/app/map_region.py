@@ -127,7 +127,7 @@ def _write_page(
     title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
         f"{len(results)} runs; features are {how.features}; {how.motion}; converged: every "
-        f"feature within {how.options.tolerance_px:g} px at the end."
+        f"feature within {how.tolerance_px:g} px at the end."
     )
     return write_page(how.folder, "vergence map", title, remark, parts), image
 

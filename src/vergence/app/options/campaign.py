@@ -18,9 +18,13 @@ class CampaignOptions:
 
     cell: CellName
     tolerance_px: Annotated[
-        float,
-        typer.Option(min=0.0, help="Largest final feature error of a converged run, in pixels."),
-    ] = 2.0
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Largest final feature error of a converged run, in pixels. Default: 2, and 5 "
+            "for `compare` if the target moves.",
+        ),
+    ] = None
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Number of processes on this machine. Default: one per core."),
