@@ -32,7 +32,8 @@ from real_images import (
 )
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.object_follower import ObjectFollower, Sighting
+from vergence.estimation.hypothesis_follower import HypothesisFollower
+from vergence.estimation.object_follower import Sighting
 from vergence.vision.known_object import EdgeTracker, ObjectModel
 from visp_tracker import PROGRAM, VispTracker
 
@@ -65,8 +66,8 @@ class Answers(NamedTuple):
 
 def ours(known: KnownObject, images: Sequence[ImageArray]) -> Answers:
     """Poses of `vergence track`."""
-    follower = ObjectFollower(
-        EdgeTracker(known.model), known.camera, known.first_pose(), 0.0, PERIOD_S
+    follower = HypothesisFollower(
+        EdgeTracker(known.model), known.camera, [known.first_pose()], 0.0, PERIOD_S
     )
     steps = [follower.follow(image, PERIOD_S * k) for k, image in enumerate(images)]
     return Answers(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from vergence.app.main import main
+from vergence.app.tracking.start import starting_poses
 from vergence.arrays import FloatArray
 from vergence.geometry import quaternion_to_matrix, se3, so3_exp
 
@@ -195,6 +196,18 @@ def test_points_found_by_hand_are_a_start(track: Track, tmp_path: Path) -> None:
         f"points_m = {places.tolist()}\npoints_px = {pixels.tolist()}\n"
     )
     assert track("--no-overlay", start=tmp_path / "start.toml", out="here") == 0
+
+
+def test_points_of_a_small_flat_object_begin_with_both_its_poses(tmp_path: Path) -> None:
+    square = 0.02 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    T = se3(so3_exp(np.array([0.4, 0.2, 0.0])), np.array([0.0, 0.0, 0.6]))
+    pixels = np.round(CAMERA.project(square @ T[:3, :3].T + T[:3, 3]))
+    path = tmp_path / "start.json"
+    path.write_text(json.dumps({"points_m": square.tolist(), "points_px": pixels.tolist()}))
+    poses = starting_poses(str(path), CAMERA)
+    assert len(poses) == 2
+    assert min(pose_error(one, T)[1] for one in poses) < 0.3
+    assert pose_error(*poses)[1] > 0.5
 
 
 @pytest.mark.parametrize(

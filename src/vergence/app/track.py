@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from vergence.app.tracking.footage import Footage, FootageFrame
     from vergence.arrays import ImageArray
     from vergence.camera import Camera
-    from vergence.estimation.object_follower import FollowRule, ObjectFollower, ObjectTracker, Step
+    from vergence.estimation.hypothesis_follower import HypothesisFollower
+    from vergence.estimation.object_follower import FollowRule, ObjectTracker, Step
     from vergence.vision.known_object import ObjectModel
 
 _NO_SAMPLES: dict[str, Any] = {
@@ -24,6 +25,7 @@ _NO_SAMPLES: dict[str, Any] = {
     "samples_found": np.zeros(0, dtype=np.bool_),
 }
 _KEY_FRAMES = 6  # spread over the footage
+_TOLD_TURNS = 3
 _MOST_KEY_FRAMES = 24  # with those where the sighting changes
 
 
@@ -38,6 +40,8 @@ class Tracked(NamedTuple):
     deviation_max_rad: float  # but for turns that no image shows
     median_ms: float  # an image, drawing and files left out
     free: str  # which turns no image shows; empty if there are none
+    alike: tuple[str, ...]  # turns after which the object's edges are the same
+    note: str  # which pose was taken instead of the given one; empty if none was
 
 
 def track(options: "TrackOptions") -> int:
@@ -84,10 +88,10 @@ def _follower(
     camera: "Camera",
     footage: "Footage",
     first: "FootageFrame",
-) -> "ObjectFollower":
-    from vergence.app.tracking.start import starting_pose
+) -> "HypothesisFollower":
+    from vergence.app.tracking.start import starting_poses
     from vergence.errors import InputError
-    from vergence.estimation.object_follower import ObjectFollower
+    from vergence.estimation.hypothesis_follower import HypothesisFollower
 
     for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
@@ -96,7 +100,7 @@ def _follower(
     if share is not None and not 0.2 <= share <= 1.0:
         allowed = "0.2 … 1: with less of it an object cannot be distinguished from its background"
         raise InputError("track", "--share", share, allowed)
-    start = starting_pose(options.start, camera)
+    starts = starting_poses(options.start, camera)
     tracker, usual = _tracker(options, model, first)
     rule = replace(usual, jolt_px=options.jolt)
     if share is not None:
@@ -106,7 +110,7 @@ def _follower(
             least_share=min(usual.least_share, share + 0.07),
             surprising_share=max(usual.surprising_share, share),
         )
-    return ObjectFollower(tracker, camera, start, 0.0, 1.0 / footage.rate_hz, rule)
+    return HypothesisFollower(tracker, camera, starts, 0.0, 1.0 / footage.rate_hz, rule)
 
 
 def _tracker(
@@ -133,7 +137,7 @@ class _Run:
         folder: Path,
         footage: "Footage",
         camera: "Camera",
-        follower: "ObjectFollower",
+        follower: "HypothesisFollower",
         overlay: bool,
     ) -> None:
         from vergence.app.tracking.film import Film
@@ -155,7 +159,7 @@ class _Run:
         }
 
     def through(self, first: "FootageFrame", rest: Any) -> Tracked:
-        """Follow the object to the end of the footage, or until it is lost."""
+        """Follow the object to the end of the footage, or until one never seen is lost."""
         from itertools import chain
 
         from vergence.app.progress import bar
@@ -174,10 +178,10 @@ class _Run:
                 self._draw(number, frame, step, steps[-1] if steps else None)
                 steps.append(replace(step, **_NO_SAMPLES))  # a long film must fit in memory
                 progress.update(task, completed=number + 1, description="track")
-                if step.sighting is Sighting.LOST:
+                if step.sighting is Sighting.LOST and not self._follower.was_seen:
                     break
             self._key_frame(len(steps) - 1, frame, step)
-        return _summary(steps, took, self._follower.tracker.free)
+        return _summary(steps, took, self._follower)
 
     def _image(self, frame: "FootageFrame") -> "ImageArray":
         """Return the image as the tracker takes it."""
@@ -217,7 +221,7 @@ class _Run:
             self._key_frames.append(path)
 
 
-def _summary(steps: "list[Step]", took: list[float], free: str) -> Tracked:
+def _summary(steps: "list[Step]", took: list[float], follower: "HypothesisFollower") -> Tracked:
     from vergence.estimation.object_follower import Sighting
 
     seen = [step for step in steps if step.sighting is Sighting.SEEN]
@@ -230,7 +234,9 @@ def _summary(steps: "list[Step]", took: list[float], free: str) -> Tracked:
         float(widest[0]),
         float(widest[1]),
         float(np.median(took)) * 1e3,
-        free,
+        follower.tracker.free,
+        tuple(map(str, follower.symmetries)),
+        follower.note,
     )
 
 
@@ -244,10 +250,14 @@ def _outcome(steps: "list[Step]") -> Outcome:
         reason = f"the object was seen in {held} of {len(steps)} images, the last among them"
         return Outcome(OutcomeKind.COMPLETED, reason, last.time)
     reason = f"not seen at the end: {last.reason}"
+    if last.sighting is Sighting.AMBIGUOUS:
+        reason = f"ambiguous at the end: {last.reason}"
     if last.sighting is Sighting.LOST:
         before = [step.time for step in steps if step.sighting is Sighting.SEEN]
         since = f"last seen at {before[-1]:.2f} s" if before else "never seen"
         reason = f"{since}; {last.reason}"
+    if last.reason.endswith("needed"):
+        reason += " (--share lowers that)"
     return Outcome(OutcomeKind.TARGET_LOST, reason, last.time)
 
 
@@ -272,6 +282,8 @@ def _answer(
         "rotation_deviation_max_deg": float(np.rad2deg(tracked.deviation_max_rad)),
         "median_ms": tracked.median_ms,
         "unseen_turns": tracked.free or None,
+        "symmetries": tracked.alike,
+        "note": tracked.note or None,
         "last": pose_record(tracked.last),
         "run": folder,
         **files,
@@ -288,6 +300,16 @@ def _tell(tracked: Tracked, files: Mapping[str, Any], folder: Path) -> None:
     if tracked.free:
         say(f"  {tracked.free}; its standard deviation is that of an unknown angle, 104°")
     say(f"  poses    {files['poses']}  (with covariances: {files['poses_with_covariance'].name})")
+    if tracked.alike:
+        say(f"  turned by {_listed(tracked.alike)} its edges are the same: the start decides")
+    if tracked.note:
+        say(f"  {tracked.note}")
     if files["overlay"]:
         say(f"  overlay  {files['overlay']}")
     say(f"  folder   {folder}")
+
+
+def _listed(turns: tuple[str, ...]) -> str:
+    """Return a few of the turns in words."""
+    rest = len(turns) - _TOLD_TURNS
+    return ", ".join(turns[:_TOLD_TURNS]) + (f" and {rest} others" if rest > 0 else "")

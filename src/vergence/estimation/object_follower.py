@@ -107,6 +107,7 @@ class Sighting(StrEnum):
     """What became of the object in an image."""
 
     SEEN = "seen"
+    AMBIGUOUS = "ambiguous"  # found, but a turned pose explains the images as well
     PREDICTED = "predicted"  # not found in this image: the pose is what motion makes expect
     LOST = "lost"
 
@@ -126,6 +127,7 @@ class Step:
     share: float  # of what should be seen, how much was found, 0 … 1
     samples_px: FloatArray  # (N, 2) the places looked at
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
+    alternatives: tuple[FloatArray, ...] = ()  # T_camera_target (4, 4) of turned poses, if any
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +161,7 @@ class ObjectFollower:
         time: of the first image, s.
         period: between images, s.
         rule: when an image counts.
+        memory: what the object looks like, if it was followed before.
     """
 
     def __init__(
@@ -169,6 +172,7 @@ class ObjectFollower:
         time: float,
         period: float,
         rule: FollowRule | None = None,
+        memory: Any = None,
     ) -> None:
         self._tracker, self._camera, self._rule = tracker, camera, rule or FollowRule()
         depth = float(T_camera_target[2, 3])
@@ -182,11 +186,12 @@ class ObjectFollower:
         start = np.repeat(
             [3.0 * jolt, 3.0 * jolt / lever, 2.0 * jolt / period, 2.0 * jolt / lever / period], 3
         )
+        self.start_covariance = np.diag(start**2)[:6, :6]  # of (δp, δθ) at the start
         self._unseen = tracker.free_motions(T_camera_target)
         self._belief: Belief = self._filter.start(
             time, T_camera_target, covariance=with_unknown(np.diag(start**2), self._unseen)
         )
-        self._memory = tracker.blank()
+        self._memory = tracker.blank() if memory is None else memory
         self._shared = np.zeros((6, 6))
         self._missed = 0
 
@@ -194,6 +199,16 @@ class ObjectFollower:
     def tracker(self) -> ObjectTracker:
         """What measures the object."""
         return self._tracker
+
+    @property
+    def T_camera_target(self) -> FloatArray:
+        """Pose after the last image, (4, 4)."""
+        return self._belief.T_world_target
+
+    @property
+    def memory(self) -> Any:
+        """What the object looks like."""
+        return self._memory
 
     @property
     def in_color(self) -> bool:

@@ -16,7 +16,12 @@ _SHIFT = 4  # fractional bits of a place
 _PLACES = 60  # along an edge: where it comes out from behind something
 _BESIDE_PX = 4.0  # places on one outline
 _AXES = ((0, 0, 230), (0, 180, 0), (230, 80, 0))  # x red, y green, z blue
-_COLORS = {Sighting.SEEN: FOUND, Sighting.PREDICTED: DESIRED, Sighting.LOST: LOST}
+_COLORS = {
+    Sighting.SEEN: FOUND,
+    Sighting.AMBIGUOUS: DESIRED,
+    Sighting.PREDICTED: DESIRED,
+    Sighting.LOST: LOST,
+}
 
 
 def draw_step(

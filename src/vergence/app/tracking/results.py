@@ -25,7 +25,8 @@ class PoseFiles:
 
     Poses are those of the object in the camera: z forward, x right, y down. The covariance is that
     of (δp, δθ), t + δp and exp(δθ) R, along the camera's axes, in m and rad.
-    Motions that do not show in the image have a large one, and are listed.
+    Motions that do not show in the image have a large one, and are listed, as are the turned poses
+    (4 x 4 matrices) that explain an ambiguous image as well.
 
     Args:
         folder: where to.
@@ -79,4 +80,5 @@ def pose_record(step: Step) -> dict[str, Any]:
         "velocity": step.velocity.tolist(),
         "covariance": step.covariance[:6, :6].tolist(),
         "unseen_motions": step.unseen.T.tolist(),
+        "alternatives": [pose.tolist() for pose in step.alternatives],
     }

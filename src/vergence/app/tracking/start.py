@@ -7,37 +7,44 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.errors import NOTHING, InputError
+from vergence.estimation import CornerView, NoPose, fit_pose
 from vergence.geometry import quaternion_to_matrix, rpy_to_matrix, se3, so3_exp
 from vergence.tables import KINDS, numbers, read_table, require_known
 
 _ROTATIONS = ("rotation_rpy_deg", "quaternion_wxyz", "rotation_vector")
 _KEYS = ("T_camera_target", "position_m", *_ROTATIONS, "points_m", "points_px")
+_NOISE_PX = 3.0  # standard deviation of a point found by hand
+_MOST_MISS_PX = 20.0  # of such a point from where the pose puts it
 _HOW = (
     "position_m with one of rotation_rpy_deg, quaternion_wxyz, rotation_vector; or "
     "T_camera_target; or points_m with points_px"
 )
 
 
-def starting_pose(text: str, camera: Camera) -> FloatArray:
+def starting_poses(text: str, camera: Camera) -> list[FloatArray]:
     """Return T_camera_target (4, 4) from a file, or from x,y,z,roll,pitch,yaw in m and degrees.
+
+    Points found by hand may fit several poses, as those of nearly flat targets do; the likeliest
+    comes first.
 
     Raises:
         InputError: if it cannot be read, or puts the object behind the camera.
     """
     if Path(text).suffix.lower() in KINDS:
-        T, source = _from_file(Path(text), camera), text
+        poses, source = _from_file(Path(text), camera), text
     else:
         source = "--start"
         given = {"--start": text.replace(",", " ").split()}
         values = numbers(given, "--start", (6,), "vergence track")
-        T = se3(_rotation(values[3:]), values[:3].copy())
-    if not T[2, 3] > 0.0:
+        poses = [se3(_rotation(values[3:]), values[:3].copy())]
+    ahead = [T for T in poses if T[2, 3] > 0.0]
+    if not ahead:
         allowed = "a place before the camera: its z axis points forward"
-        raise InputError(source, "position_m", T[:3, 3].round(4).tolist(), allowed)
-    return T
+        raise InputError(source, "position_m", poses[0][:3, 3].round(4).tolist(), allowed)
+    return ahead
 
 
-def _from_file(path: Path, camera: Camera) -> FloatArray:
+def _from_file(path: Path, camera: Camera) -> list[FloatArray]:
     source = str(path)
     table = read_table(path, "a starting pose")
     require_known(table, _KEYS, source)
@@ -51,7 +58,7 @@ def _from_file(path: Path, camera: Camera) -> FloatArray:
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0.0:
             raise InputError(source, "T_camera_target", R.tolist(), "a rotation and a position")
         U, _, Vt = np.linalg.svd(R)
-        return se3(U @ Vt, T[:3, 3].copy())
+        return [se3(U @ Vt, T[:3, 3].copy())]
     named = [key for key in _ROTATIONS if key in table]
     if "position_m" not in table or len(named) != 1:
         raise InputError(source, "", ", ".join(table) or NOTHING, _HOW)
@@ -61,11 +68,11 @@ def _from_file(path: Path, camera: Camera) -> FloatArray:
         norm = float(np.linalg.norm(q))
         if not norm > 1e-6:
             raise InputError(source, named[0], q.tolist(), "a quaternion w, x, y, z")
-        return se3(quaternion_to_matrix(q / norm), position)
+        return [se3(quaternion_to_matrix(q / norm), position)]
     angles = numbers(table, named[0], (3,), source)
     if named[0] == "rotation_vector":
-        return se3(so3_exp(angles), position)
-    return se3(_rotation(angles), position)
+        return [se3(so3_exp(angles), position)]
+    return [se3(_rotation(angles), position)]
 
 
 def _rotation(rpy_deg: FloatArray) -> FloatArray:
@@ -74,22 +81,27 @@ def _rotation(rpy_deg: FloatArray) -> FloatArray:
     return R
 
 
-def _from_points(places: FloatArray, pixels: FloatArray, camera: Camera, source: str) -> FloatArray:
-    """Return the pose under which points of the object have these pixels."""
-    import cv2
-
+def _from_points(
+    places: FloatArray, pixels: FloatArray, camera: Camera, source: str
+) -> list[FloatArray]:
+    """Return the poses under which points of the object have these pixels, the likeliest first."""
     if len(places) != len(pixels) or len(places) < 4:
         given = f"{len(places)} places and {len(pixels)} pixels"
         raise InputError(source, "points_px", given, "as many as points_m, at least 4")
-    rays = np.ascontiguousarray(camera.normalize(pixels))
-    found, w, t = cv2.solvePnP(places, rays, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
-    if not found:
-        raise InputError(source, "points_px", pixels.tolist(), "pixels that one pose explains")
-    w, t = cv2.solvePnPRefineLM(places, rays, np.eye(3), None, w, t)
-    T = se3(so3_exp(np.ravel(w).astype(np.float64)), np.ravel(t).astype(np.float64))
-    seen = camera.project(places @ T[:3, :3].T + T[:3, 3])
-    miss = float(np.linalg.norm(seen - pixels, axis=1).max())
-    if not miss < 20.0:
-        given = f"points that the best pose misses by {miss:.0f} px"
+    found = fit_pose(places, [CornerView(camera, np.eye(4), pixels)], noise_px=_NOISE_PX)
+    fits = found.alternatives if isinstance(found, NoPose) else (found,)
+    poses = [fit.T_world_target for fit in fits]
+    if isinstance(found, NoPose) and not poses:
+        given = f"points that no pose explains: {found.reason}"
         raise InputError(source, "points_px", given, "pixels of points_m in the same order")
-    return T
+    misses = [_miss_px(T, places, pixels, camera) for T in poses]
+    near = [T for T, miss in zip(poses, misses, strict=True) if miss < _MOST_MISS_PX]
+    if not near:
+        given = f"points that the best pose misses by {min(misses):.0f} px"
+        raise InputError(source, "points_px", given, "pixels of points_m in the same order")
+    return near
+
+
+def _miss_px(T: FloatArray, places: FloatArray, pixels: FloatArray, camera: Camera) -> float:
+    seen = camera.project(places @ T[:3, :3].T + T[:3, 3])
+    return float(np.linalg.norm(seen - pixels, axis=1).max())

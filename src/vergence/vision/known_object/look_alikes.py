@@ -1,0 +1,103 @@
+"""Turns of an object after which it may look the same: of its shape, or nearly so from here.
+
+A box turned by half a turn is the same box. A wedge seen from its high end, and many a machined
+part, is nearly the same, and its edges are then taken for one another.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
+from vergence.vision.known_object.object_model import ObjectModel
+
+_FOLDS = (2, 3, 4, 6)  # of symmetries that things have
+_SAME = 0.01  # of the object's size: edges nearer than this coincide
+_PLACES = 9  # along an edge, that are compared
+_APART_RAD = 0.05
+
+
+class Turn(NamedTuple):
+    """A turn about an axis of the object."""
+
+    T_target_turned: FloatArray  # (4, 4)
+    axis: FloatArray  # (3,) unit, object's frame
+    angle_deg: float
+
+    def __str__(self) -> str:
+        axis = ", ".join(f"{value:.2g}" for value in self.axis.round(3) + 0.0)
+        return f"{self.angle_deg:.0f}° about ({axis})"
+
+
+def turns_of(model: ObjectModel) -> list[Turn]:
+    """Return the turns about the middle of an object under which things may look the same.
+
+    Halves, thirds, quarters and sixths of a turn about the axes of its frame and about its own, and
+    those that take a cube to itself.
+    """
+    middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
+    turns: list[Turn] = []
+    for axis, folds in _axes(model):
+        for fold in folds:
+            for k in range(1, fold):
+                angle = 2.0 * np.pi * k / fold
+                R = so3_exp(np.ascontiguousarray(angle * axis))
+                turn = Turn(se3(R, middle - R @ middle), axis, float(np.rad2deg(angle)))
+                if all(
+                    apart_rad(turn.T_target_turned, o.T_target_turned) > _APART_RAD for o in turns
+                ):
+                    turns.append(turn)
+    return turns
+
+
+def symmetries(model: ObjectModel) -> list[Turn]:
+    """Return the turns that take the edges and vertices of an object to themselves."""
+    places = _places_on_edges(model)
+    return [
+        turn
+        for turn in turns_of(model)
+        if _near_edges(model, places @ turn.T_target_turned[:3, :3].T + turn.T_target_turned[:3, 3])
+    ]
+
+
+def between(T: FloatArray, T_other: FloatArray) -> Turn:
+    """Return by which turn of the object one pose becomes another."""
+    change = se3_compose(se3_inverse(T), T_other)
+    w = so3_log(np.ascontiguousarray(change[:3, :3]))
+    angle = float(np.linalg.norm(w))
+    return Turn(change, w / max(angle, 1e-12), float(np.rad2deg(angle)))
+
+
+def apart_rad(T: FloatArray, T_other: FloatArray) -> float:
+    """Return the angle between two orientations."""
+    return float(np.linalg.norm(so3_log(np.ascontiguousarray(T[:3, :3].T @ T_other[:3, :3]))))
+
+
+def _axes(model: ObjectModel) -> list[tuple[FloatArray, tuple[int, ...]]]:
+    """Return axes (3,) and the folds of the turns about each."""
+    centred = model.vertices - model.vertices.mean(axis=0)
+    own = np.linalg.svd(centred, full_matrices=True)[2]
+    axes: list[tuple[FloatArray, tuple[int, ...]]] = [(axis, _FOLDS) for axis in (*np.eye(3), *own)]
+    for signs in product((-1.0, 0.0, 1.0), repeat=3):
+        count = int(np.count_nonzero(signs))
+        if signs > (0.0, 0.0, 0.0) and count > 1:
+            axis = np.array(signs) / np.sqrt(count)
+            axes.append((axis, (2,) if count == 2 else (3,)))
+    return axes
+
+
+def _places_on_edges(model: ObjectModel) -> FloatArray:
+    share = np.linspace(0.0, 1.0, _PLACES)[:, None, None]
+    places: FloatArray = (1.0 - share) * model.edges[:, 0] + share * model.edges[:, 1]
+    return places.reshape(-1, 3)
+
+
+def _near_edges(model: ObjectModel, places: FloatArray) -> bool:
+    """Tell whether all places (N, 3) lie on edges of an object."""
+    start, along = model.edges[:, 0], model.edges[:, 1] - model.edges[:, 0]
+    ahead = places[:, None] - start
+    share = np.clip(np.einsum("nej,ej->ne", ahead, along) / np.sum(along**2, axis=1), 0.0, 1.0)
+    away = np.linalg.norm(ahead - share[..., None] * along, axis=2).min(axis=1)
+    return bool((away < _SAME * model.size).all())
