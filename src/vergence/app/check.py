@@ -46,19 +46,21 @@ def _cells(check: Check) -> tuple[str, ...]:
 def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
     headings, rows = table(checks)
-    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
+    shown = [heading for heading in headings if heading != "note"]
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in shown)
     body = "\n".join(
-        _html_row(headings, cells, check.holds) for cells, check in zip(rows, checks, strict=True)
+        _html_row(shown, cells, check.holds) + _note(check.note, len(shown))
+        for cells, check in zip(rows, checks, strict=True)
     )
     return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>'
 
 
-_KINDS = {**dict.fromkeys(NUMBERS, "number"), "unit": "unit", "note": "note"}
+_KINDS = {**dict.fromkeys(NUMBERS, "number"), "unit": "unit"}
 
 
 def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str:
     row = []
-    for heading, cell in zip(headings, map(escape, cells), strict=True):
+    for heading, cell in zip(headings, map(escape, cells), strict=False):  # the note is below
         if heading == "check":
             row.append(f'<th scope="row">{cell}</th>')
         elif heading == "holds":
@@ -67,3 +69,8 @@ def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str
             kind = f' class="{_KINDS[heading]}"' if heading in _KINDS else ""
             row.append(f"<td{kind}>{cell}</td>")
     return f"<tr>{''.join(row)}</tr>"
+
+
+def _note(note: str, columns: int) -> str:
+    """Return a row below its check, over the whole width of the table."""
+    return f'\n<tr class="remark"><td colspan="{columns}">{escape(note)}</td></tr>' if note else ""

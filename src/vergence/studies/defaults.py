@@ -1,7 +1,6 @@
 """Which settings arrive: starts and goals on three arms, served by each choice in turn."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -9,17 +8,16 @@ import numpy as np
 
 from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.drawing import COLORS, figure, legend
 from vergence.planning import Path as CameraPath
 from vergence.planning import PlanFailure, proves_no_path
 from vergence.robot import Arm
 from vergence.simulation import SimulatedDriver
-from vergence.studies.check import Figure, Progress, StudyResult
+from vergence.studies.check import Progress, StudyResult
 from vergence.studies.defaults_checks import PLAN_WORST_S, checks_of
 from vergence.studies.defaults_choices import CHOICES, EVERY, MOVING, Tried
+from vergence.studies.defaults_figures import figures
 from vergence.studies.defaults_moving import Drift, keep
 from vergence.studies.defaults_run import NOISE_PX, End, follow, plan, plan_again, serve
-from vergence.studies.figure_files import save_figures
 from vergence.studies.guarantees_random import CAMERA, SQUARE
 from vergence.studies.processes import processes, try_all
 from vergence.studies.reach_scene import Scene
@@ -31,8 +29,6 @@ STARTS_SEED = 11
 TILT_DEG = 80.0  # up to which start and goal see the target obliquely
 PROOF_CELLS = 256
 EVERY_NTH, MOVING_NTH = 20, 10  # pairs of starts with every combination, and with a moving target
-
-_WIDTH = 7.6  # inches
 
 
 def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
@@ -67,7 +63,7 @@ def study(out: Path, count: int, progress: Progress, seed: int = 0) -> StudyResu
                     f"{count} starts of {name}", (k + done) / len(CELLS)
                 ),
             )
-    return StudyResult(TITLE, checks_of(found), _figures(out, found), seed)
+    return StudyResult(TITLE, checks_of(found), figures(out, found), seed)
 
 
 def camera_arm(cell: str) -> Arm:
@@ -114,10 +110,8 @@ def _try_more(tried: Tried, scene: Scene, seed: Sequence[int], noise_px: float) 
     """Add every combination, or a moving target, for some of the starts with and without noise."""
     pair = seed[-1] // 2
     if pair % (EVERY_NTH // 2) == 0:
-        randoms = np.random.default_rng([*seed, 2]).spawn(len(EVERY))
         every = (
-            serve(scene, choice, random, noise_px)
-            for choice, random in zip(EVERY, randoms, strict=True)
+            serve(scene, choice, np.random.default_rng([*seed, 2]), noise_px) for choice in EVERY
         )
         tried = tried._replace(every=tuple(every))
     if pair % (MOVING_NTH // 2) == 0:
@@ -127,29 +121,3 @@ def _try_more(tried: Tried, scene: Scene, seed: Sequence[int], noise_px: float) 
         )
         tried = tried._replace(moving=tuple(kept))
     return tried
-
-
-def _figures(out: Path, found: Mapping[str, Sequence[Tried]]) -> tuple[Figure, ...]:
-    names, counts = [], []
-    for name, tried in found.items():
-        names.append(f"{name}, default")
-        counts.append(Counter(one.planned.end for one in tried))
-        for k, choice in enumerate(CHOICES):
-            names.append(f"{name}, {choice.name}")
-            counts.append(Counter(one.served[k].end for one in tried))
-    drawing, (axes,) = figure(_WIDTH, 0.24 * len(names) + 1.1)
-    left = np.zeros(len(names))
-    for index, end in enumerate(End):
-        share = np.array([100.0 * count[end] / count.total() for count in counts])
-        again, color = divmod(index, len(COLORS))
-        look = {"color": COLORS[color], "hatch": "/////" * again, "edgecolor": "white"}
-        axes.barh(names, share, left=left, label=end.value, linewidth=0.0, **look)
-        left += share
-    axes.set_axisbelow(True)
-    axes.invert_yaxis()
-    axes.set_xlabel("runs (%)")
-    axes.set_xlim(0, 100)
-    axes.grid(visible=False, axis="y")
-    legend(axes)
-    caption = "How runs end from the same starts, by the choice of settings."
-    return save_figures(out, {"defaults": (drawing, caption)})

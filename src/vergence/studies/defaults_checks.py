@@ -88,14 +88,16 @@ def _every(tried: Sequence[Tried]) -> Check:
     reached = np.array([[end.end is End.REACHED for end in one.every] for one in tried])
     counts = reached.sum(axis=0)
     order = np.argsort(-counts, kind="stable")
-    shares = "; ".join(f"{EVERY[k].name}: {counts[k] / len(tried):.2f}" for k in order)
+    best, worst = (f"{EVERY[k].name}: {counts[k] / len(tried):.2f}" for k in (order[0], order[-1]))
+    rank = 1 + int((counts > counts[0]).sum())
     return Check(
         "defaults.every_combination",
         "no combination of settings reaches more than the default, without a plan: 0 beyond chance",
         ahead := better(reached),
         "combinations",
         ahead == 0,
-        f"{len(tried)} starts of all arms by {len(EVERY)} combinations: {shares}",
+        f"{len(tried)} starts of all arms; the default reaches {counts[0] / len(tried):.2f}, "
+        f"number {rank} of {len(EVERY)}; most: {best}; fewest: {worst}",
     )
 
 
