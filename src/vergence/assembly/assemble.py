@@ -13,6 +13,8 @@ from vergence.assembly.photograph import is_by_photograph, photograph_parts
 from vergence.assembly.reach import reach_parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.switch import switch_parts
+from vergence.assembly.tag import located
+from vergence.assembly.tag_reach import tag_reach_parts
 from vergence.assembly.track import track_parts
 from vergence.cell import Cell
 from vergence.cell.schema import AdvanceTable, FollowTable, ReachTable, SwitchTable, TrackTable
@@ -79,6 +81,10 @@ def task_parts(
         InputError: if the cell cannot be run as it is written.
     """
     context = LawContext.of(cell, started, model)
+    if images:
+        context, outcome = located(context, started)
+        if outcome is not None:
+            return outcome
     parts = _parts(context, started, images)
     if images and isinstance(parts, Parts) and any(cell.cameras[n].depth for n in cell.watched):
         _require_depth(cell, started)
@@ -107,6 +113,8 @@ def _parts(context: LawContext, started: StartedDriver, images: bool) -> Parts |
             return switch_parts(context, cell.task, started)
         case FollowTable():
             return follow_parts(context, cell.task, started, images)
+        case ReachTable() if cell.target.tag is not None:
+            return tag_reach_parts(context, cell.task, started, images)
         case ReachTable() if is_by_photograph(cell):
             return photograph_parts(context, cell.task, started, images)
         case ReachTable():

@@ -6,8 +6,9 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.own_parts import started_tracker
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.tag import TagFinder
 from vergence.cell.schema import TrackTable
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.estimation import TrackedPoints
 from vergence.geometry import se3_inverse, transform_points
 from vergence.parts import kind_of
@@ -44,7 +45,9 @@ def first_points(
         return _exact_points(context, key, camera, frame)
     assert frame.image is not None
     points_px = _given_points(context, camera)
-    if points_px is None and _are_known(context, camera):
+    if points_px is None and _shows_tag(context, camera):
+        points_px = _tag_points(context, camera, frame)
+    elif points_px is None and _are_known(context, camera):
         points_px = _predicted_points(context, key, camera, frame.image)
     elif points_px is None:
         points_px = _pick(context, camera, frame.image)
@@ -95,6 +98,29 @@ def _are_known(context: LawContext, camera: str) -> bool:
     tool = context.cell.tool
     at_tool = tool is not None and tool.camera == camera
     return at_tool or context.cell.target.features is not None
+
+
+def _shows_tag(context: LawContext, camera: str) -> bool:
+    """Tell whether a camera looks at a target with a tag rather than at a tool."""
+    tool = context.cell.tool
+    return context.cell.target.tag is not None and (tool is None or tool.camera != camera)
+
+
+def _tag_points(context: LawContext, camera: str, frame: Frame) -> FloatArray:
+    """Return where the corners of the target's tag are, wherever it is in the image.
+
+    Raises:
+        InputError: if it is not seen, or is not the only one of its number.
+    """
+    tag = context.cell.target.tag
+    assert tag is not None
+    finder = TagFinder(tag)
+    found = finder.tag(frame)
+    if isinstance(found, str):
+        given = f"{found} by camera {camera} at the start; {finder.seen_instead(frame)}"
+        allowed = f"one marker {tag.id} of {tag.dictionary} in view"
+        raise InputError(str(context.cell.path), "target.tag", Absent(given), allowed)
+    return found.corners_px
 
 
 def _given_points(context: LawContext, camera: str) -> FloatArray | None:

@@ -35,7 +35,7 @@ from vergence.vision.two_view import TwoViewFailure
 def is_by_photograph(cell: Cell) -> bool:
     """Whether a cell's task is to reach what a photograph shows, without known features."""
     task = cell.task
-    if not isinstance(task, ReachTable):
+    if not isinstance(task, ReachTable) or cell.target.tag is not None:
         return False
     return cell.target.features is None or task.goal_deg is None
 
@@ -159,5 +159,7 @@ def with_goal(cell: Cell, photograph: Path) -> Cell:
         "goal": photograph.resolve(),
         "goal_deg": None,
     }
+    if cell.target.tag is not None:  # whose corners are the features
+        return cell.replace(task=goal)
     changed = cell.replace(task=goal, target={"features": None})
     return changed if kept else changed.replace(law={"kind": "image_based"})

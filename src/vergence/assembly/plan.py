@@ -8,11 +8,13 @@ from vergence.assembly.photograph import is_by_photograph, plan_approach
 from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.run import changed_cell
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.tag import Located, located
+from vergence.assembly.tag_reach import plan_tag_reach
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError
+from vergence.planning import Obstacle, PlanFailure
 from vergence.planning import Path as PlannedPath
-from vergence.planning import PlanFailure
 from vergence.simulation import SimulatedDriver
 from vergence.vision.two_view import TwoViewFailure
 
@@ -42,6 +44,11 @@ def plan(
     try:
         started = StartedDriver(driver, loaded.watched)
         context = LawContext.of(loaded, started)
+        if loaded.target.tag is not None:
+            context, outcome = located(context, started) if images else Located(context, None)
+            if outcome is not None:
+                return PlanFailure(Obstacle.START, outcome.reason)
+            return plan_tag_reach(context, loaded.task, started, images)
         if is_by_photograph(loaded):
             return plan_approach(context, loaded.task, started)
         pair = measure_twice(context, loaded.task, started, images)

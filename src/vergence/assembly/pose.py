@@ -8,16 +8,19 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
+from vergence.assembly.tag import TagFinder
 from vergence.cell import Cell
 from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
+    Find,
     HeldTarget,
     IndexSelection,
     InformationSelection,
     Joints,
     Measure,
+    MirrorWatch,
     PerceptionSettings,
     PosePerception,
     TargetFilter,
@@ -61,6 +64,9 @@ def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
     """
     from vergence.vision.known_object import ObjectModel, object_model_of
 
+    if cell.target.tag is not None:
+        name, tag = f"tag {cell.target.tag.id}", cell.target.tag
+        return ObjectModel.from_face(name, tag.corners)
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
     return object_model_of(model.model, "target").with_corners()
@@ -85,6 +91,7 @@ def follow_pose(
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
         "settings": PerceptionSettings(budget=table.budget),
+        "find": _find(context, images),
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
     shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
@@ -100,8 +107,11 @@ def follow_pose(
         start,
         **parts,
     )
+    watched: PosePerception[Any] | MirrorWatch = perception
+    if cell.target.tag is not None:
+        watched = MirrorWatch(perception, rig, surroundings.camera_pose, shape.points)
     tip_pose = surroundings.tip_pose
-    return perception if tip_pose is None else HeldTarget(perception, tip_pose)
+    return watched if tip_pose is None else HeldTarget(watched, tip_pose)
 
 
 def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure:
@@ -109,7 +119,9 @@ def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure
     cell = context.cell
     table = cell.perception
     measure: Measure
-    if images:
+    if images and (tag := cell.target.tag) is not None:
+        measure = TagFinder(tag)
+    elif images:
         measure = CornerWindows(model, context.cameras)
     else:
         measure = ExactCorners(table.noise_px, np.random.default_rng([cell.seed, 3]))
@@ -118,6 +130,12 @@ def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
     return measure
+
+
+def _find(context: LawContext, images: bool) -> Find | None:
+    """Return what finds the target in a whole image, if anything does."""
+    tag = context.cell.target.tag
+    return TagFinder(tag).find if images and tag is not None else None
 
 
 class Surroundings(NamedTuple):

@@ -59,11 +59,11 @@ def with_points(cell: Cell, points_px: Sequence[tuple[float, float]]) -> Cell:
         task = {**cell.task.model_dump(exclude={"tool"}), "points_px": points_px}
         if not isinstance(cell.task.desired, str):  # places of other points
             task |= {"desired": "initial", "approach": "direct"}
-        return cell.replace(task=task, target={"features": None})
+        return cell.replace(task=task, target={"features": None, "tag": None})
     task = {"kind": "track", "arm": cell.task.arm, "camera": cell.task.camera}
     return cell.replace(
         task={**task, "points_px": points_px},
-        target={"features": None},
+        target={"features": None, "tag": None},
         law={"kind": "image_based"},
     )
 

@@ -26,6 +26,7 @@ from vergence.cell.schema import (
     TrackTable,
 )
 from vergence.cell.settings_text import is_whole, settings_text
+from vergence.cell.tagged import check_tag, with_tag
 from vergence.cell.tasks import check_sequence, naming_task, with_first_task
 from vergence.cell.toml_text import read_toml, setting
 from vergence.errors import InputError, KeyConflict, nearest
@@ -156,6 +157,7 @@ def load_cell(
     if seed is not None:
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
+    check_tag(values, str(path))
     return _validate(values, path, text)
 
 
@@ -196,7 +198,7 @@ def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = with_first_task(_with_calibrations(values, path), str(path))
+    values = with_first_task(with_tag(_with_calibrations(values, path)), str(path))
     number = 0 if "tasks" in values else None
     with naming_task(number):
         try:

@@ -14,6 +14,7 @@ from vergence.estimation.history import FilterHistory
 from vergence.estimation.index_selection import IndexSelection
 from vergence.estimation.measure import CameraPose, Find, Joints, Measure
 from vergence.estimation.measured_depth import WithMeasuredDepth, depth_of_points
+from vergence.estimation.mirror_watch import MirrorWatch
 from vergence.estimation.perception import PosePerception
 from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.pose_filter import PoseFilter
@@ -61,6 +62,7 @@ __all__ = [
     "InformationSelection",
     "Joints",
     "Measure",
+    "MirrorWatch",
     "NoPose",
     "PerceptionSettings",
     "PoseFilter",

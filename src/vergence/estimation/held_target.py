@@ -8,6 +8,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.measure import CameraPose, Joints
+from vergence.estimation.mirror_watch import MirrorWatch
 from vergence.estimation.perception import PosePerception
 from vergence.estimation.visibility import Blocked
 from vergence.geometry import se3_compose, se3_inverse, transform_points
@@ -28,7 +29,7 @@ class HeldTarget:
         tip_pose: gives T_world_tip (4, 4) from the joints at the exposure.
     """
 
-    def __init__(self, perception: PosePerception[Any], tip_pose: TipPose) -> None:
+    def __init__(self, perception: PosePerception[Any] | MirrorWatch, tip_pose: TipPose) -> None:
         self._perception, self._tip_pose = perception, tip_pose
 
     @property

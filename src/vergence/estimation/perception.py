@@ -34,7 +34,7 @@ from vergence.estimation.visibility import (
 )
 from vergence.estimation.windows import WindowRule, innovation_spread
 from vergence.geometry import se3_compose, se3_inverse, transform_points
-from vergence.signals import Frame, ImagePoints, Observation
+from vergence.signals import Frame, ImagePoints, Observation, TargetState
 
 DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
 JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
@@ -108,6 +108,11 @@ class PosePerception(Generic[B]):
     def lost(self) -> str:
         """Why the target counts as lost; empty while it is followed."""
         return self._lost
+
+    @property
+    def state(self) -> TargetState:
+        """What is believed after the newest image, as it is handed on."""
+        return state_of(self.belief)
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
         """Return what the images show and where the target is, or None without an image.
@@ -274,11 +279,21 @@ class PosePerception(Generic[B]):
         fit = pose_from_points([view for view in views if view.size])
         if isinstance(fit, NoPose):
             return
-        covariance = np.diag(np.repeat([0.0, 0.0, 0.2, 0.5], 3) ** 2)
-        covariance[:6, :6] = fit.covariance
-        start = self._filter.start(fit.time, fit.T_world_target, covariance=covariance)
+        self.restart(fit.time, fit.T_world_target, fit.covariance)
+
+    def restart(self, time: float, T_world_target: FloatArray, covariance: FloatArray) -> None:
+        """Follow the target from a pose on, whatever was believed before.
+
+        Args:
+            time: of the pose, s.
+            T_world_target: (4, 4).
+            covariance: of (δp, δθ), world axes, (6, 6).
+        """
+        of_all = np.diag(np.repeat([0.0, 0.0, 0.2, 0.5], 3) ** 2)
+        of_all[:6, :6] = covariance
+        start = self._filter.start(time, T_world_target, covariance=of_all)
         self._history = FilterHistory(self._filter, start, self._settings.horizon)
-        self._patience_from, self._lost = fit.time, ""
+        self._patience_from, self._lost = time, ""
 
     def _found(self, frame: Frame) -> View | None:
         assert self._find is not None

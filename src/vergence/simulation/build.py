@@ -15,6 +15,7 @@ from vergence.geometry import matrix_to_quaternion
 from vergence.robot.mesh_files import SHELL
 from vergence.robot.model_files import read_model
 from vergence.simulation.motion import placement_pose
+from vergence.simulation.tag_plate import add_tag
 
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
 _FOLLOWS, _BALL = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtGeom.mjGEOM_SPHERE
@@ -108,7 +109,12 @@ def _add_output(spec: Any, cell: Cell, name: str, output: OutputTable) -> None:
 
 def _add_target(spec: Any, cell: Cell) -> None:
     """Attach the target to the arm that carries it, else to a body that is moved about."""
-    model = _read(cell, "target.model", cell.target.model)
+    target = cell.target
+    model = mujoco.MjSpec()
+    if target.model is not None:
+        model = _read(cell, "target.model", target.model)
+    if target.tag is not None:
+        add_tag(model, target.tag)
     arm = cell.target.carried_by
     if arm is None:
         frame = spec.worldbody.add_body(name="target", mocap=True).add_frame()

@@ -9,6 +9,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera.calibration import Sighting
 from vergence.errors import InputError, nearest
 from vergence.geometry import se3, so3_exp, transform_points
+from vergence.tag_families import tag_family
 from vergence.vision.board_finders import (
     Corners,
     charuco_board,
@@ -51,9 +52,7 @@ class Board:
                 raise InputError("board", key, getattr(self, key), allowed)
         if not 0.0 < self.square_m < 10.0:
             raise InputError("board", "square", self.square_m, "the side of a square in metres")
-        if self.dictionary not in DICTIONARIES:
-            allowed = nearest(self.dictionary, DICTIONARIES)
-            raise InputError("board", "dictionary", self.dictionary, allowed)
+        tag_family(self.dictionary, "board")
         if self.marker_m is not None:
             self._require_marker(self.marker_m)
         elif self.pattern == "squares" and self.columns == self.rows:

@@ -192,6 +192,7 @@ class Studio:
             "carried_by": self.arm if self.fixed else None,
             "motion": {"kind": "stationary"},
             "features": None,
+            "tag": None,
             **_placement(T),
         }
         task = {"kind": "track", "arm": self.arm, "camera": self.name}

@@ -30,6 +30,7 @@ from vergence.cell.schema.tables import (
     ToolTable,
     TrackTable,
 )
+from vergence.cell.schema.tag import TagTable
 
 __all__ = [
     "AdvanceTable",
@@ -53,6 +54,7 @@ __all__ = [
     "SwitchTable",
     "TABLES",
     "Table",
+    "TagTable",
     "TargetTable",
     "Task",
     "TaskTable",
@@ -71,6 +73,7 @@ TABLES: dict[str, type[Table]] = {
     "cameras": CameraTable,
     "collision": CollisionTable,
     "target": TargetTable,
+    "tag": TagTable,
     "track": TrackTable,
     "tool": ToolTable,
     "follow": FollowTable,

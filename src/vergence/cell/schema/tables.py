@@ -29,7 +29,8 @@ from vergence.cell.schema.base import (
     Vector3,
 )
 from vergence.cell.schema.imaging import Imaging
-from vergence.errors import InputError
+from vergence.cell.schema.tag import TagTable
+from vergence.errors import NOTHING, InputError
 from vergence.parts import kind_of
 
 _MOST_WAYPOINTS = 1000
@@ -159,11 +160,21 @@ def _kind(motion: Any) -> Any:
 class TargetTable(Placement):
     """The object; its placement is where it starts, or its pose in the body that carries it."""
 
-    model: Path  # MJCF or URDF
+    model: Path | None = None  # MJCF or URDF; a plate that shows the tag if absent
+    tag: TagTable | None = None  # marker that it carries
     carried_by: Text | None = None  # arm to whose last body it is attached
     motion: Part = "stationary"  # motion of its own
-    # Points in the target's frame, in m; picked in the first image if absent.
+    # Points in the target's frame, in m; the corners of its tag, or picked in the first image, if
+    # absent.
     features: _Features | None = None
+
+    @model_validator(mode="after")
+    def _shown(self) -> "TargetTable":
+        if self.model is None and self.tag is None:
+            raise InputError("", "model", NOTHING, "a value, or a tag")
+        if self.tag is not None:
+            object.__setattr__(self, "features", self.tag.corners)
+        return self
 
     @model_validator(mode="after")
     def _moved_once(self) -> "TargetTable":

@@ -102,6 +102,19 @@ class ObjectModel:
             _frozen_index(np.full((len(places), 1), -1)),
         )
 
+    @classmethod
+    def from_face(cls, name: str, corners: ArrayLike) -> Self:
+        """Make a model of a flat four-sided face that is seen from one side.
+
+        Args:
+            name: what to call it in messages.
+            corners: (4, 3), m, clockwise as seen from that side.
+        """
+        model = cls.from_corners(name, corners)
+        triangles = _frozen_index(np.array([[0, 3, 2], [0, 2, 1]]))
+        normals = triangle_normals(model.vertices, np.asarray(triangles))
+        return replace(model, triangles=triangles, normals=frozen(normals))
+
     def with_corners(self) -> Self:
         """Return the model itself.
 

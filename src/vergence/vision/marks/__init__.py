@@ -3,6 +3,7 @@
 from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector
 from vergence.vision.marks.mark_tracker import MarkTracker
 from vergence.vision.marks.mark_tracking import MarkTracking
+from vergence.vision.marks.one_tag import OneTag, one_tag, seen_instead
 from vergence.vision.marks.round import RoundMarks, circle_centre_bias, measure_round_marks
 from vergence.vision.marks.tag_tracking import TagTracking
 
@@ -12,8 +13,11 @@ __all__ = [
     "MarkTracker",
     "MarkTracking",
     "MarkerDetector",
+    "OneTag",
     "RoundMarks",
     "TagTracking",
     "circle_centre_bias",
     "measure_round_marks",
+    "one_tag",
+    "seen_instead",
 ]

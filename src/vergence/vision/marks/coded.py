@@ -6,24 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray, IntArray
-from vergence.errors import InputError, nearest
+from vergence.errors import InputError
+from vergence.tag_families import TAG_FAMILIES, tag_family
 from vergence.vision.brightness import brightened
 from vergence.vision.marks.tag_corners import refined_corners
 
 _CELL_MARGIN = 0.3  # of a cell, next to its neighbours, that blur spoils and is not read
 
-DICTIONARIES = {
-    "apriltag_16h5": "DICT_APRILTAG_16h5",
-    "apriltag_25h9": "DICT_APRILTAG_25h9",
-    "apriltag_36h10": "DICT_APRILTAG_36h10",
-    "apriltag_36h11": "DICT_APRILTAG_36h11",
-    **{
-        f"aruco_{bits}x{bits}_{count}": f"DICT_{bits}X{bits}_{count}"
-        for bits in (4, 5, 6, 7)
-        for count in (50, 100, 250, 1000)
-    },
-    "aruco_original": "DICT_ARUCO_ORIGINAL",
-}
+DICTIONARIES = {name: family.opencv for name, family in TAG_FAMILIES.items()}
 
 
 class CodedMarks(NamedTuple):
@@ -48,12 +38,10 @@ class MarkerDetector:
     def __post_init__(self) -> None:
         import cv2
 
-        if self.dictionary not in DICTIONARIES:
-            allowed = nearest(self.dictionary, DICTIONARIES)
-            raise InputError("MarkerDetector", "dictionary", self.dictionary, allowed)
+        family = tag_family(self.dictionary, "MarkerDetector")
         if not self.noise_px > 0.0:
             raise InputError("MarkerDetector", "noise_px", self.noise_px, "above zero")
-        known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[self.dictionary]))
+        known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, family.opencv))
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_MARGIN

@@ -7,6 +7,7 @@ from vergence.errors import Absent, InputError
 from vergence.parts import knob, part
 from vergence.vision.image import grey_image
 from vergence.vision.marks.coded import CodedMarks, MarkerDetector
+from vergence.vision.marks.one_tag import tag_among
 from vergence.vision.tracks import PointTracker, Tracks, nothing_found
 
 
@@ -56,15 +57,14 @@ class _TagTracker:
             return nothing_found(self._points, reason)
         seen = self._detector.detect(grey)
         lost = nothing_found(self._points.copy(), "")
-        rows = {number: row for row, number in enumerate(seen.ids.tolist())}
         reasons = []
         for j, (number, corner) in enumerate(self._corners):
-            row = rows.get(number)
-            reasons.append("" if row is not None else f"marker {number} is not seen")
-            if row is not None:
+            tag = tag_among(seen, number)
+            reasons.append(tag if isinstance(tag, str) else "")
+            if not isinstance(tag, str):
                 lost.found[j] = True
-                lost.points_px[j] = seen.corners_px[row, corner]
-                lost.covariance_px[j] = seen.covariance_px[row, corner]
+                lost.points_px[j] = tag.corners_px[corner]
+                lost.covariance_px[j] = tag.covariance_px[corner]
         self._points = lost.points_px
         return lost._replace(reasons=tuple(reasons))
 

@@ -1,0 +1,155 @@
+"""A target that carries a tag: found by the tag in the first images, and measured by it."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import FloatArray, IntArray
+from vergence.assembly.law_context import LawContext
+from vergence.assembly.started_driver import StartedDriver
+from vergence.cell.schema import AdvanceTable, SwitchTable, TagTable
+from vergence.errors import Absent, InputError
+from vergence.estimation import NoPose, PoseFit, pose_from_points, view_of
+from vergence.geometry import matrix_to_rpy
+from vergence.signals import Frame, ImagePoints, Outcome, OutcomeKind
+from vergence.vision.marks import MarkerDetector, OneTag, one_tag, seen_instead
+
+_COUNT = 4
+_KNOWN = 3.0  # standard deviations of the first pose that the start is believed to
+
+
+class TagFinder:
+    """Finds a tag in whole images; a `Measure` and a `Find` of perception.
+
+    Args:
+        tag: which.
+    """
+
+    def __init__(self, tag: TagTable) -> None:
+        self._detector, self._tag = MarkerDetector(tag.dictionary), tag
+
+    def tag(self, frame: Frame) -> OneTag | str:
+        """Return the tag, or why it is not found."""
+        assert frame.image is not None
+        return one_tag(self._detector, frame.image, self._tag.id)
+
+    def seen_instead(self, frame: Frame) -> str:
+        """Return in words which markers an image shows."""
+        assert frame.image is not None
+        return seen_instead(self._detector, frame.image)
+
+    def __call__(
+        self,
+        frame: Frame,
+        features: IntArray,
+        points_px: FloatArray,
+        half_px: FloatArray,
+        T_camera_target: FloatArray,
+    ) -> ImagePoints:
+        """Return the corners asked for, see `vergence.estimation.Measure`.
+
+        They are looked for in the whole image: a number tells the tag from all else.
+        """
+        found = self.find(frame)
+        if found is None:
+            return _none(frame, len(features), str(self.tag(frame)))
+        return ImagePoints(
+            frame.camera,
+            frame.time,
+            found.points_px[features],
+            found.covariance_px[features],
+            found.found[features],
+            ("",) * len(features),
+        )
+
+    def find(self, frame: Frame) -> ImagePoints | None:
+        """Return all corners wherever they are in an image, or None."""
+        tag = self.tag(frame)
+        if isinstance(tag, str):
+            return None
+        seen = np.ones(_COUNT, dtype=np.bool_)
+        reasons = ("",) * _COUNT
+        return ImagePoints(frame.camera, frame.time, *tag, seen, reasons)
+
+
+class Located(NamedTuple):
+    """A cell whose target is where its tag was found, or why the task ends before it begins."""
+
+    context: LawContext
+    outcome: Outcome | None
+
+
+def located(context: LawContext, driver: StartedDriver) -> Located:
+    """Put the target of a cell where the first images show its tag.
+
+    Nothing but its carrier knows where a target is that an arm holds; there its placement counts,
+    and so it does in a task that does not look.
+
+    Raises:
+        InputError: if no camera shows the tag.
+    """
+    cell = context.cell
+    idle = isinstance(cell.task, AdvanceTable | SwitchTable)
+    if cell.target.tag is None or cell.target.carried_by is not None or idle:
+        return Located(context, None)
+    fit = _first_pose(context, driver, TagFinder(cell.target.tag))
+    if isinstance(fit, NoPose):
+        # For points in an image it matters little which of two poses it is: their depth is the
+        # same to some percent.
+        if not fit.alternatives or cell.task.kind == "follow":
+            return Located(context, Outcome(OutcomeKind.TARGET_LOST, fit.reason, 0.0))
+        fit = fit.alternatives[0]
+    return Located(_placed(context, fit), None)
+
+
+def _first_pose(context: LawContext, driver: StartedDriver, finder: TagFinder) -> PoseFit | NoPose:
+    """Return the pose of the target by the first images of all cameras."""
+    from vergence.assembly.pose import camera_poses
+
+    tag, source = context.cell.target.tag, str(context.cell.path)
+    assert tag is not None
+    camera_pose, views = camera_poses(context), []
+    for name, frame in driver.frames.items():
+        found = finder.find(frame)
+        if found is not None:
+            T_world_camera = camera_pose(name, frame.joints)
+            points = np.array(tag.corners)
+            views.append(view_of(found, context.cameras[name], T_world_camera, points))
+    if views:
+        return pose_from_points(views)
+    frame = driver.frames[context.cell.task.camera]
+    why = f"{finder.tag(frame)} by camera {frame.camera} at the start; "
+    given = Absent(why + finder.seen_instead(frame))
+    allowed = f"one marker {tag.id} of {tag.dictionary} in view"
+    raise InputError(source, "target.tag", given, allowed)
+
+
+def _placed(context: LawContext, fit: PoseFit) -> LawContext:
+    """Return the context with the target at a pose, known as well as it is."""
+    T, deviations = fit.T_world_target, np.sqrt(np.diag(fit.covariance))
+    yaw, pitch, roll = np.degrees(matrix_to_rpy(np.ascontiguousarray(T[:3, :3]))).tolist()
+    target = context.cell.target.model_copy(
+        update={
+            "position_m": tuple(T[:3, 3].tolist()),
+            "rotation_rpy_deg": (roll, pitch, yaw),
+        }
+    )
+    perception = context.cell.perception.model_copy(
+        update={
+            "start_error_m": _KNOWN * float(deviations[:3].max()),
+            "start_error_deg": _KNOWN * float(np.rad2deg(deviations[3:].max())),
+        }
+    )
+    context.model.move_target(T)
+    context.model.update()
+    cell = context.cell.model_copy(update={"target": target, "perception": perception})
+    return replace(context, cell=cell)
+
+
+def _none(frame: Frame, count: int, why: str) -> ImagePoints:
+    """Return points of which none is found."""
+    return ImagePoints(
+        frame.camera, frame.time, np.full((count, 2), np.nan), np.tile(np.eye(2), (count, 1, 1)),
+        np.zeros(count, dtype=np.bool_), (why,) * count,
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+"""A flat target's second pose, kept in mind while images cannot exclude it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vergence.arrays import FloatArray
+from vergence.estimation.measure import CameraPose
+from vergence.estimation.measurement import POSE
+from vergence.estimation.perception import PosePerception
+from vergence.estimation.pose_minima import APART_RAD, PoseMinimum, pose_minima
+from vergence.estimation.recovery import LEAST_POINTS, RIVAL
+from vergence.estimation.rig import CameraRig
+from vergence.estimation.view import Seen, together, view_of
+from vergence.geometry import so3_log
+from vergence.signals import Frame, Observation, TargetState
+
+_MOST = 2.0 * RIVAL  # evidence beyond which more changes nothing
+_INDEPENDENT = 0.5  # of each image's evidence: errors of images in a row are partly the same
+_MOST_OF_ONE = 3.0  # evidence of one image: a single bad one decides nothing
+
+
+class MirrorWatch:
+    """Watches over a perception of a flat target that an image fits in two poses.
+
+    The second pose is the first mirrored in depth. Once images have excluded it, it stays excluded
+    for as long as the two poses are apart: nothing turns from one into the other. Where they meet,
+    the target seen straight on, the target may leave on either side. The filter goes on with one
+    of them, and this class adds up what each image says for it: the difference in χ² of the two.
+    Until that is odds of a thousand to one, the stated covariance reaches from one pose to the
+    other; if it is odds against, the filter begins again at the other.
+
+    Args:
+        perception: of the target, which is watched.
+        rig: its cameras.
+        camera_pose: gives the pose of a camera from the joints at the exposure.
+        points: the target's features, (M, 3), m, in one plane.
+    """
+
+    def __init__(
+        self,
+        perception: PosePerception[Any],
+        rig: CameraRig,
+        camera_pose: CameraPose,
+        points: FloatArray,
+    ) -> None:
+        self._perception, self._rig, self._camera_pose = perception, rig, camera_pose
+        self._points = points
+        self._evidence = _MOST  # for the filter's pose; a start is certain
+
+    @property
+    def lost(self) -> str:
+        """Why the target counts as lost; empty while it is followed."""
+        return self._perception.lost
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the images show and where the target is, or None without an image."""
+        observation = self._perception.observe(frames)
+        if observation is None:
+            return None
+        if observation.target is None:
+            self._evidence = _MOST  # it is found again by images that decide
+            return observation
+        seen = self._seen(frames, observation)
+        if seen.size < LEAST_POINTS:
+            return self._with_doubt(observation, None)
+        own, rival = _two_poses(seen, observation.target.T_world_target)
+        if own is None or rival is None:
+            self._evidence = 0.0
+            return observation
+        scale = max(1.0, min(own.square, rival.square) / max(2 * seen.size - POSE, 1))
+        said = _INDEPENDENT * (rival.square - own.square) / scale
+        said = np.clip(said, -_MOST_OF_ONE, _MOST_OF_ONE)
+        self._evidence = float(np.clip(self._evidence + said, -_MOST, _MOST))
+        if self._evidence <= -RIVAL:
+            self._perception.restart(
+                seen.time, rival.pose, scale * np.asarray(np.linalg.inv(rival.information))
+            )
+            self._evidence, rival = 0.0, own  # so the pose that was given up is in its reach
+            observation = replace(observation, target=self._perception.state)
+        return self._with_doubt(observation, rival)
+
+    def _seen(self, frames: Sequence[Frame], observation: Observation) -> Seen:
+        """Return the points that the images show."""
+        joints = {(frame.camera, frame.time): frame.joints for frame in frames}
+        views = []
+        for view in observation.views:
+            camera = self._rig.cameras[self._rig.numbers[view.camera]]
+            pose = self._camera_pose(view.camera, joints[view.camera, view.time])
+            views.append(view_of(view, camera, pose, self._points))
+        return together(views)
+
+    def _with_doubt(self, observation: Observation, rival: PoseMinimum | None) -> Observation:
+        """Return the observation, its covariance as wide as the other pose is away if need be."""
+        target = observation.target
+        if rival is None or target is None or self._evidence >= RIVAL:
+            return observation
+        return replace(observation, target=_reaching(target, rival.pose))
+
+
+def _two_poses(seen: Seen, believed: FloatArray) -> tuple[PoseMinimum | None, PoseMinimum | None]:
+    """Return the minimum next to a pose (4, 4), and the best of the others."""
+    minima = pose_minima(seen, believed)
+    if not minima:
+        return None, None
+    own = min(minima, key=lambda minimum: _turned(minimum.pose, believed))
+    others = [m for m in minima if m is not own and _turned(m.pose, own.pose) > APART_RAD]
+    return own, others[0] if others else None
+
+
+def _turned(T_a: FloatArray, T_b: FloatArray) -> float:
+    """Return the angle between the orientations of two poses, rad."""
+    return float(np.linalg.norm(so3_log(np.ascontiguousarray(T_a[:3, :3] @ T_b[:3, :3].T))))
+
+
+def _reaching(target: TargetState, other: FloatArray) -> TargetState:
+    """Return a state whose covariance has a pose (4, 4) within one standard deviation."""
+    T = target.T_world_target
+    away = np.zeros(len(target.covariance))
+    away[:3] = other[:3, 3] - T[:3, 3]
+    away[3:6] = so3_log(np.ascontiguousarray(other[:3, :3] @ T[:3, :3].T))
+    return replace(target, covariance=target.covariance + np.outer(away, away))
