@@ -182,7 +182,10 @@ def reproduce(
     ],
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Use exact projections instead of images: about a minute."),
+        typer.Option(
+            "--quick",
+            help="Fewer runs, and exact projections instead of images: a few minutes at most.",
+        ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     seeds: Annotated[

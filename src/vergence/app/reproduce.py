@@ -12,7 +12,7 @@ from vergence.studies.reproduce import PAPERS
 if TYPE_CHECKING:
     from vergence.studies import StudyResult
 
-QUICK = "quick: on exact projections instead of images"
+QUICK = "quick: fewer runs, and exact projections where images would be rendered"
 FEWER = "quick: fewer and shorter runs"
 
 
