@@ -4,8 +4,10 @@ import time
 
 import pytest
 from numba import njit
+from numba.core import event
 
 from vergence.app import heartbeat
+from vergence.app.compilations import Compilations
 from vergence.app.progress import bar, working
 
 
@@ -45,6 +47,25 @@ def test_what_is_left_is_told_at_the_pace_of_the_whole(capsys: pytest.CaptureFix
         words = capsys.readouterr().err.splitlines()[-1]
         left = float(words.removesuffix(" s left").rpartition(" ")[2])
         assert left > 300.0  # 0.2 s for two: 400 s
+
+
+def test_what_compiling_takes_does_not_count_in_the_pace(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with bar("{task.completed} of {task.total} runs") as progress, Compilations() as beside:
+        task = progress.add_task("runs", total=1000)
+        event.start_event("numba:compile")
+        wait_for("runs: 0 of 1000 runs, 0 s so far, compiling kernels, once on", capsys)
+        event.end_event("numba:compile")
+        assert beside.count == 1
+        assert not beside.under_way
+        time.sleep(0.05)
+        progress.advance(task)
+        left_s = float(progress.rest(progress.tasks[0]).removesuffix(" s left"))
+        assert left_s < 1.0 + 999.0 * (progress.tasks[0].elapsed - beside.spent_s)
+        progress.begin()
+        from_here_s = float(progress.rest(progress.tasks[0]).removesuffix(" s left"))
+        assert from_here_s < left_s
 
 
 def test_compilation_is_told_while_it_lasts(capsys: pytest.CaptureFixture[str]) -> None:

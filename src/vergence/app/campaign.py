@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vergence.app import markup
-from vergence.app.compilations import Compilations
 from vergence.app.output import FAILURE, warn
-from vergence.app.progress import COMPILING, bar
+from vergence.app.progress import bar
 from vergence.app.report import REPORT
 from vergence.errors import InputError
 
@@ -91,20 +90,16 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
         def show(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total, description="runs")
 
-        def compiling(count: int) -> None:
-            progress.update(task, description=f"runs ({COMPILING}, {count} so far)")
-
         try:
-            with Compilations(compiling):
-                return run_campaign(
-                    source,
-                    trials,
-                    how.folder,
-                    executor=Executor(how.options.workers, how.options.scheduler),
-                    tolerance_px=how.tolerance_px,
-                    physics=how.options.physics,
-                    progress=show,
-                )
+            return run_campaign(
+                source,
+                trials,
+                how.folder,
+                executor=Executor(how.options.workers, how.options.scheduler),
+                tolerance_px=how.tolerance_px,
+                physics=how.options.physics,
+                progress=show,
+            )
         except KeyboardInterrupt:
             warn(f"interrupted: repeat the command with --out {how.folder} to resume")
             raise SystemExit(FAILURE) from None

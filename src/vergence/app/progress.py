@@ -5,74 +5,32 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from vergence.app.compilations import Compilations
+from vergence.app.compilations import COMPILING, Compilations
 from vergence.app.heartbeat import Heartbeat
 from vergence.runtime import RunInfo, TickRecord
 from vergence.signals import Outcome
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import TaskID
+
+    from vergence.app.bar import Bar
 
 _PERIOD = 0.1  # s between two looks at the terminal
-COMPILING = "compiling kernels, once on this computer"
 
 
-def bar(words: str) -> "Progress":
-    """Return a progress bar on stderr; where it is no terminal, a line every ten seconds.
+def bar(words: str) -> "Bar":
+    """Return a progress bar, which costs the import of rich.
 
     Args:
-        words: what stands beside the bar, as rich's `TextColumn` formats it.
+        words: what stands beside it, as rich's `TextColumn` formats it.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
-    from rich.text import Text
+    from vergence.app.bar import Bar
 
-    class Remaining(ProgressColumn):
-        def render(self, task: Any) -> Text:
-            return Text(_remaining(task), style="progress.remaining")
-
-    class Bar(Progress):
-        heartbeat: Heartbeat
-
-        def start(self) -> None:
-            self.heartbeat.start()
-            super().start()
-
-        def stop(self) -> None:
-            super().stop()
-            self.heartbeat.stop()
-
-    progress = Bar(
-        TextColumn("[bold]{task.description}"),
-        BarColumn(bar_width=30),
-        TextColumn(words),
-        Remaining(),
-        console=Console(stderr=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    )
-    progress.heartbeat = Heartbeat(lambda: "\n".join(_line(task, words) for task in progress.tasks))
-    return progress
-
-
-def _line(task: Any, words: str) -> str:
-    """Return what a bar shows of a task, in words."""
-    told = (words.format(task=task), f"{task.elapsed:.0f} s so far", _remaining(task))
-    return f"{task.description}: {', '.join(filter(None, told))}"
-
-
-def _remaining(task: Any) -> str:
-    """Return how long the rest takes at the pace of the whole so far; empty before any is done.
-
-    Rich's own estimate is the pace of the newest steps, which may have come all at once.
-    """
-    if not task.completed or not task.total:
-        return ""
-    return f"{task.elapsed * (task.total / task.completed - 1.0):.0f} s left"
+    return Bar(words)
 
 
 @contextmanager
@@ -103,10 +61,8 @@ class RunProgress:
         self._duration_s = duration_s
         self._task: TaskID = self._bar.add_task("prepare", total=None, state="")
         self._began = self._shown = time.perf_counter()
-        self._compilations = Compilations(self._compiling)
 
     def __enter__(self) -> Self:
-        self._compilations.__enter__()
         self._bar.start()
         return self
 
@@ -117,12 +73,12 @@ class RunProgress:
         traceback: TracebackType | None,
     ) -> None:
         self._bar.stop()
-        self._compilations.__exit__(kind, error, traceback)
 
     def begin(self, info: RunInfo) -> None:
         """Start the clock: what came before was preparation."""
         self._began = time.perf_counter()
         self._bar.update(self._task, description=info.cell)
+        self._bar.begin()
 
     def tick(self, record: TickRecord) -> None:
         """Show a tick, unless one was shown just now."""
@@ -146,9 +102,6 @@ class RunProgress:
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
         """Nothing to add: the command says how it ended."""
-
-    def _compiling(self, count: int) -> None:
-        self._bar.update(self._task, state=f"{COMPILING}: {count} so far")
 
 
 def _state(record: TickRecord) -> str:
