@@ -27,6 +27,7 @@ HALF_PX = 0.5
 CASES: Mapping[str, Spoil] = {
     **SPOILS,
     "blurred, σ 3 px": blurred(3.0),
+    "blurred, σ 4 px": blurred(4.0),
     "a tenth of the light": darkened(0.1),
 }
 

@@ -133,6 +133,15 @@ def test_a_marker_in_the_dark_is_found(light: float) -> None:
     np.testing.assert_allclose(marks.corners_px[0], QUAD, atol=0.6)
 
 
+def test_a_marker_far_out_of_focus_is_found_once_and_says_how_uncertain_its_corners_are() -> None:
+    blurred = cv2.GaussianBlur(marker_image(23, QUAD), (0, 0), 4.0)
+    marks = MarkerDetector("apriltag_36h11").detect(blurred)
+    assert marks.ids.tolist() == [23]
+    off = marks.corners_px[0] - QUAD
+    squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(marks.covariance_px[0]), off)
+    assert squares.max() < 9.0
+
+
 def test_a_window_keeps_the_pixels_of_the_image() -> None:
     detector, image = MarkerDetector("apriltag_36h11"), marker_image(7, QUAD)
     whole, part = detector.detect(image), detector.detect(image, (80, 40, 230, 190))

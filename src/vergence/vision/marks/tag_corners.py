@@ -9,11 +9,13 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 
-_ENDS = 0.14  # of a side, next to its corners, that is left out: blur rounds it
+_ENDS = 0.08  # of a side, next to its corners, that is left out: blur rounds it
 _CELL = 0.1  # of a side: the marker's border is at least this wide
 _STEP_PX = 0.25  # between samples of a profile
 _LEAST_PX, _MOST_PX = 2.0, 7.0  # how far to both sides a profile reaches
 _PROFILES = (8, 48)  # fewest and most of a side
+_ACROSS, _ALONG = 2.0, 1.5  # smoothing against noise: samples of a profile, and profiles
+_TOGETHER = 2.0 * np.sqrt(np.pi) * _ALONG  # profiles that this makes alike
 _FLOOR_PX = 0.03  # standard deviation of a line: aliasing and lens, which do not average out
 _APART = 0.024  # of a side: a step that is wider takes in what lies behind the border
 _PULL = 0.8  # of what it is wider, by which that may move the line
@@ -60,8 +62,9 @@ def _side(image: ImageArray, corners: FloatArray, k: int) -> tuple[FloatArray, f
     offset = np.arange(-reach, reach + _STEP_PX / 2, _STEP_PX)
     places = a + t[:, None, None] * (b - a) + offset[:, None] * n
     xy = np.asarray(places, np.float32)
-    profiles = cv2.remap(image, xy[..., 0], xy[..., 1], cv2.INTER_LINEAR)
-    rise = np.maximum(np.diff(np.asarray(profiles, np.float64), axis=1), 0.0)
+    profiles = cv2.remap(image.astype(np.float32), xy[..., 0], xy[..., 1], cv2.INTER_LINEAR)
+    profiles = cv2.GaussianBlur(profiles, (0, 0), sigmaX=_ACROSS, sigmaY=_ALONG)
+    rise = np.maximum(np.diff(profiles.astype(np.float64), axis=1), 0.0)
     centres = 0.5 * (offset[1:] + offset[:-1])
     middle = _centroid(rise.mean(axis=0), centres)
     near = np.abs(centres - middle) <= 0.75 * reach
@@ -73,7 +76,7 @@ def _side(image: ImageArray, corners: FloatArray, k: int) -> tuple[FloatArray, f
         return n, np.nan, np.full(2, np.nan)
     solution, *_ = np.linalg.lstsq(design, found[keep], rcond=None)
     residual = found[keep] - design @ solution
-    variance = float(residual @ residual) / max(len(residual) - 2, 1)
+    variance = _TOGETHER * float(residual @ residual) / max(len(residual) - 2, 1)
     C = variance * np.linalg.inv(design.T @ design)
     ends = np.array([(1.0, 0.0), (1.0, 1.0)])
     mean = rise[:, near].mean(axis=0)
