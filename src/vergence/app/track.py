@@ -14,8 +14,10 @@ from vergence.signals import Outcome, OutcomeKind
 if TYPE_CHECKING:
     from vergence.app.options import TrackOptions
     from vergence.app.tracking.footage import Footage, FootageFrame
+    from vergence.app.tracking.tag_follower import TagFollower
     from vergence.arrays import ImageArray
     from vergence.camera import Camera
+    from vergence.cell.schema import TagTable
     from vergence.estimation.hypothesis_follower import HypothesisFollower
     from vergence.estimation.object_follower import FollowRule, ObjectTracker, Step
     from vergence.vision.known_object import ObjectModel
@@ -47,14 +49,19 @@ class Tracked(NamedTuple):
 def track(options: "TrackOptions") -> int:
     """Follow an object through footage into a run folder; return the exit code."""
     from vergence.app.tracking.footage import open_footage
-    from vergence.vision.known_object import load_object_model
 
-    model = load_object_model(options.model, options.scale)
+    tag = _tag(options)
+    model = None if tag is not None else _model(options)
     footage = open_footage(options.images, options.rate, options.topic)
     frames = footage.frames()
     first = next(frames)
     camera = _camera(options, first)
-    follower = _follower(options, model, camera, footage, first)
+    follower: HypothesisFollower | TagFollower
+    if tag is not None:
+        follower = _tag_follower(tag, camera)
+    else:
+        assert model is not None
+        follower = _follower(options, model, camera, footage, first)
     folder = options.out or new_folder(f"track-{Path(options.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
     run = _Run(folder, footage, camera, follower, options.overlay)
@@ -65,6 +72,46 @@ def track(options: "TrackOptions") -> int:
     else:
         _tell(tracked, files, folder)
     return SUCCESS if tracked.outcome.succeeded else FAILURE
+
+
+def _tag(options: "TrackOptions") -> "TagTable | None":
+    """Return the tag that is followed, None for an object with a model.
+
+    Raises:
+        InputError: if it is none, or stands beside options that have no use for it.
+    """
+    from vergence.app.tracking.tag_follower import tag_of_option
+    from vergence.errors import InputError
+
+    if options.tag is None:
+        return None
+    fields = type(options).__dataclass_fields__
+    for key in ("model", "start", "scale", "contrast", "jolt", "share", "by"):
+        if (given := getattr(options, key)) != fields[key].default:
+            raise InputError("track", f"--{key}", given, "none beside --tag, which needs none")
+    return tag_of_option(options.tag)
+
+
+def _tag_follower(tag: "TagTable", camera: "Camera") -> "TagFollower":
+    from vergence.app.tracking.tag_follower import TagFollower
+
+    return TagFollower(tag, camera)
+
+
+def _model(options: "TrackOptions") -> "ObjectModel":
+    """Return the object that is followed.
+
+    Raises:
+        InputError: if no model is given, or no start.
+    """
+    from vergence.errors import NOTHING, InputError
+    from vergence.vision.known_object import load_object_model
+
+    if options.model is None:
+        raise InputError("track", "--model", NOTHING, "--model with --start, or --tag")
+    if options.start is None:
+        raise InputError("track", "--start", NOTHING, "the object's pose in the first image")
+    return load_object_model(options.model, options.scale)
 
 
 def _camera(options: "TrackOptions", first: "FootageFrame") -> "Camera":
@@ -100,6 +147,7 @@ def _follower(
     if share is not None and not 0.2 <= share <= 1.0:
         allowed = "0.2 … 1: with less of it an object cannot be distinguished from its background"
         raise InputError("track", "--share", share, allowed)
+    assert options.start is not None
     starts = starting_poses(options.start, camera)
     tracker, usual = _tracker(options, model, first)
     rule = replace(usual, jolt_px=options.jolt)
@@ -137,7 +185,7 @@ class _Run:
         folder: Path,
         footage: "Footage",
         camera: "Camera",
-        follower: "HypothesisFollower",
+        follower: "HypothesisFollower | TagFollower",
         overlay: bool,
     ) -> None:
         from vergence.app.tracking.film import Film
@@ -221,7 +269,9 @@ class _Run:
             self._key_frames.append(path)
 
 
-def _summary(steps: "list[Step]", took: list[float], follower: "HypothesisFollower") -> Tracked:
+def _summary(
+    steps: "list[Step]", took: list[float], follower: "HypothesisFollower | TagFollower"
+) -> Tracked:
     from vergence.estimation.object_follower import Sighting
 
     seen = [step for step in steps if step.sighting is Sighting.SEEN]
@@ -271,6 +321,7 @@ def _answer(
         "command": "track",
         "images": options.images,
         "model": options.model,
+        "tag": options.tag,
         "outcome": {
             "kind": outcome.kind.value,
             "reason": outcome.reason,

@@ -19,7 +19,8 @@ from vergence.signals import Frame, Observation, TargetState
 
 _MOST = 2.0 * RIVAL  # evidence beyond which more changes nothing
 _INDEPENDENT = 0.5  # of each image's evidence: errors of images in a row are partly the same
-_MOST_OF_ONE = 3.0  # evidence of one image: a single bad one decides nothing
+_CLEAR = 3.0 * RIVAL  # χ² by which one image alone excludes the other pose
+_MOST_OF_ONE = 3.0  # evidence of any other image: a bad one decides nothing
 
 
 class MirrorWatch:
@@ -49,15 +50,22 @@ class MirrorWatch:
         self._perception, self._rig, self._camera_pose = perception, rig, camera_pose
         self._points = points
         self._evidence = _MOST  # for the filter's pose; a start is certain
+        self._doubtful = False
 
     @property
     def lost(self) -> str:
         """Why the target counts as lost; empty while it is followed."""
         return self._perception.lost
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether the last images left a second pose open."""
+        return self._doubtful
+
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
         """Return what the images show and where the target is, or None without an image."""
         observation = self._perception.observe(frames)
+        self._doubtful = False
         if observation is None:
             return None
         if observation.target is None:
@@ -71,8 +79,8 @@ class MirrorWatch:
             self._evidence = 0.0
             return observation
         scale = max(1.0, min(own.square, rival.square) / max(2 * seen.size - POSE, 1))
-        said = _INDEPENDENT * (rival.square - own.square) / scale
-        said = np.clip(said, -_MOST_OF_ONE, _MOST_OF_ONE)
+        more = (rival.square - own.square) / scale
+        said = _MOST if more > _CLEAR else np.clip(_INDEPENDENT * more, -_MOST_OF_ONE, _MOST_OF_ONE)
         self._evidence = float(np.clip(self._evidence + said, -_MOST, _MOST))
         if self._evidence <= -RIVAL:
             self._perception.restart(
@@ -97,6 +105,7 @@ class MirrorWatch:
         target = observation.target
         if rival is None or target is None or self._evidence >= RIVAL:
             return observation
+        self._doubtful = True
         return replace(observation, target=_reaching(target, rival.pose))
 
 

@@ -23,14 +23,22 @@ class TrackOptions:
     """Which footage, which object, and how it is followed."""
 
     images: Annotated[str, typer.Argument(help="A folder of images, a video, or a ROS 2 bag.")]
-    model: Annotated[str, typer.Option(help="The object: an OBJ, STL or MJCF file.")]
+    model: Annotated[str | None, typer.Option(help="The object: an OBJ, STL or MJCF file.")] = None
+    tag: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DICTIONARY:ID:SIZE",
+            help="Instead of --model: a marker, such as apriltag_36h11:7:0.05, its side in metres; "
+            "it needs no --start.",
+        ),
+    ] = None
     start: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="The object's pose in the camera, in the first image: "
             "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file."
         ),
-    ]
+    ] = None
     camera: Annotated[
         Path | None,
         typer.Option(help="Camera file with the intrinsics: TOML, JSON or YAML, including ROS's."),

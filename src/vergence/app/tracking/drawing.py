@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.overlay import DESIRED, FOUND, LOST
+from vergence.app.tracking.tag_follower import Shown
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
@@ -25,7 +26,7 @@ _COLORS = {
 
 
 def draw_step(
-    image: ImageArray, step: Step, tracker: ObjectTracker, camera: Camera
+    image: ImageArray, step: Step, tracker: ObjectTracker | Shown, camera: Camera
 ) -> NDArray[np.uint8]:
     """Return the image in colour with the object's outline or visible edges, and axes, over it.
 

@@ -113,7 +113,15 @@ class ObjectModel:
         model = cls.from_corners(name, corners)
         triangles = _frozen_index(np.array([[0, 3, 2], [0, 2, 1]]))
         normals = triangle_normals(model.vertices, np.asarray(triangles))
-        return replace(model, triangles=triangles, normals=frozen(normals))
+        sides = np.stack((model.corners, np.roll(model.corners, -1, axis=0)), axis=1)
+        both = np.stack((normals[0], -normals[0]))
+        return replace(
+            model,
+            triangles=triangles,
+            normals=frozen(normals),
+            edges=frozen(sides),
+            edge_normals=frozen(np.tile(both, (len(sides), 1, 1))),
+        )
 
     def with_corners(self) -> Self:
         """Return the model itself.
