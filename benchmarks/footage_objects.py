@@ -6,6 +6,7 @@ starting pose on, a cube cannot turn by a quarter between two images. Images tha
 or hidden have the same true poses. The rendered castle comes with true poses.
 
 Right is a pose that puts the corners within 4 px of where the reference puts them, on average.
+Others are wrong if they lie beyond what is stated of them, or nothing is stated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from footage_rows import Row, median, missing
+from footage_rows import Row, beyond, median, missing, over_stated
 from object_judge import explained, shift_px
 from real_images import (
     CUBE,
@@ -35,6 +36,7 @@ from vergence.camera import Camera
 from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import Sighting
 from vergence.vision.known_object import EdgeTracker, ObjectModel
+from vergence.vision.known_object.pose_fit import pose_difference
 from visp_tracker import PROGRAM, VispTracker
 
 RIGHT_PX = 4.0
@@ -62,6 +64,7 @@ class Answers(NamedTuple):
 
     poses: list[FloatArray]
     told: list[bool]  # whether it says that it sees the object
+    covariances: list[FloatArray]  # (6, 6) of (δp, δθ); empty if it states none
 
 
 def ours(known: KnownObject, images: Sequence[ImageArray]) -> Answers:
@@ -73,6 +76,7 @@ def ours(known: KnownObject, images: Sequence[ImageArray]) -> Answers:
     return Answers(
         [step.T_camera_target for step in steps],
         [step.sighting is Sighting.SEEN for step in steps],
+        [step.covariance[:6, :6] for step in steps],
     )
 
 
@@ -112,19 +116,20 @@ def box(T: FloatArray, model: ObjectModel, camera: Camera) -> tuple[float, float
 
 def row(case: str, who: str, answers: Answers, known: KnownObject, truth: Reference) -> Row:
     """Count what a tracker says beside the reference."""
-    off, lost = [], 0
     model, camera = known.model, known.camera
-    for T, told, T_true, sure in zip(*answers, *truth, strict=True):
-        if not sure:
-            continue
-        if told:
-            off.append(shift_px(T, T_true, model, camera))
-        else:
-            lost += 1
-    right = [each for each in off if each <= RIGHT_PX]
+    told = [k for k, seen in enumerate(answers.told) if seen and truth.known[k]]
+    pairs = [(answers.poses[k], truth.poses[k]) for k in told]
+    off = np.array([shift_px(T, T_true, model, camera) for T, T_true in pairs])
+    right, wrong, stated = off[off <= RIGHT_PX], off > RIGHT_PX, None
+    if answers.covariances and pairs:
+        errors = np.array([pose_difference(T, T_true) for T, T_true in pairs])
+        covariances = np.array([answers.covariances[k] for k in told])
+        stated = over_stated(errors, covariances)
+        wrong &= beyond(errors, covariances)
+    total = sum(truth.known)
     return Row(
-        "objects", case, who, len(off) + lost, len(right), len(off) - len(right), lost,
-        median(right), "px",
+        "objects", case, who, total, len(right), int(wrong.sum()), total - len(told),
+        median(right), "px", stated,
     )  # fmt: skip
 
 
@@ -152,7 +157,7 @@ def rows_of_case(
             peers = []
             for visp_case, who in VISP_CASES.items() if visp else ():
                 seen = visp.follow(visp_case, step)
-                answers = Answers(seen.poses, [not lost for lost in seen.lost])
+                answers = Answers(seen.poses, [not lost for lost in seen.lost], [])
                 peers.append(row(name, who, answers, known, chosen))
             rows += [aimed(own, peers), *(peers or [missing("objects", name, INSTALL_VISP)])]
     return rows

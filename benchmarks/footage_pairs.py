@@ -19,7 +19,7 @@ import numpy as np
 
 from footage_boards import BOARD
 from footage_objects import reference
-from footage_rows import Row, median
+from footage_rows import Row, beyond, median
 from real_images import CUBE, IMAGES, read_grey
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.camera import Camera
@@ -30,7 +30,6 @@ from vergence.vision.matching.compare import FEWEST, NOISE_PX
 from vergence.vision.two_view import TwoView, estimate_two_view
 
 RIGHT_DEG = 5.0
-BEYOND = 5.0  # deviations
 THINGS = (
     "cube/image.0000.pgm", "mire-2/image.0001.pgm", "Klimt/Klimt.pgm", "calibration/grid36-01.pgm",
     "Solvay/Solvay_conference_1927_Version2_640x440.png", "AprilTag/AprilTag.pgm",
@@ -157,7 +156,7 @@ def row(case: str, who: str, ask: Callable[[Pair], list[Motion]], pairs: Sequenc
             right.append(min(off))
         else:
             lost += not found
-            wrong += bool(found) and all(beyond(motion, pair) for motion in found)
+            wrong += bool(found) and all(unstated(motion, pair) for motion in found)
     return Row("pairs", case, who, len(pairs), len(right), wrong, lost, median(right), "°")
 
 
@@ -173,12 +172,12 @@ def apart_deg(motion: Motion, pair: Pair) -> float:
     return float(np.rad2deg(np.linalg.norm(turn_off(motion, pair.rotation))))
 
 
-def beyond(motion: Motion, pair: Pair) -> bool:
+def unstated(motion: Motion, pair: Pair) -> bool:
     """Whether the truth lies beyond what a motion states of itself."""
     if pair.rotation is None or motion.covariance is None:
         return True
     off = turn_off(motion, pair.rotation)
-    return bool(off @ np.linalg.solve(motion.covariance, off) > BEYOND**2)
+    return bool(beyond(off[None], motion.covariance[None])[0])
 
 
 def rows() -> list[Row]:

@@ -20,12 +20,15 @@ def test_a_model_of_visp_is_read_with_the_parts_it_names(tmp_path: Path) -> None
 
 def test_a_table_shows_who_is_missing_and_which_aim_fails() -> None:
     rows = [
-        Row("tags", "dark", "vergence", 12, 9, 1, 2, 0.25, "px", "never wrong", False),
+        Row("tags", "dark", "vergence", 12, 9, 1, 2, 0.25, "px", 1.3, "never wrong", False),
         missing("tags", "dark", "ViSP is not installed"),
     ]
     text = markdown(rows)
-    assert "| dark | vergence | 12 | 9 | 1 | 2 | 0.25 px | never wrong: **does not hold** |" in text
-    assert "|  | ViSP is not installed | | | | | | |" in text
+    assert (
+        "| dark | vergence | 12 | 9 | 1 | 2 | 0.25 px | 1.3 | never wrong: **does not hold** |"
+        in text
+    )
+    assert "|  | ViSP is not installed | | | | | | | |" in text
 
 
 def test_a_real_board_of_circles_is_found_in_its_order_in_any_light() -> None:

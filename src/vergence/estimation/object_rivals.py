@@ -16,7 +16,7 @@ from vergence.estimation.object_follower import ObjectFollower, ObjectTracker
 from vergence.vision.known_object.look_alikes import Turn, apart_rad, between, turns_of
 
 DECIDED = 3.0  # standard deviations between two shares
-_ALIKE = 6.0  # places beside each other that are found or missed together
+_ALIKE = 4.0  # places beside each other that are found or missed together
 _IMAGES_ALIKE = 5.0  # and images one after the other
 _SAME_RAD = 0.1
 _SAME = 0.05  # of the distance

@@ -23,6 +23,8 @@ from vergence.vision.known_object.object_model import ObjectModel
 
 _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
+_FEW = 0.7  # share of the edges found, below which other things are likely taken for some of them
+_WIDER = 4.0  # power by which the variances then grow
 _UNKNOWN_RATE = 0.5  # at which a place counts that was not looked at yet
 
 
@@ -108,6 +110,9 @@ class EdgeTracker:
             rule,
             memory,
         )
+        if seen.found and seen.share < _FEW:
+            wider = (_FEW / seen.share) ** _WIDER
+            seen = seen._replace(covariance_px=wider * seen.covariance_px)
         return seen
 
     def remember(self, memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
