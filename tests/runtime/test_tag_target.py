@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vergence.assembly import assemble_parts, run_driver
+from vergence.assembly import assemble_parts, rehearse, run_driver
+from vergence.assembly.copied import copied
 from vergence.cell import Cell, load_cell
 from vergence.errors import InputError
 from vergence.runtime import Run
@@ -154,3 +155,24 @@ def test_a_reach_refuses_keys_that_a_tag_makes_useless() -> None:
     cell = tagged(task={**REACH, "goal_deg": GOAL_DEG, "distance_m": 0.3})
     with pytest.raises(InputError, match="the tag tells pose and scale"):
         parts_believing(cell, cell)
+
+
+def test_what_follows_a_tag_can_be_copied_so_that_it_is_warmed_up_before_the_arm_moves() -> None:
+    for given in ({}, {"task": FOLLOW, "law": BY_POSE}):
+        parts = parts_believing(tagged(**given), tagged())
+        copied(parts.perception)
+
+
+@pytest.mark.parametrize("given", [{}, {"task": FOLLOW, "law": BY_POSE}])
+def test_a_run_on_a_robot_is_rehearsed_without_knowing_where_the_tag_is(
+    given: dict[str, Any],
+) -> None:
+    behind = {"position_m": (-1.0, 0.0, 1.5)}
+    tag = {"position_m": (0.1, 0.0, 0.02), "rotation_rpy_deg": (0.0, 90.0, 0.0)}
+    rehearse(tagged({**behind, "tag": tag}, **given), duration_s=0.1)
+
+
+def test_a_tool_beside_a_tag_is_refused() -> None:
+    tag = {"target.tag": "{ id = 3, size_m = 0.05 }", "target.features": ""}
+    with pytest.raises(InputError, match="one tracker measures both"):
+        load_cell("wrist_and_wall", tag)

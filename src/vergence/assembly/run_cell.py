@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from vergence.assembly.parts import Parts
 from vergence.assembly.self_calibrating import SELF_CALIBRATION, SelfCalibrating, words
+from vergence.assembly.tag import with_tag_in_view
 from vergence.assembly.task_sequence import TaskSequence
 from vergence.assembly.task_stages import stages_of, timeouts_of
 from vergence.assembly.under_actuation import under_actuation
@@ -53,7 +54,7 @@ def rehearse(cell: Cell, duration_s: float = 0.2) -> None:
     for number, stage in enumerate(cell.stages):
         try:
             with naming_task(number if cell.tasks else None):
-                run_cell(stage.replace(duration_s=duration_s))
+                run_cell(with_tag_in_view(stage).replace(duration_s=duration_s))
         except RenderingError as error:
             _LOG.info("no rehearsal: %s", error)
             return

@@ -8,14 +8,18 @@ import numpy as np
 from vergence.arrays import FloatArray, IntArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.started_driver import StartedDriver
+from vergence.cell import Cell
 from vergence.cell.schema import AdvanceTable, SwitchTable, TagTable
 from vergence.errors import Absent, InputError
 from vergence.estimation import NoPose, PoseFit, pose_from_points, view_of
-from vergence.geometry import matrix_to_rpy
+from vergence.geometry import matrix_to_rpy, se3, se3_compose, se3_inverse, so3_exp
 from vergence.signals import Frame, ImagePoints, Outcome, OutcomeKind
+from vergence.simulation import placement_pose
 from vergence.vision.marks import MarkerDetector, OneTag, one_tag, seen_instead
 
 _COUNT = 4
+_REHEARSED = 0.3  # share of the image's height that a tag takes in a rehearsal
+_TILT = 0.4  # and how it is tilted, rad: straight on, its pose would stay open
 _KNOWN = 3.0  # standard deviations of the first pose that the start is believed to
 
 
@@ -128,13 +132,7 @@ def _first_pose(context: LawContext, driver: StartedDriver, finder: TagFinder) -
 def _placed(context: LawContext, fit: PoseFit) -> LawContext:
     """Return the context with the target at a pose, known as well as it is."""
     T, deviations = fit.T_world_target, np.sqrt(np.diag(fit.covariance))
-    yaw, pitch, roll = np.degrees(matrix_to_rpy(np.ascontiguousarray(T[:3, :3]))).tolist()
-    target = context.cell.target.model_copy(
-        update={
-            "position_m": tuple(T[:3, 3].tolist()),
-            "rotation_rpy_deg": (roll, pitch, yaw),
-        }
-    )
+    target = context.cell.target.model_copy(update=_placement(T))
     perception = context.cell.perception.model_copy(
         update={
             "start_error_m": _KNOWN * float(deviations[:3].max()),
@@ -145,6 +143,31 @@ def _placed(context: LawContext, fit: PoseFit) -> LawContext:
     context.model.update()
     cell = context.cell.model_copy(update={"target": target, "perception": perception})
     return replace(context, cell=cell)
+
+
+def with_tag_in_view(cell: Cell) -> Cell:
+    """Return a cell whose tag rests before the task's camera, for a rehearsal in simulation.
+
+    A cell for a robot need not say where the tag is, and the rehearsal has to see it.
+    """
+    from vergence.simulation.cell_model import CellModel
+
+    tag = cell.target.tag
+    if tag is None or cell.target.carried_by is not None:
+        return cell
+    model = CellModel(cell)
+    lens = model.cameras[cell.task.camera]
+    away = tag.size_m * lens.fy / (_REHEARSED * lens.height)
+    T_camera_tag = se3(so3_exp(np.array([np.pi - _TILT, 0.0, 0.0])), np.array([0.0, 0.0, away]))
+    T_camera_target = se3_compose(T_camera_tag, se3_inverse(placement_pose(tag)))
+    T = se3_compose(model.camera_pose(cell.task.camera), T_camera_target)
+    return cell.replace(target={"motion": {"kind": "stationary"}, **_placement(T)})
+
+
+def _placement(T: FloatArray) -> dict[str, tuple[float, ...]]:
+    """Return the keys of a cell file for a pose (4, 4)."""
+    yaw, pitch, roll = np.degrees(matrix_to_rpy(np.ascontiguousarray(T[:3, :3]))).tolist()
+    return {"position_m": tuple(T[:3, 3].tolist()), "rotation_rpy_deg": (roll, pitch, yaw)}
 
 
 def _none(frame: Frame, count: int, why: str) -> ImagePoints:

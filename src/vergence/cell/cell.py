@@ -329,6 +329,9 @@ def _check_tool(cell: Cell, tool: ToolTable) -> None:
 
     if (carrier := cell.cameras[tool.camera].arm) is not None:
         refuse("task.tool.camera", f"{tool.camera}, which {carrier} carries", "a fixed camera")
+    if cell.target.tag is not None:
+        given = "a tool beside a target with a tag, but one tracker measures both"
+        refuse("task.tool", given, "a tool beside a target with features")
     if cell.cameras[cell.task.camera].arm is None:
         refuse("task.tool", "a second fixed camera", "a task.camera that the arm carries")
 

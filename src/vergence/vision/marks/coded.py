@@ -50,6 +50,10 @@ class MarkerDetector:
         parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_MARGIN
         object.__setattr__(self, "_detector", cv2.aruco.ArucoDetector(known, parameters))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make it again: OpenCV's detector cannot be copied."""
+        return MarkerDetector, (self.dictionary, self.noise_px)
+
     def detect(
         self, image: ImageArray, window: tuple[int, int, int, int] | None = None
     ) -> CodedMarks:
