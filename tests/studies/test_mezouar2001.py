@@ -47,6 +47,7 @@ CHECKS = {
     "tracking.final_pose_error_m",
     "classical.image_based_fails",
     "classical.position_based_fails",
+    "misprint.plus_in_l_w_inverse",
     "perturbed.success_rate",
     "random.success_rate",
     "random_roll.success_rate",
@@ -225,7 +226,7 @@ def test_every_check_of_the_study_holds_on_projections(tmp_path: Path) -> None:
         tmp_path,
         True,
         lambda _what, share: shares.append(share),
-        counts={"random": 3, "random_roll": 2, "perturbed": 2},
+        counts={"random": 3, "random_roll": 2, "perturbed": 2, "joined": 4},
         workers=1,
     )
     assert {check.name for check in result.checks} == CHECKS

@@ -77,8 +77,9 @@ def _exact_points(
     context: LawContext, key: str, camera: str, frame: Frame
 ) -> tuple[FloatArray, Perception]:
     """Return what a simulated camera truly sees."""
-    rng = np.random.default_rng([context.cell.seed, 3])
-    perception = ExactPoints(camera, rng=rng)
+    task, rng = context.cell.task, np.random.default_rng([context.cell.seed, 3])
+    noise_px = task.noise_px if isinstance(task, TrackTable) else 0.0
+    perception = ExactPoints(camera, noise_px, rng)
     observation = perception.observe((frame,))
     assert observation is not None
     view = observation.views[-1]

@@ -169,7 +169,8 @@ def _exact_pair(
     context: LawContext, task: ReachTable, now: Frame, then: Frame
 ) -> TwoImages | PlanFailure:
     """Return the marks as a simulated camera truly projects them."""
-    perception = ExactPoints(task.camera, rng=np.random.default_rng([context.cell.seed, 3]))
+    rng = np.random.default_rng([context.cell.seed, 3])
+    perception = ExactPoints(task.camera, task.noise_px, rng)
     views: list[ImagePoints] = []
     for where, frame in ((_START, now), (_GOAL, then)):
         observation = perception.observe((frame,))

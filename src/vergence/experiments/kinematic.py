@@ -108,6 +108,7 @@ class KinematicRuns:
             desired,
             cell.duration_s,
             timeouts=timeouts,
+            noise_px=cell.task.noise_px,
             clearance=self._clearance,
         )
 

@@ -21,7 +21,7 @@ from vergence.simulation import SimulatedDriver
 
 BUDGET = 16
 CAMERAS = (2, 64)  # few and many
-_TICKS = 40
+_TICKS = 100
 
 
 class Cost(NamedTuple):

@@ -18,7 +18,7 @@ NOISE_PX = 0.3
 ROLL_DEG = (120.0, 180.0)
 SEED_START, SEED_NOISE, SEED_WRONG = 0, 1, 2  # of the draws
 _IN_A_SET = 100_000  # starts, or beliefs, that a seed has
-CELLS = 256  # of the proof's grid along each turning joint, at most
+CELLS = 512  # of the proof's grid along each turning joint, at most
 
 
 class End(NamedTuple):

@@ -45,6 +45,7 @@ _Desired = (
 )
 _Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
 _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
+_ExactNoise = Annotated[float, Field(ge=0, le=100)]  # px, of projections
 
 
 class SceneTable(Table):
@@ -209,6 +210,8 @@ class TrackTable(TaskTable):
     # Auto: follow a planned path to the `desired` points if they are given and a path exists.
     approach: Literal["direct", "auto"] = "direct"
     tool: ToolTable | None = None  # tool to be kept in place in the image of a second, fixed camera
+    # Standard deviation of a simulated feature's measured position if no images are rendered.
+    noise_px: _ExactNoise = 0.0
     tolerance_px: Pixels = 1.0  # an arm at rest with a larger mean error has not reached its goal
     image_timeout_s: Duration = 0.5  # time without an image after which the run ends
     target_timeout_s: Duration = 0.2  # time without any feature found after which the run ends
@@ -261,6 +264,8 @@ class ReachTable(TaskTable):
     # Distance to keep from joint limits, as a fraction of half the range.
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     camera_speed_m_s: Speed = 0.25  # speed of the camera along the path
+    # Standard deviation of a simulated feature's measured position if no images are rendered.
+    noise_px: _ExactNoise = 0.0
     tolerance_px: Pixels = 1.0  # largest mean error of the farthest feature that counts as reached
     image_timeout_s: Duration = 0.5  # time without an image after which the run ends
     target_timeout_s: Duration = 0.5  # time without finding the target after which the run ends
