@@ -1,5 +1,7 @@
 """The optimal tracking law minimises what it says it does."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -25,6 +27,7 @@ from vergence.control.objectives._tracking import (
     tracking_displacement,
     unpack_tick,
 )
+from vergence.control.objectives.optimal_tracking import Avoidance
 from vergence.errors import InputError, ShapeError
 from vergence.features import interaction_matrix_points
 from vergence.robot import manipulability
@@ -162,6 +165,35 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     np.testing.assert_allclose(
         [tick.w, tick.penalty, tick.sigma], [m.value, m.penalty, m.smallest_singular_value]
     )
+
+
+def test_the_measure_of_eq_24_is_that_of_26_with_the_determinant_itself() -> None:
+    def avoidance(measure: str, q: np.ndarray) -> Avoidance:
+        law = OptimalTracking(axes=FOUR, avoidance_axes=("x", "y"), S=1e-3, measure=measure)
+        return law._avoidance(SimpleNamespace(arm=ARM, q=q, A=None))
+
+    now = avoidance("absolute", START)
+    m = manipulability(ARM.chain, START, ARM.q_min, ARM.q_max, 1e5, False, 0.02)
+    assert now.w == pytest.approx(m.penalty * abs(np.linalg.det(ARM.jacobian(START))))
+    h = 1e-6
+    by_joints = [
+        (avoidance("absolute", START + d).w - avoidance("absolute", START - d).w) / (2 * h)
+        for d in h * np.eye(6)
+    ]
+    np.testing.assert_allclose(ARM.jacobian(START).T @ now.gradient, by_joints, rtol=1e-5, atol=1e-9)
+    assert avoidance("squared", START).w == pytest.approx(m.value)
+
+
+def test_a_servo_with_the_measure_of_eq_24_uses_it() -> None:
+    desired, depth = seen(ARM, START, in_view(ARM, START, SQUARE))
+    command = {
+        measure: tracking_law(
+            ARM, depth, axes=FOUR, avoidance_axes=("x", "y"), S=1e-3, measure=measure
+        ).command(observed(desired), Reference(0.0, desired), joints_at(START))
+        for measure in ("squared", "absolute")
+    }
+    off = np.abs(command["squared"].v_camera - command["absolute"].v_camera).max()
+    assert off > 0.01 * np.abs(command["squared"].v_camera).max()
 
 
 def test_a_feature_that_was_not_found_has_no_say() -> None:

@@ -1,5 +1,7 @@
 """The planner of the paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gantry_cell import gantry, section6
@@ -13,6 +15,7 @@ from vergence.planning.field import (
     image_barrier,
     joint_barrier,
     parameter_jacobian,
+    printed_joint_barrier,
     repulsion,
 )
 from vergence.planning.path import Path
@@ -37,6 +40,7 @@ def make_field(seed: int, gain_image: float = 1.0, gain_joint: float = 0.0) -> F
         joint_zone=np.full(6, 0.6),
         gain_image=gain_image,
         gain_joint=gain_joint,
+        printed=False,
     )
 
 
@@ -86,6 +90,34 @@ def test_image_barrier_gradient_is_its_derivative() -> None:
         step = (h * np.eye(10)[k]).reshape(5, 2)
         change = image_barrier(field, m + step)[0] - image_barrier(field, m - step)[0]
         assert gradient[k] == pytest.approx(change / (2 * h), rel=1e-5, abs=1e-5)
+
+
+def test_the_printed_joint_barrier_is_the_papers_sum_once_a_joint_is_in_its_zone() -> None:
+    # One joint at 0.5 of ±1: 1/((1 - 0.5)(1 + 0.5)) = 4/3, slope 2q/(1 - q²)² = 16/9; the other in
+    # the middle of -2 … 1: 1/((1 + 0.5)(1 - 0.25)) = 8/9 and slope 0.
+    low, high = np.array([-1.0, -2.0]), np.array([1.0, 1.0])
+    field = make_field(0)._replace(q_min=low, q_max=high, joint_zone=np.full(2, 0.6))
+    value, gradient = printed_joint_barrier(field, np.array([0.5, -0.5]))
+    assert value == pytest.approx(4 / 3 + 8 / 9)
+    np.testing.assert_allclose(gradient, [16 / 9, 0.0], atol=1e-12)
+    value, gradient = printed_joint_barrier(field, np.array([0.39, -0.5]))  # both acceptable
+    assert value == 0.0
+    assert not gradient.any()
+
+
+def test_the_printed_joint_barrier_is_refused_for_limits_on_one_side_of_zero() -> None:
+    problem = section6()
+    aside = replace(problem, arm=replace(problem.arm, q_min=np.append(problem.arm.q_min[:5], 0.1)))
+    plan = PotentialFieldPlanner(joint_potential="printed").plan(aside)
+    assert not plan
+    assert "needs limits on both sides of 0" in str(plan)
+
+
+def test_with_the_printed_joint_barrier_the_paths_joints_keep_off_their_limits() -> None:
+    free = PotentialFieldPlanner(gain_joint=0.0).walk(section6())
+    held = PotentialFieldPlanner(gain_joint=0.05, joint_potential="printed").walk(section6())
+    assert free.joint_margin < 0.0
+    assert held.joint_margin > 0.0
 
 
 def test_joint_barrier_gradient_is_its_derivative_and_zero_at_the_border() -> None:

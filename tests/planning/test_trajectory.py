@@ -97,3 +97,21 @@ def test_goal_at_the_start_is_a_short_rest() -> None:
     assert timed.duration < 0.1
     np.testing.assert_allclose(still.T_world_camera[0], here)
     np.testing.assert_allclose(timed.reference(1.0).velocity_px, 0.0)
+
+
+def test_a_waypoint_an_image_passes_all_of_them_on_a_natural_spline() -> None:
+    """[Mezouar2001] section 4: t_k = kT, and no bending at either end."""
+    path, T = PotentialFieldPlanner().plan(section6()), 0.04
+    assert isinstance(path, Path)
+    trajectory, h = Trajectory.in_steps(path, T), 1e-4
+    assert trajectory.duration == pytest.approx((len(path.q) - 1) * T)
+    for k in (0, 1, 7, len(path.q) - 2):
+        at = trajectory.reference(k * T)
+        np.testing.assert_allclose(at.points_px, path.points_px[k], atol=1e-9)
+        np.testing.assert_allclose(at.depth_m, path.depth_m[k], atol=1e-12)
+    bent = np.abs(trajectory.joints(0.5 * trajectory.duration)[2]).max()
+    assert np.abs(trajectory.joints(h)[2]).max() < 0.05 * bent
+    before, after = (trajectory.reference(1.0 + sign * h).points_px for sign in (-1, 1))
+    slope = (after - before) / (2 * h)
+    np.testing.assert_allclose(trajectory.reference(1.0).velocity_px, slope, atol=1e-3)
+    assert not trajectory.reference(trajectory.duration + 1.0).velocity_px.any()

@@ -38,8 +38,8 @@ def plan(options: "PlanOptions") -> int:
     from vergence.app.plan_page import write_plan_page
     from vergence.app.progress import working
     from vergence.assembly import plan as plan_path
+    from vergence.assembly.reach import timed
     from vergence.planning import Path as PlannedPath
-    from vergence.planning import Trajectory
 
     with working("planning"):
         found = plan_path(cell, images=options.images)
@@ -48,7 +48,7 @@ def plan(options: "PlanOptions") -> int:
         reason = str(found)
         emit({**answer, "reason": reason}) if options.as_json else say(f"no path: {reason}")
         return FAILURE
-    trajectory = Trajectory.of(found, cell.task.camera_speed_m_s)
+    trajectory = timed(cell, cell.task, found)
     folder = options.out or new_folder(f"{cell.name}-plan")
     numbers = _numbers(found, trajectory)
     with working("drawing"):

@@ -12,6 +12,7 @@ from vergence.assembly.own_parts import planned_path, started_tracker
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.camera.image_file import read_image_file
+from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import NOTHING, InputError
@@ -67,7 +68,7 @@ def reach_parts(
     plan = _plan(context, task, view, context.joints[task.arm])
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
-    trajectory = Trajectory.of(plan, task.camera_speed_m_s)
+    trajectory = timed(context.cell, task, plan)
     again = _plan_again(context, task, pair.desired_px)
     planner = Replanner(trajectory, again, driver.worker())
     duration = trajectory.duration + SETTLE_S
@@ -89,7 +90,7 @@ def _plan_again(context: LawContext, task: ReachTable, desired_px: FloatArray) -
         found = _plan(context, task, view, q)
         if isinstance(found, PlanFailure):
             return str(found)
-        return Trajectory.of(found, task.camera_speed_m_s)
+        return timed(context.cell, task, found)
 
     return plan
 
@@ -163,6 +164,13 @@ def measure_twice(
     return TwoImages(
         seen.points_px, desired.points_px, TrackedPoints(task.camera, tracker, len(seen.points_px))
     )
+
+
+def timed(cell: Cell, task: ReachTable, path: Path) -> Trajectory:
+    """Return a path in time, as the task says."""
+    if task.timing == "waypoint_per_image":
+        return Trajectory.in_steps(path, 1.0 / cell.cameras[task.camera].rate_hz)
+    return Trajectory.of(path, task.camera_speed_m_s)
 
 
 def _exact_pair(

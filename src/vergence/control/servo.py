@@ -231,6 +231,8 @@ class Servo:
             return None
         if not (isinstance(objective, OptimalTracking) and isinstance(solver, PseudoInverse)):
             return None
+        if objective.measure != "squared":
+            return None
         return TrackingTickLaw(
             self._arm,
             mounting.camera,

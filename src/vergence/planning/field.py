@@ -5,8 +5,9 @@
 - Υ = (t_d, uθ) of the camera in the goal frame; L_w⁻¹ is the right Jacobian of SO(3), which has a
   minus before its first-order term (the printed plus gives ω along the axes of F*).
 - After (6) the joints are closed on the pose of Υ, so that linearisation leaves no drift.
-- V_rq uses joint positions normalised to [-1, 1] and, as does V_rs, is a C¹ barrier: half the
-  square of what the printed 1/((1 - q)(1 + q)) exceeds its value at the border of the free zone.
+- V_rq is available as printed, see `printed_joint_barrier`. By default it uses joint positions
+  normalised to [-1, 1] and, as does V_rs, is a C¹ barrier: half the square of what the printed
+  1/((1 - q)(1 + q)) exceeds its value at the border of the free zone.
 - V_rs = ½ Σ (1/w - 1)², w the distance to a side of the image over the width of its zone, w < 1.
 - A zone that holds the goal shrinks to the goal's own clearance.
 - The step is clipped at the goal and halved when the force turns back.
@@ -41,6 +42,7 @@ class Field(NamedTuple):
     joint_zone: FloatArray  # (n,) width of the zone at both limits, of half the range
     gain_image: float  # γ
     gain_joint: float  # χ
+    printed: bool  # V_rq as the paper prints it
 
 
 class FieldPath(NamedTuple):
@@ -116,6 +118,30 @@ def joint_barrier(field: Field, q: FloatArray) -> tuple[float, FloatArray]:
 
 
 @njit(cache=True)
+def printed_joint_barrier(field: Field, q: FloatArray) -> tuple[float, FloatArray]:
+    """Return V_rq as printed in section 3.6 and its gradient, (n,).
+
+    Σ 1/((1 - q/q_max)(1 - q/q_min)) over all joints once any is in its zone, else 0: it jumps.
+    """
+    value, gradient, acceptable = 0.0, np.zeros(len(q)), True
+    for i in range(len(q)):
+        low, high = field.q_min[i], field.q_max[i]
+        if not (np.isfinite(low) and np.isfinite(high)):
+            continue
+        half = 0.5 * (high - low)
+        if abs((q[i] - low) / half - 1.0) > 1.0 - field.joint_zone[i]:
+            acceptable = False
+        edge = 0.01 * field.joint_zone[i] * half  # where the barrier stops growing
+        at = min(max(q[i], low + edge), high - edge)
+        over, under = 1.0 - at / high, 1.0 - at / low
+        value += 1.0 / (over * under)
+        gradient[i] = (under / high + over / low) / (over * under) ** 2
+    if acceptable:
+        return 0.0, np.zeros(len(q))
+    return value, gradient
+
+
+@njit(cache=True)
 def damped_solve(J: FloatArray, twist: FloatArray) -> FloatArray:
     """Return J⁺ twist, damped a little so that it stays bounded at a singularity."""
     A = J @ J.T
@@ -136,7 +162,10 @@ def repulsion(
             depth = field.distance * np.maximum(rho, 1e-3)
             force -= field.gain_image * (M.T @ (interaction_matrix_points(m, depth).T @ slope))
     if field.gain_joint > 0.0:
-        value, slope = joint_barrier(field, q)
+        if field.printed:
+            value, slope = printed_joint_barrier(field, q)
+        else:
+            value, slope = joint_barrier(field, q)
         if value > 0.0:
             J = jacobian(chain, q)
             A = J @ J.T

@@ -1,5 +1,7 @@
 """The planner of the paper, in front of its kernels."""
 
+from typing import Literal
+
 import numpy as np
 
 from vergence.arrays import FloatArray
@@ -28,13 +30,20 @@ class PotentialFieldPlanner:
     image_zone_px: float = knob(100.0, "px", above=0, upto=1e4)
     # Width of the repulsive zone at a joint limit, as a fraction of half the range.
     joint_zone: float = knob(0.2, above=0, upto=1)
+    # V_rq: smooth at the border of its zone, for any limits; or as printed, for limits about 0.
+    joint_potential: Literal["smooth", "printed"] = knob("smooth")
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return a path that keeps every constraint, or what stood in the way.
 
         Both senses of rotation are tried, the shorter turn first.
         """
-        failures = []
+        arm, failures = problem.arm, []
+        aside = ~((arm.q_min < 0.0) & (arm.q_max > 0.0))
+        if self.joint_potential == "printed" and aside.any():
+            joint = arm.names[int(np.argmax(aside))]
+            reason = f"V_rq as printed needs limits on both sides of 0, which {joint} has not"
+            return PlanFailure(Obstacle.JOINT_LIMIT, reason)
         for long_way in (False, True):
             path, end = self._walk(problem, long_way)
             failure = self._judge(problem, path, end)
@@ -69,6 +78,7 @@ class PotentialFieldPlanner:
             joint_zone=np.clip(self.joint_zone, 1e-3, np.maximum(free, 1e-3)),
             gain_image=self.gain_image,
             gain_joint=self.gain_joint,
+            printed=self.joint_potential == "printed",
         )
 
     def _judge(self, problem: PlanningProblem, path: Path, end: int) -> PlanFailure | None:
@@ -125,6 +135,7 @@ def _pose_free_field(problem: PlanningProblem, long_way: bool) -> tuple[Field, F
         joint_zone=np.ones(n),
         gain_image=0.0,
         gain_joint=0.0,
+        printed=False,
     )
     return field, np.concatenate((T[:3, 3] / distance, turn))
 

@@ -39,6 +39,19 @@ class TimeLaw:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class SteadyLaw:
+    """Place σ = t/duration: [Mezouar2001] section 4 with t_k = kT, at one speed from the start."""
+
+    duration: float  # s
+
+    def at(self, time: float | FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return σ, dσ/dt and d²σ/dt² at times in s; outside the duration the path rests."""
+        t = np.asarray(time, dtype=np.float64) / self.duration
+        moving = (t >= 0.0) & (t < 1.0)
+        return np.clip(t, 0.0, 1.0), moving / self.duration, np.zeros_like(t)
+
+
 def pace(path: Path, camera_speed: float) -> FloatArray:
     """Return the place σ in [0, 1] of each waypoint, (K,): equal steps take equal time.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.planning.path import Path
-from vergence.planning.timing import TimeLaw, fastest_law, pace
+from vergence.planning.timing import SteadyLaw, TimeLaw, fastest_law, pace
 from vergence.signals import Reference
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class Trajectory:
     """
 
     path: Path
-    law: TimeLaw
+    law: TimeLaw | SteadyLaw
     _image: "CubicSpline"  # of (N, 2) px
     _depth: "CubicSpline"  # of (N,) m
     _joints: "CubicSpline"  # of (n,)
@@ -51,6 +51,27 @@ class Trajectory:
         )  # fmt: skip
         shortest = _way(path) / camera_speed / (1.0 - law.ramp)
         return cls(path, TimeLaw(max(law.duration, shortest), law.ramp), image, depth, joints)
+
+    @classmethod
+    def in_steps(cls, path: Path, period_s: float) -> Self:
+        """Time a path as [Mezouar2001] section 4 does: t_k = kT, through a natural spline.
+
+        It starts and stops at once and knows no limits: the planner's step sets the speed.
+
+        Args:
+            path: from a planner with steps of one length.
+            period_s: T, between two waypoints.
+        """
+        from scipy.interpolate import CubicSpline
+
+        path = _at_least_four(path)
+        steps = len(path.q) - 1
+        sigma = np.linspace(0.0, 1.0, steps + 1)
+        image, depth, joints = (
+            CubicSpline(sigma, values, bc_type="natural")
+            for values in (path.points_px, path.depth_m, path.q)
+        )
+        return cls(path, SteadyLaw(steps * period_s), image, depth, joints)
 
     @property
     def duration(self) -> float:

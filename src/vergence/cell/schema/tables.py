@@ -264,6 +264,8 @@ class ReachTable(TaskTable):
     # Distance to keep from joint limits, as a fraction of half the range.
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     camera_speed_m_s: Speed = 0.25  # speed of the camera along the path
+    # As fast as limits and camera_speed_m_s allow; or, as in [Mezouar2001], a waypoint an image.
+    timing: Literal["limits", "waypoint_per_image"] = "limits"
     # Standard deviation of a simulated feature's measured position if no images are rendered.
     noise_px: _ExactNoise = 0.0
     tolerance_px: Pixels = 1.0  # largest mean error of the farthest feature that counts as reached

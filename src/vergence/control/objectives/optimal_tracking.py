@@ -29,13 +29,14 @@ from vergence.robot.positive_definite import factor_spd, solve_factored, times_s
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
 _UNUSED_AXIS = 1e6  # times R: an axis outside `axes` costs too much to move
+_LEAST_DET = 1e-9  # of |det J|, by which its slope is divided
 _DAMPED_BELOW = 0.02  # smallest singular value of J below which its inverse is damped
 
 
 class Avoidance(NamedTuple):
     """How far the arm is from limits and singularities, and which way leads away from them."""
 
-    w: float  # w'(q), [Nelson1995] eq. (26)
+    w: float  # w'(q), [Nelson1995] eq. (26), or w(q), eq. (24)
     gradient: FloatArray  # ∂w'/∂x along the camera's axes, (6,)
 
 
@@ -65,6 +66,8 @@ class OptimalTracking:
     S: float = knob(0.0, least=0, upto=1e3)
     # Penalty for joint limits: eq. (27), or per joint.
     penalty: Literal["product", "per_joint"] = knob("product")
+    # Measure of manipulability: eq. (26), or eq. (24), with |det J| in place of its square.
+    measure: Literal["squared", "absolute"] = knob("squared")
     penalty_k: float = knob(1e5, above=0, upto=1e9)  # k of the penalty in eq. (27)
     # Highest camera speed for avoidance.
     avoidance_speed_max_m_s: float = knob(0.5, "m/s", above=0, upto=10)
@@ -117,11 +120,15 @@ class OptimalTracking:
         now = posture(arm.chain, state.q, _DAMPED_BELOW)
         per_joint = self.penalty == "per_joint"
         P, slope_P = limit_penalty(state.q, arm.q_min, arm.q_max, self.penalty_k, per_joint)
-        slope = determinant_slope(arm.chain, state.q, now)
-        gradient: FloatArray = camera_gradient(now, measure_gradient(now, slope, P, slope_P))
+        slope, det = determinant_slope(arm.chain, state.q, now), now.det_JJt
+        if self.measure == "absolute":
+            det = max(np.sqrt(max(det, 0.0)), _LEAST_DET)
+            slope = slope / (2.0 * det)
+        by_joints = measure_gradient(now._replace(det_JJt=det), slope, P, slope_P)
+        gradient: FloatArray = camera_gradient(now, by_joints)
         if state.A is not None:
             gradient = np.linalg.solve(state.A.T, gradient).astype(np.float64)
-        return Avoidance(P * now.det_JJt, gradient)
+        return Avoidance(P * det, gradient)
 
 
 @njit(cache=True, error_model="numpy")
