@@ -180,7 +180,9 @@ def test_the_measure_of_eq_24_is_that_of_26_with_the_determinant_itself() -> Non
         (avoidance("absolute", START + d).w - avoidance("absolute", START - d).w) / (2 * h)
         for d in h * np.eye(6)
     ]
-    np.testing.assert_allclose(ARM.jacobian(START).T @ now.gradient, by_joints, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(
+        ARM.jacobian(START).T @ now.gradient, by_joints, rtol=1e-5, atol=1e-9
+    )
     assert avoidance("squared", START).w == pytest.approx(m.value)
 
 
