@@ -23,6 +23,7 @@ from vergence.studies.mezouar2001_methods import (
     servo,
     too_close,
 )
+from vergence.studies.mezouar2001_misprint import twist_of
 from vergence.studies.mezouar2001_trials import (
     End,
     Trial,
@@ -226,10 +227,23 @@ def test_every_check_of_the_study_holds_on_projections(tmp_path: Path) -> None:
         tmp_path,
         True,
         lambda _what, share: shares.append(share),
-        counts={"random": 3, "random_roll": 2, "perturbed": 2, "joined": 4},
+        counts={"random": 3, "random_roll": 2, "perturbed": 2, "joined": 20},
         workers=1,
     )
     assert {check.name for check in result.checks} == CHECKS
     assert [check.name for check in result.checks if not check.holds] == []
     assert shares == sorted(shares)
     assert all(figure.path.stat().st_size > 5000 for figure in result.figures)
+
+
+def test_the_printed_plus_is_right_along_the_axis_alone() -> None:
+    upsilon = np.array([0.3, -0.2, 0.1, 0.4, -0.9, 1.2])
+    for step in 1e-5 * np.eye(6):
+        R, after = so3_exp(upsilon[3:]), so3_exp((upsilon + step)[3:])
+        moved = np.concatenate((R.T @ step[:3], so3_log(R.T @ after)))
+        np.testing.assert_allclose(twist_of(upsilon, step, -1.0), moved, atol=1e-9)
+    across = np.cross(upsilon[3:], [1.0, 0.0, 0.0])
+    for way, alike in ((upsilon[3:], True), (across, False)):
+        step = 1e-5 * np.concatenate((np.zeros(3), way))
+        plus, minus = (twist_of(upsilon, step, sign) for sign in (1.0, -1.0))
+        assert np.allclose(plus, minus, atol=1e-9) == alike
