@@ -27,6 +27,7 @@ PAPERS = (
     "guarantees",
     "honesty",
     "region",
+    "features",
     "photograph",
     "defaults",
 )

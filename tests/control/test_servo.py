@@ -23,9 +23,10 @@ from vergence.control import (
     Situation,
     Term,
 )
+from vergence.control.objectives import state_of
 from vergence.errors import InputError
-from vergence.features import Centre, Feature, Lines, Points
-from vergence.geometry import se3_exp
+from vergence.features import Centre, Feature, Lines, LogDepth, Points
+from vergence.geometry import se3_exp, so3_log, transform_points
 from vergence.parts import as_part, knob, part
 from vergence.signals import JointState, Observation, OutcomeKind, Reference
 
@@ -136,6 +137,27 @@ def test_the_points_depths_bring_the_camera_straight_to_its_goal():
     v = T_goal_now[:3, :3] @ command.v_camera[:3]
     straight = -T_goal_now[:3, 3]
     assert v @ straight == pytest.approx(np.linalg.norm(v) * np.linalg.norm(straight), rel=1e-6)
+
+
+def test_an_image_point_its_depth_and_the_rotation_are_the_law_2_half_d():
+    """[Malis1999]: the rotation decays by itself, the point on a straight line in the image."""
+    T = se3_exp(np.array([0.1, -0.05, 0.1, 0.2, -0.1, 0.4]))
+    goal = np.array([[-0.1, -0.1, 0.6], [0.1, -0.1, 0.6], [0.1, 0.1, 0.65], [-0.1, 0.1, 0.7]])
+    now = transform_points(T, goal)
+    features = Points(now[:, :2] / now[:, 2:], now[:, 2])
+    desired = Points(goal[:, :2] / goal[:, 2:], goal[:, 2])
+    stack = [
+        ImageBased(gain=2.0, feature=Centre, interaction="current"),
+        ImageBased(gain=2.0, feature=LogDepth, interaction="current"),
+        PointPose(gain=2.0, axes=("rx", "ry", "rz")),
+    ]
+    quadratics = [objective.quadratic(state_of(features, desired)) for objective in stack]
+    assert np.linalg.matrix_rank(quadratics[2].H) == 3
+    v = np.linalg.solve(sum(q.H for q in quadratics), sum(q.g for q in quadratics))
+    np.testing.assert_allclose(v[3:], 2.0 * so3_log(T[:3, :3].copy()), atol=1e-5)
+    for kind in (Centre, LogDepth):
+        s, s_star = kind(features.points, now[:, 2]), kind(desired.points, goal[:, 2])
+        np.testing.assert_allclose(s.interaction() @ v, -2.0 * s.error(s_star), atol=1e-5)
 
 
 def test_joint_rates_for_points_are_asked_for_in_one_call():

@@ -156,6 +156,7 @@ def test_only_turns_move_a_vanishing_point() -> None:
         ("ellipse", [[0.1, 0.1]] * 6),
         ("orientation", [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]]),
         ("region_moments", [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2]]),
+        ("region_moments", [[-0.1, -0.1], [0.11, 0.1], [0.1, -0.1], [-0.1, 0.12]]),
     ],
 )
 def test_points_that_do_not_make_the_feature_are_refused(

@@ -9,6 +9,31 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError
 
 _ORDER = 3
+# Of the integrals over a polygon: p, q, and the powers of the corner at the end of a side.
+_P, _Q, _K, _J = np.array(
+    [
+        (p, q, k, j)
+        for p in range(_ORDER + 1)
+        for q in range(_ORDER + 1 - p)
+        for k in range(p + 1)
+        for j in range(q + 1)
+    ]
+).T
+
+
+def _factors() -> FloatArray:
+    """Return the factor of each term in each integral, (16, terms)."""
+    factors = np.zeros(((_ORDER + 1) ** 2, len(_P)))
+    for term, (p, q, k, j) in enumerate(
+        zip(*map(np.ndarray.tolist, (_P, _Q, _K, _J)), strict=True)
+    ):
+        share = (p + q + 2) * (p + q + 1) * comb(p + q, p)
+        ways = comb(k + j, j) * comb(p + q - k - j, q - j)
+        factors[(_ORDER + 1) * p + q, term] = ways / share
+    return factors
+
+
+_FACTORS = _factors()
 _ROUND = 1e-9  # share of the spread up to which two extents are one: no orientation
 
 
@@ -50,7 +75,7 @@ def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
     Integrals over the inside are sums over the sides, by Green's theorem [Steger1996].
 
     Raises:
-        InputError: if it has no area.
+        InputError: if it has no area, or crosses itself so that it has no extent.
     """
     about = corners.mean(axis=0)
     raw = _polygon_integrals(corners - about)
@@ -59,6 +84,8 @@ def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
     middle = np.array([raw[1, 0], raw[0, 1]]) / raw[0, 0]
     mu = _polygon_integrals(corners - about - middle)
     mu *= np.sign(raw[0, 0])  # corners may come either way round
+    if not (mu[2, 0] > 0.0 and mu[2, 0] * mu[0, 2] > mu[1, 1] ** 2):
+        raise InputError(name, "points", "a polygon that crosses itself", "corners in order")
     return CentralMoments(about + middle, float(mu[0, 0]), mu, dense=True)
 
 
@@ -93,22 +120,12 @@ def tilt_invariants(moments: CentralMoments) -> FloatArray:
 
 def _polygon_integrals(corners: FloatArray) -> FloatArray:
     """Return ∫ x^p y^q over the inside of a polygon, signed by its sense, (4, 4)."""
-    before = np.roll(corners, 1, axis=0)
+    before = np.concatenate((corners[-1:], corners[:-1]))
     twice = before[:, 0] * corners[:, 1] - corners[:, 0] * before[:, 1]
     now = corners[:, :, None] ** np.arange(_ORDER + 1)
     last = before[:, :, None] ** np.arange(_ORDER + 1)
-    integrals = np.zeros((_ORDER + 1, _ORDER + 1))
-    for p in range(_ORDER + 1):
-        for q in range(_ORDER + 1 - p):
-            total = sum(
-                comb(k + j, j)
-                * comb(p + q - k - j, q - j)
-                * (now[:, 0, k] * last[:, 0, p - k] * now[:, 1, j] * last[:, 1, q - j])
-                for k in range(p + 1)
-                for j in range(q + 1)
-            )
-            share = (p + q + 2) * (p + q + 1) * comb(p + q, p)
-            integrals[p, q] = np.sum(twice * total) / share
+    terms = now[:, 0, _K] * last[:, 0, _P - _K] * now[:, 1, _J] * last[:, 1, _Q - _J]
+    integrals: FloatArray = (_FACTORS @ (twice @ terms)).reshape(_ORDER + 1, _ORDER + 1)
     return integrals
 
 

@@ -2,6 +2,7 @@
 
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -13,3 +14,9 @@ class Centre(Feature):
         """Return s, (2,)."""
         centre: FloatArray = self.points.mean(axis=0)
         return centre
+
+    def interaction(self) -> FloatArray:
+        """Return L (2, 6), the mean of the points' own."""
+        rows = interaction_matrix_points(self.points, self.depth_m)
+        L: FloatArray = rows.reshape(-1, 2, 6).mean(axis=0)
+        return L

@@ -6,6 +6,7 @@ from vergence.arrays import FloatArray
 from vergence.features._angles import wrapped
 from vergence.features._pairs import ends
 from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -31,3 +32,21 @@ class Lines(Feature):
         difference = self.value() - desired.value()
         difference[1::2] = wrapped(difference[1::2])
         return difference
+
+    def interaction(self) -> FloatArray:
+        """Return L (M, 6), by what the two points of each line do.
+
+        With n the normal, ℓ the distance of the points and ẋ their motion,
+        θ̇ = nᵀ (ẋ1 - ẋ2) / ℓ and ρ̇ = nᵀ ẋ1 + θ̇ mᵀ x1, where m = dn/dθ. On a line in space this is
+        the matrix of [Espiau1992].
+        """
+        first, second = ends("lines", self.points)
+        way = second - first
+        length = np.linalg.norm(way, axis=1)[:, None]
+        normal = np.column_stack((way[:, 1], -way[:, 0])) / length
+        rows: FloatArray = interaction_matrix_points(self.points, self.depth_m)
+        rows = rows.reshape(-1, 2, 2, 6)  # line, end, coordinate
+        across = np.einsum("lc,lecv->lev", normal, rows)
+        turn = (across[:, 0] - across[:, 1]) / length
+        along = np.sum(way / length * first, axis=1)[:, None]
+        return np.stack((across[:, 0] + turn * along, turn), axis=1).reshape(-1, 6)

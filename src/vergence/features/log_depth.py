@@ -4,6 +4,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
+from vergence.features.interaction import depth_interaction
 from vergence.parts import as_part
 
 
@@ -17,3 +18,9 @@ class LogDepth(Feature):
     def value(self) -> FloatArray:
         """Return s, (1,)."""
         return np.log([self.depth_m.mean()])
+
+    def interaction(self) -> FloatArray:
+        """Return L (1, 6), the mean of the depths' own over the mean depth."""
+        rows = depth_interaction(self.points, self.depth_m)
+        L: FloatArray = rows.mean(axis=0, keepdims=True) / self.depth_m.mean()
+        return L

@@ -32,6 +32,8 @@ def ending_bars(axes: "Axes", names: Sequence[str], counts: Sequence[Counter[End
     rows, left = range(len(names)), np.zeros(len(names))
     for ending, color in _COLORS.items():
         share = np.array([100.0 * count[ending] / max(count.total(), 1) for count in counts])
+        if not share.any():
+            continue
         axes.barh(rows, share, left=left, color=color, label=ending.value)
         left += share
     axes.set_yticks(rows, names)

@@ -20,6 +20,7 @@ PAPERS = (
     "defaults",
     "honesty",
     "region",
+    "features",
 )
 
 

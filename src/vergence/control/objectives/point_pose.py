@@ -1,9 +1,13 @@
 """Position-based servoing on points of known depth, without a filter of the pose."""
 
+from typing import Annotated
+
 import numpy as np
+from pydantic import Field
 
 from vergence.arrays import FloatArray
 from vergence.control.objectives.objective import CameraState, Quadratic
+from vergence.control.objectives.optimal_tracking import AXES, Axis, axis_mask
 from vergence.geometry import so3_log
 from vergence.parts import knob, part
 
@@ -13,10 +17,13 @@ class PointPose:
     """Moves the camera straight to its goal: v = -λ (Rᵀ t, θu) of its pose in the goal frame.
 
     The pose is the one that brings the points, by their depths, onto those at the goal
-    [Chaumette2006] section 3.
+    [Chaumette2006] section 3. With `axes = ["rx", "ry", "rz"]` beside an image point and its depth
+    it is the law of [Malis1999], "2½D".
     """
 
     gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    # Camera axes that it controls; it leaves the others to other objectives.
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(AXES)
 
     def quadratic(self, state: CameraState) -> Quadratic:
         """Return the quadratic for this tick."""
@@ -26,7 +33,9 @@ class PointPose:
         mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
         R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
         t = goal.mean(0) - R @ seen.mean(0)
-        return Quadratic(np.eye(6), -self.gain * np.concatenate((R.T @ t, so3_log(R))))
+        v = -self.gain * np.concatenate((R.T @ t, so3_log(R)))
+        controlled = axis_mask(self.axes)
+        return Quadratic(np.diag(controlled.astype(np.float64)), np.where(controlled, v, 0.0))
 
 
 def _lifted(points: FloatArray, depth_m: FloatArray) -> FloatArray:
