@@ -6,6 +6,7 @@ from vergence.features.feature import Feature
 from vergence.features.interaction import interaction_matrix_points
 from vergence.features.lines import Lines
 from vergence.features.log_depth import LogDepth
+from vergence.features.luminance import Luminance
 from vergence.features.moments import Moments, RegionMoments
 from vergence.features.orientation import Orientation
 from vergence.features.plane import inverse_depth_plane
@@ -23,6 +24,7 @@ __all__ = [
     "Feature",
     "Lines",
     "LogDepth",
+    "Luminance",
     "Moments",
     "Orientation",
     "Points",
