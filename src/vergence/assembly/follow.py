@@ -28,11 +28,17 @@ def follow_parts(
     perception = follow_pose(context, shape, images, begin)
     seen = perception.observe(frames)
     if seen is None or not any(view.found.any() for view in seen.views):
-        given = f"at the start none of the cameras ({', '.join(cell.watched)}) sees a corner of it"
-        raise InputError(str(cell.path), "target", given, "a start from which a camera sees it")
+        given = f"at the start none of the cameras ({', '.join(cell.watched)}) sees it{_why(seen)}"
+        allowed = "a start from which a camera sees it where target.position_m says"
+        raise InputError(str(cell.path), "target", given, allowed)
     desired = _desired_pose(context, task, seen)
     planner = FixedReference(Reference(0.0, T_camera_target=desired))
     return Parts(driver, perception, planner, build_law(context), context)
+
+
+def _why(seen: Observation | None) -> str:
+    reasons = [reason for view in seen.views for reason in view.reasons if reason] if seen else []
+    return f": {reasons[0]}" if reasons else ""
 
 
 def _desired_pose(context: LawContext, task: FollowTable, seen: Observation) -> FloatArray:

@@ -152,11 +152,7 @@ class LawContext:
         return depth
 
     def target_corners(self) -> FloatArray:
-        """Return the corners of the target's model in its frame, (K, 3), m.
-
-        Raises:
-            InputError: if it has none and the file names no features.
-        """
+        """Return the points that stand for the target in its frame, (K, 3), m."""
         from vergence.assembly.pose import target_shape
 
         return target_shape(self.cell, self.model).corners

@@ -1,7 +1,7 @@
 """Perception of a target's pose, as a cell describes it."""
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,11 +10,13 @@ from vergence.assembly.law_context import LawContext
 from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
 from vergence.assembly.tag import TagFinder
 from vergence.cell import Cell
+from vergence.errors import InputError
 from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
     Find,
+    FollowedPose,
     HeldTarget,
     IndexSelection,
     InformationSelection,
@@ -29,10 +31,10 @@ from vergence.estimation import (
     blocked_from_tip,
     seen_from_tip,
 )
+from vergence.estimation.outline_perception import OutlinePerception
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.loading import asking
 from vergence.robot import forward_kinematics
-from vergence.signals import Frame, Observation
 from vergence.simulation import ExactCorners
 
 if TYPE_CHECKING:
@@ -43,33 +45,16 @@ _LEAST_M, _LEAST_RAD = 1e-3, 2e-3  # no start is known better
 _START_VELOCITY = (0.1, 0.3)  # m/s and rad/s, standard deviations about rest
 
 
-class FollowedPose(Protocol):
-    """A perception that may lose its target."""
-
-    @property
-    def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
-        ...
-
-    def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the frames show, or None if none of them concerns it."""
-        ...
-
-
 def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
-    """Return the target's geometry; its features are the file's, else its sharp corners.
-
-    Raises:
-        InputError: if it has no corners and the file names no features.
-    """
-    from vergence.vision.known_object import ObjectModel, object_model_of
+    """Return the target's geometry; its features are the file's, else what stands for it."""
+    from vergence.vision.known_object import ObjectModel, as_followed, object_model_of
 
     if cell.target.tag is not None:
         name, tag = f"tag {cell.target.tag.id}", cell.target.tag
         return ObjectModel.from_face(name, tag.corners)
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
-    return object_model_of(model.model, "target").with_corners()
+    return as_followed(object_model_of(model.model, "target"))
 
 
 def follow_pose(
@@ -85,6 +70,8 @@ def follow_pose(
     """
     cell, cameras = context.cell, context.cameras
     table = cell.perception
+    if images and by_outline(model):
+        return _outline_pose(context, model, begin)
     expected = table.believed_noise_px or table.noise_px  # as wide as the windows must allow for
     rig = CameraRig.of({name: cameras[name] for name in cell.watched}, expected)
     surroundings = _surroundings(context)
@@ -94,7 +81,10 @@ def follow_pose(
         "find": _find(context, images),
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
-    shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
+    if by_outline(model):  # no image: points inside it, which it does not hide, stand for it
+        shape = TargetShape.from_points(model.corners)
+    else:
+        shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
     target_filter: TargetFilter[Any] = table.filter
     with asking(target_filter, str(cell.path), "perception.filter"):
         start = target_filter.start(begin, surroundings.start, covariance=_start_covariance(cell))
@@ -112,6 +102,42 @@ def follow_pose(
         watched = MirrorWatch(perception, rig, surroundings.camera_pose, shape.points)
     tip_pose = surroundings.tip_pose
     return watched if tip_pose is None else HeldTarget(watched, tip_pose)
+
+
+def by_outline(model: "ObjectModel") -> bool:
+    """Tell whether a target is followed by its outline: it has a mesh, but few sharp edges."""
+    from vergence.vision.known_object import shown_by_edges
+
+    return bool(len(model.triangles)) and not shown_by_edges(model)
+
+
+def _outline_pose(context: LawContext, model: "ObjectModel", begin: float) -> FollowedPose:
+    """Return the perception of an object without sharp edges, by the task's camera.
+
+    Raises:
+        InputError: if it is to use more cameras.
+    """
+    from vergence.vision.known_object import SilhouetteTracker
+
+    cell, name = context.cell, context.camera_name
+    if others := [camera for camera in cell.watched if camera != name]:
+        allowed = f'["{name}"]: an object without sharp edges is followed by one camera'
+        raise InputError(str(cell.path), "perception.cameras", ", ".join(others), allowed)
+    surroundings = _surroundings(context)
+    known = _start_known(cell)
+    perception = OutlinePerception(
+        name,
+        context.cameras[name],
+        SilhouetteTracker(model, channels=1),
+        surroundings.camera_pose,
+        surroundings.start,
+        known,
+        begin,
+        context.period_s(),
+        model.corners,
+    )
+    tip_pose = surroundings.tip_pose
+    return perception if tip_pose is None else HeldTarget(perception, tip_pose)
 
 
 def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure:
@@ -199,7 +225,11 @@ def _blocked_at(context: LawContext) -> Callable[[Joints], Blocked]:
 
 def _start_covariance(cell: Cell) -> FloatArray:
     """Return what is known of pose and velocity at the start, (12, 12)."""
-    distance, angle = cell.placement_error
-    known = max(distance, _LEAST_M), max(np.deg2rad(angle), _LEAST_RAD)
-    deviations: FloatArray = np.repeat([*known, *_START_VELOCITY], 3)
+    deviations: FloatArray = np.repeat([*_start_known(cell), *_START_VELOCITY], 3)
     return np.diag(deviations**2)
+
+
+def _start_known(cell: Cell) -> tuple[float, float]:
+    """Return how well the target's placement is known, m and rad."""
+    distance, angle = cell.placement_error
+    return max(distance, _LEAST_M), max(float(np.deg2rad(angle)), _LEAST_RAD)

@@ -5,6 +5,7 @@ from vergence.estimation.consistency import Consistency
 from vergence.estimation.corner_view import CornerView
 from vergence.estimation.fit_pose import fit_pose
 from vergence.estimation.held_target import (
+    FollowedPose,
     HeldTarget,
     TipPose,
     blocked_from_tip,
@@ -55,6 +56,7 @@ __all__ = [
     "CornerView",
     "Exposure",
     "FilterHistory",
+    "FollowedPose",
     "Find",
     "TipPose",
     "HeldTarget",

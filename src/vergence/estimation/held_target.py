@@ -2,19 +2,30 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.measure import CameraPose, Joints
-from vergence.estimation.mirror_watch import MirrorWatch
-from vergence.estimation.perception import PosePerception
 from vergence.estimation.visibility import Blocked
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, Observation, TargetState
 
 TipPose: TypeAlias = Callable[[Joints], FloatArray]  # joints to T_world_tip (4, 4)
+
+
+class FollowedPose(Protocol):
+    """A perception that may lose its target."""
+
+    @property
+    def lost(self) -> str:
+        """Why the target counts as lost; empty while it is followed."""
+        ...
+
+    def observe(self, frames: Sequence[Frame]) -> Observation | None:
+        """Return what the frames show, or None if none of them concerns it."""
+        ...
 
 
 class HeldTarget:
@@ -29,7 +40,7 @@ class HeldTarget:
         tip_pose: gives T_world_tip (4, 4) from the joints at the exposure.
     """
 
-    def __init__(self, perception: PosePerception[Any] | MirrorWatch, tip_pose: TipPose) -> None:
+    def __init__(self, perception: FollowedPose, tip_pose: TipPose) -> None:
         self._perception, self._tip_pose = perception, tip_pose
 
     @property

@@ -1,6 +1,6 @@
 """One camera follows one known object: predict, look, fuse, and say when it is lost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
@@ -19,7 +19,7 @@ from vergence.estimation import (
     with_unseen,
     without_unseen,
 )
-from vergence.geometry import so3_log
+from vergence.geometry import se3_compose, so3_log
 from vergence.signals import ImagePoints
 from vergence.vision.known_object import ObjectModel
 
@@ -162,6 +162,8 @@ class ObjectFollower:
         period: between images, s.
         rule: when an image counts.
         memory: what the object looks like, if it was followed before.
+        known: standard deviation of the pose in the first image, m and rad; that of `jolt_px` if
+            less.
     """
 
     def __init__(
@@ -173,6 +175,7 @@ class ObjectFollower:
         period: float,
         rule: FollowRule | None = None,
         memory: Any = None,
+        known: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._tracker, self._camera, self._rule = tracker, camera, rule or FollowRule()
         depth = float(T_camera_target[2, 3])
@@ -184,16 +187,13 @@ class ObjectFollower:
             acceleration_density=density, angular_acceleration_density=density / lever**2
         )
         start = np.repeat(
-            [3.0 * jolt, 3.0 * jolt / lever, 2.0 * jolt / period, 2.0 * jolt / lever / period], 3
-        )
-        self.start_covariance = np.diag(start**2)[:6, :6]  # of (δp, δθ) at the start
-        self._unseen = tracker.free_motions(T_camera_target)
-        self._belief: Belief = self._filter.start(
-            time, T_camera_target, covariance=with_unknown(np.diag(start**2), self._unseen)
-        )
+            [max(3.0 * jolt, known[0]), max(3.0 * jolt / lever, known[1]),
+             2.0 * jolt / period, 2.0 * jolt / lever / period], 3
+        )  # fmt: skip
+        self._start = np.diag(start**2)
+        self.start_covariance = self._start[:6, :6]  # of (δp, δθ) at the start
         self._memory = tracker.blank() if memory is None else memory
-        self._shared = np.zeros((6, 6))
-        self._missed = 0
+        self.restart(T_camera_target, time)
 
     @property
     def tracker(self) -> ObjectTracker:
@@ -214,6 +214,33 @@ class ObjectFollower:
     def in_color(self) -> bool:
         """Whether images are to be in colour, (height, width, 3); else grey, (height, width)."""
         return getattr(self._tracker, "channels", 1) == 3
+
+    def restart(self, T_camera_target: FloatArray, time: float) -> None:
+        """Look for the object around a pose (4, 4) again; what it looks like is not forgotten."""
+        self._unseen = self._tracker.free_motions(T_camera_target)
+        self._belief: Belief = self._filter.start(
+            time,
+            T_camera_target,
+            covariance=with_unknown(self._start, self._unseen),
+        )
+        self._shared = np.zeros((6, 6))
+        self._missed = 0
+
+    def carry(self, T_now_before: FloatArray) -> None:
+        """Take in that the camera has moved: its pose (4, 4) before, in its frame now.
+
+        Velocities stay those against the surroundings, along the camera's axes.
+        """
+        turn = np.kron(np.eye(4), T_now_before[:3, :3])
+        belief = self._belief
+        self._belief = replace(
+            belief,
+            T_world_target=se3_compose(T_now_before, belief.T_world_target),
+            velocity=turn[:6, :6] @ belief.velocity,
+            covariance=np.ascontiguousarray(turn @ belief.covariance @ turn.T),
+        )
+        self._unseen = turn[:6, :6] @ self._unseen
+        self._shared = turn[:6, :6] @ self._shared @ turn[:6, :6].T
 
     def follow(self, image: ImageArray, time: float) -> Step:
         """Look at the next image.

@@ -157,10 +157,18 @@ class CellModel:
         )
         return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
 
-    def sees(self, camera: str, points: FloatArray) -> BoolArray:
-        """Tell which points (N, 3) in the world no surface hides from a camera, (N,)."""
+    def sees(self, camera: str, points: FloatArray, inside_target: bool = False) -> BoolArray:
+        """Tell which points (N, 3) in the world no surface hides from a camera, (N,).
+
+        Points inside the target are not hidden by it.
+        """
         eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
-        return ~hidden(self.model, self.data, eye, points)
+        geoms = hiding(self.model, self.data, eye, points)
+        seen: BoolArray = geoms < 0
+        if inside_target:
+            own = [self.belongs_to_target(body) for body in self.model.geom_bodyid[geoms].tolist()]
+            seen |= np.array(own, dtype=np.bool_)
+        return seen
 
     def in_the_way(self, camera: str, points: FloatArray) -> tuple[str, ...]:
         """Return the names of the bodies that hide points (N, 3) in the world from a camera."""

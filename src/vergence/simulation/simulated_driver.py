@@ -343,13 +343,17 @@ class SimulatedDriver:
 
         Without images nobody picks features: they are spread over the middle of the task's image.
         """
+        self._inside_target = False
         known = self.cell.target.features
         if known:
             return np.array(known, dtype=np.float64)
         if isinstance(task, FollowTable) or looks_for_target(task.until):
-            from vergence.vision.known_object import object_model_of
+            from vergence.vision.known_object import as_followed, object_model_of
 
-            return object_model_of(self.world.model, "target").corners
+            model = object_model_of(self.world.model, "target")
+            followed = as_followed(model)
+            self._inside_target = followed is not model
+            return followed.corners
         if images or not isinstance(task, TrackTable):
             return np.empty((0, 3))
         camera = self.cameras[task.camera]
@@ -370,7 +374,7 @@ class SimulatedDriver:
         in_sight = np.flatnonzero(visible)
         if len(in_sight):
             points_world = transform_points(T_world_target, features[in_sight])
-            visible[in_sight] = self.world.sees(camera, points_world)
+            visible[in_sight] = self.world.sees(camera, points_world, self._inside_target)
         truth = FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
         return truth if self._curve is None else _truth_of_curve(truth, self._curve, intrinsics)
 

@@ -26,6 +26,11 @@ def shown_by_edges(model: ObjectModel) -> bool:
     return float(np.mean(shares)) >= LEAST_SHARE
 
 
+def as_followed(model: ObjectModel) -> ObjectModel:
+    """Return an object with the points that stand for it: its corners, or those of a box inside."""
+    return model if shown_by_edges(model) else model.boxed()
+
+
 def _share_on_edges(model: ObjectModel, turn: FloatArray) -> float:
     middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
     R = so3_exp(turn)

@@ -1,6 +1,7 @@
 """A rigid object as vision knows it: sharp edges, corners where they meet, a surface that hides."""
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -123,17 +124,18 @@ class ObjectModel:
             edge_normals=frozen(np.tile(both, (len(sides), 1, 1))),
         )
 
-    def with_corners(self) -> Self:
-        """Return the model itself.
+    def boxed(self) -> Self:
+        """Return the model with the corners of a box inside for its own, (8, 3).
 
-        Raises:
-            InputError: if it has no corner.
+        They stand for an object that is followed as a whole: no image shows them. The box is half
+        as large as the one around the object, of which half may be hidden or out of the image.
         """
-        if not len(self.corners):
-            given = f"{len(self.triangles)} triangles, {len(self.edges)} sharp edges, no corner"
-            allowed = "an object with corners, where sharp edges of different directions meet"
-            raise InputError(self.name, "faces", given, allowed)
-        return self
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        low, high = 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high
+        places = np.array(list(product(*zip(low, high, strict=True))))
+        return replace(
+            self, corners=frozen(places), corner_edges=_frozen_index(np.full((len(places), 1), -1))
+        )
 
     def coarsened(self, most: int) -> Self:
         """Return a model of at most so many triangles, for its outline; itself if it has no more.
