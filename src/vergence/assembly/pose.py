@@ -77,7 +77,9 @@ def follow_pose(
     surroundings = _surroundings(context)
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
-        "settings": PerceptionSettings(budget=table.budget),
+        "settings": PerceptionSettings(
+            budget=table.budget, margin_px=table.border_px, apart_px=table.feature_distance_px
+        ),
         "find": _find(context, images),
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }

@@ -23,6 +23,7 @@ from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
+from vergence.estimation.spacing import keep_apart
 from vergence.estimation.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.view import View, view_of
@@ -179,9 +180,10 @@ class PosePerception(Generic[B]):
             return visibility.visible
         none = np.zeros(len(self._shape.points), dtype=np.bool_)
         numbers = [p.number for p in predictions]
+        held = np.array([self._held.get(p.frame.camera, none) for p in predictions])
         chosen = self._selection.choose(
             Candidates(
-                visibility.visible,
+                keep_apart(visibility.visible, visibility.points_px, held, self._settings.apart_px),
                 visibility.points_px,
                 self._shape.points,
                 np.array([p.T_world_target for p in predictions]),
@@ -189,7 +191,7 @@ class PosePerception(Generic[B]):
                 self._noise[numbers],
                 self._diagonal[numbers],
                 np.ascontiguousarray(predictions[-1].covariance[:6, :6]),
-                np.array([self._held.get(p.frame.camera, none) for p in predictions]),
+                held,
             ),
             self._settings.budget if predictions[-1].certain else self._settings.budget_in_doubt,
         )

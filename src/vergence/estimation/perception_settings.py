@@ -11,6 +11,7 @@ class PerceptionSettings:
     budget_in_doubt: int = 32  # the same while the filter is inconsistent
     doubt_widens: float = 4.0  # windows by 1 + this · share of the last points that disagreed
     margin_px: float = 8.0  # from the border of an image
+    apart_px: float = 0.0  # least distance between features chosen in one image
     least_cosine: float = 0.1  # between a face's normal and the line of sight
     horizon: float = 0.5  # s, how late an image may arrive
     lost_after: float = 1.0  # s without an image that was used

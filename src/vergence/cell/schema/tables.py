@@ -342,6 +342,9 @@ class PerceptionTable(Table):
     selection: Literal["information", "indexes"] = "information"
     # Features measured per tick, over all cameras.
     budget: Annotated[int, Field(ge=3, le=4096)] = 16
+    border_px: Pixels = 8.0  # distance of chosen features from the border of an image
+    # Least distance between features chosen in one image; 0 for any.
+    feature_distance_px: Annotated[float, Field(ge=0, le=1000)] = 0.0
     # Standard deviation of a measured point; also simulated if no images are rendered.
     noise_px: _Noise = 0.5
     # Standard deviation that the filter uses instead of that stated by each measurement.
