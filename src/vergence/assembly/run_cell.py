@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 
+from vergence.assembly.axis_advice import axis_advice
 from vergence.assembly.parts import Parts
 from vergence.assembly.self_calibrating import SELF_CALIBRATION, SelfCalibrating, words
 from vergence.assembly.tag import with_tag_in_view
@@ -16,7 +17,7 @@ from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder
 from vergence.runtime.driver import Driver
 from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.results import UNDER_ACTUATED
+from vergence.runtime.results import POOR_AXES, UNDER_ACTUATED
 from vergence.signals import Frame, Outcome
 from vergence.simulation import SimulatedDriver
 
@@ -110,6 +111,8 @@ def run_driver(
     else:
         if limits := under_actuation(parts.context):
             Listeners(everyone).event(0.0, UNDER_ACTUATED, limits)
+        if advice := axis_advice(parts.context):
+            Listeners(everyone).event(0.0, POOR_AXES, advice)
         calibrating: SelfCalibrating | None = None
         if self_calibration and len(cell.tasks) <= 1 and SelfCalibrating.suits(parts.context):
             calibrating = SelfCalibrating(parts.context)
