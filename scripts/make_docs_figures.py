@@ -1,6 +1,6 @@
 """Make what the documentation shows of our own runs: figures, checks, the table of the laws.
 
-    scripts/make_docs_figures.py [nelson1995 … guarantees honesty photograph defaults laws]
+    scripts/make_docs_figures.py [nelson1995 … guarantees honesty photograph imaging defaults laws]
 
 It runs `vergence reproduce` and `vergence compare` in full, which takes about half an hour, and
 writes images into docs/images and tables into docs/papers and docs/guide. The papers' studies are
@@ -8,6 +8,7 @@ repeated with ten seeds on exact projections. What is already in build/docs is n
 it to start afresh.
 """
 
+import csv
 import json
 import re
 import subprocess
@@ -28,6 +29,7 @@ PAPERS = (
     "honesty",
     "region",
     "features",
+    "imaging",
     "photograph",
     "defaults",
 )
@@ -117,6 +119,28 @@ def slim(svg: str) -> str:
     return re.sub(r"-?\d\.\d{3,}", lambda number: f"{float(number[0]):.2g}", svg)
 
 
+def imaging() -> None:
+    """Write the table of what laws and trackers lose by a real camera."""
+    reproduce("imaging")
+    with (BUILD / "imaging" / "imaging.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    lines = [
+        "| | | cell | final error: ideal | real | tracking: ideal | real | lost: ideal | real |",
+        "|---|---|---|--:|--:|--:|--:|--:|--:|",
+    ]
+    for row in rows:
+        errors = [
+            f"{float(row[f'{kind}_{images}']):.2g} {row[unit]}".replace("nan", "–")
+            for kind, unit in (("final", "unit"), ("tracking", "tracking_unit"))
+            for images in ("ideal", "real")
+        ]
+        lost = [f"{row[f'lost_{images}']} of {row['runs']}" for images in ("ideal", "real")]
+        cell = f"`{row['cell']}`" if row["cell"] else "films"
+        cells = (row["role"], row["name"].replace("_", " "), cell, *errors, *lost)
+        lines.append("| " + " | ".join(cells) + " |")
+    (DOCS / "papers" / "_imaging_table.md").write_text("\n".join(lines) + "\n")
+
+
 def compare() -> None:
     """Write the tables of the laws."""
     lines = []
@@ -150,6 +174,8 @@ def main() -> None:
     for name in desired:
         if name == "laws":
             compare()
+        elif name == "imaging":
+            imaging()
         else:
             reproduce(name)
 

@@ -84,6 +84,22 @@ def test_a_mark_that_is_none_has_a_reason(image: np.ndarray, reason: str) -> Non
     np.testing.assert_array_equal(found.points_px, middle)
 
 
+def test_a_thin_ring_that_noise_makes_is_no_mark() -> None:
+    """No pixel is well inside of it, and none in its box well outside."""
+    image = np.zeros((17, 16), np.uint8)
+    image[16, 0] = 195  # so that the middle of dark and bright is 97.5
+    image[:6, 11:] = [
+        [90, 110, 90, 0, 0],
+        [110, 90, 110, 0, 0],
+        [110, 90, 110, 110, 90],
+        [110, 90, 90, 90, 110],
+        [90, 110, 90, 110, 90],
+        [0, 90, 110, 90, 0],
+    ]
+    found = measure_round_marks(image, np.array([[7.5, 8.0]]), np.full((1, 2), 60.0))
+    assert not found.found[0]
+
+
 def test_a_mark_outside_the_image_is_told() -> None:
     found = measure_round_marks(disc((40, 40), 5), np.array([[-4.0, 5.0]]), np.array([[9.0, 9.0]]))
     assert found.reasons == ("outside the image",)

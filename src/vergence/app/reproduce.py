@@ -63,7 +63,7 @@ def reproduce(
 def _remark(paper: str, result: "StudyResult", quick: bool, imaging: str | None) -> str:
     seeds = f"seeds {result.seed} to {result.seed + result.seeds - 1}" if result.seeds > 1 else ""
     images = f"imaging {imaging}" if imaging else ""
-    shorter = FEWER if RENDERED.get(paper) else QUICK
+    shorter = FEWER if RENDERED.get(paper, paper == "imaging") else QUICK
     return "; ".join(filter(None, (shorter if quick else "", seeds, images)))
 
 

@@ -21,6 +21,7 @@ PAPERS = (
     "honesty",
     "region",
     "features",
+    "imaging",
 )
 
 

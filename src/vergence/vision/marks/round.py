@@ -118,6 +118,8 @@ def _centroid(
             if cut:
                 continue
             size = _moments(window, labels, number, stack[:count], low, high, level, found, spread)
+            if size <= 0.0:
+                continue
             distance = np.hypot(found[0] - u, found[1] - v)
             if distance >= nearest:
                 continue
@@ -179,7 +181,8 @@ def _moments(
 ) -> float:
     """Fill centroid and second moments of a patch and the rim around it; return its area.
 
-    A pixel counts by the share of it that the mark covers, told by its grey level.
+    A pixel counts by the share of it that the mark covers, told by its grey level. A patch that is
+    no brighter or darker than what lies around it has no area.
     """
     rows, columns = window.shape
     bright = window[pixels[0, 0], pixels[0, 1]] > level
@@ -189,6 +192,8 @@ def _moments(
     inside = _level(window, labels, number, True, inside, top, bottom, left, right)
     outside = _level(window, labels, number, False, outside, top, bottom, left, right)
     total, su, sv, suu, suv, svv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if inside == outside:
+        return 0.0
     for r in range(top, bottom + 1):
         for c in range(left, right + 1):
             share = (window[r, c] - outside) / (inside - outside)
@@ -206,6 +211,8 @@ def _moments(
             suu += share * c * c
             suv += share * c * r
             svv += share * r * r
+    if total <= 0.0:
+        return 0.0
     u, v = su / total, sv / total
     place[0], place[1] = u, v
     spread[0, 0], spread[1, 1] = suu / total - u * u, svv / total - v * v
