@@ -7,7 +7,6 @@ from pydantic import Field, model_validator
 
 from vergence.cell.schema.base import Placement, Text
 from vergence.errors import InputError
-from vergence.geometry import rpy_to_matrix
 from vergence.tag_families import tag_family
 
 
@@ -34,6 +33,8 @@ class TagTable(Placement):
     @property
     def corners(self) -> tuple[tuple[float, float, float], ...]:
         """The corners in the target's frame, clockwise from the marker's top left, m."""
+        from vergence.geometry import rpy_to_matrix
+
         half = self.size_m / 2
         own = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
         roll, pitch, yaw = np.deg2rad(self.rotation_rpy_deg)
