@@ -18,7 +18,7 @@ class TagTable(Placement):
     """
 
     dictionary: Text = "apriltag_36h11"  # dictionary of the marker, such as aruco_4x4_50
-    id: Annotated[int, Field(ge=0)]  # number of the marker
+    id: Annotated[int, Field(ge=0, le=9999)]  # number of the marker
     # Side of the marker with its black border, without the white around it.
     size_m: Annotated[float, Field(ge=1e-3, le=10)]
 
