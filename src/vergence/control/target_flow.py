@@ -10,8 +10,9 @@ class TargetFlow:
 
     Flow f and trend g are smoothed by exponential weights of one time constant T, without lag
     behind a steady change: with θ = exp(-Δt/T) and the deviation ε of a measured flow from the
-    predicted one, f ← f + Δt g + (1 - θ²) ε and g ← g + (1 - θ)² ε / Δt. A flow measured between
-    two images is that of the instant between them.
+    predicted one, f ← f + Δt g + (1 - θ²) ε and g ← g + (1 - θ)² ε / Δt: an α-β filter with
+    α = 1 - θ² and β = (1 - θ)², which [Nelson1995] section 2.1 names for its d_F. A flow measured
+    between two images is that of the instant between them.
 
     Args:
         smoothing_s: T; infinite for a flow that is zero for ever.
