@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
@@ -17,6 +18,7 @@ from vergence.estimation.object_search import search_object
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.look_alikes import Turn, between, symmetries
 
+_LEAST_FOUND = 0.75  # share of a lost object, for it to be found again
 _MISSED = 2  # images in a row without the object, from which on it is looked for elsewhere
 
 
@@ -48,7 +50,7 @@ class HypothesisFollower:
     ) -> None:
         self._tracker, self._camera, self._period = tracker, camera, period
         self._rule = rule or FollowRule()
-        self._main = self._begin(starts[0], time)
+        self._main = self._begin(starts[0], time, tracker.blank())
         self._others = tuple(starts[1:])
         self._by_edges = isinstance(tracker, EdgeTracker)
         self._turns = symmetries(tracker.model) if self._by_edges else []
@@ -97,22 +99,23 @@ class HypothesisFollower:
             self._missed += 1
         return step
 
-    def _begin(self, T: FloatArray, time: float) -> ObjectFollower:
-        memory = None if not hasattr(self, "_main") else self._main.memory
+    def _begin(self, T: FloatArray, time: float, memory: Any) -> ObjectFollower:
         return ObjectFollower(
             self._tracker, self._camera, T, time, self._period, self._rule, memory
         )
 
     def _compare(self, image: ImageArray, time: float) -> None:
         """Choose among turned poses, and keep those that cannot be told apart."""
-        chosen, rivals, self.note = compare_poses(
+        chosen, rivals, note = compare_poses(
             self._tracker, image, self._camera, self._main.T_camera_target,
             self._main.start_covariance, self._turns, self._others, self._rule.least_of_all,
         )  # fmt: skip
-        if self.note:
-            self._main = self._begin(chosen, time)
-        self._rivals = [Rival(self._begin(T, time), Evidence()) for T in rivals]
-        self._evidence, self._compared = Evidence(), True
+        memory = self._main.memory
+        if note:
+            self.note = note
+            self._main = self._begin(chosen, time, memory)
+        self._rivals = [Rival(self._begin(T, time, memory), Evidence()) for T in rivals]
+        self._evidence, self._compared, self._others = Evidence(), True, ()
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
         """Look for a lost object elsewhere; return the step as it is if it is not found."""
@@ -121,15 +124,15 @@ class HypothesisFollower:
             return step
         place = search_object(
             self._tracker, image, self._camera, self._last, self._main.start_covariance,
-            self._main.memory, missed, self._rule.surprising_share,
+            self._main.memory, missed, max(self._rule.surprising_share, _LEAST_FOUND),
         )  # fmt: skip
         if place is None:
             return step
-        again = self._begin(place, time)
+        again = self._begin(place, time, self._main.memory)
         found = again.follow(image, time)
         if found.sighting is not Sighting.SEEN:
             return step
-        self._main, self._rivals = again, []
+        self._main, self._rivals, self._compared = again, [], False
         return found
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:

@@ -100,7 +100,7 @@ def compare_poses(
         chosen = fits[0]
         turn = between(given.T_camera_target, chosen.T_camera_target)
         note = (
-            f"the start fits {given.share:.0%} of the edges; turned by {turn} it fits "
+            f"the first pose fits {given.share:.0%} of the edges; turned by {turn} it fits "
             f"{chosen.share:.0%}, and that is taken"
         )
     near = [fit.T_camera_target for fit in fits if chosen.evidence.over(fit.evidence) < DECIDED]
