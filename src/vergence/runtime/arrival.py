@@ -12,6 +12,9 @@ from vergence.signals import ImagePoints, JointCommand, Observation, Outcome, Re
 _WINDOW_S = 1.0  # over which errors are averaged and rest is judged
 _FALLING = 0.1  # share of the error by which it is less in the later half of a window, if it falls
 _FALLING_PX = 0.01  # and by how much at least
+_NO_LIMIT = (
+    "no limit: this is a local minimum of the law, or its features leave the rest of the way free"
+)
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _DESIRED_MOVED_PX = 0.1  # in a window, up to which the desired features are at rest
 
@@ -115,7 +118,7 @@ class Arrival:
         held = list(self.active)
         if _mirrored(self._rows[-1]):
             held.append("a goal that shows the mirror image of the features seen")
-        return " and ".join(held) or "a local minimum of the law; no limit is active"
+        return " and ".join(held) or _NO_LIMIT
 
     def outcome(self, duration_s: float, time: float) -> Outcome:
         """Return how a run ends whose time is over."""
