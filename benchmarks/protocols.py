@@ -1,17 +1,18 @@
 """The same cell in simulation and over a robot's protocol: final error, and features lost.
 
-.drivers/NAME/bin/python benchmarks/protocols.py NAME    (make test-drivers makes the environment)
-python benchmarks/protocols.py socket
+.drivers/NAME/bin/python benchmarks/protocols.py NAME [--moving]    (after make test-drivers)
+python benchmarks/protocols.py socket [--moving]
 
-NAME is franka, ros2, so101, socket or ur. The robot is the one of the driver's tests, in a process
-of its own, with a camera whose images are rendered from where its arm is. It keeps real time, so a
-busy computer makes the figures worse; the load is told beside them.
+NAME is franka, ros2, so101, socket or ur. With --moving the target goes round a circle, and the
+error is the root mean square of the second half. The robot is the one of the driver's tests, in a
+process of its own, with a camera whose images are rendered from where its arm is. It keeps real
+time, so a busy computer makes the figures worse; the load is told beside them.
 """
 
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +28,10 @@ from vergence.runtime import Driver, Run
 
 ROOT = Path(__file__).parents[1]
 RUNS, LAST = 3, 10  # runs over the protocol, and images at the end whose error is taken
+MOVING = {
+    "target.motion": '{ kind = "circle", radius_m = 0.02, period_s = 8 }',
+    "duration_s": "16",
+}
 SOCKET = {
     "target.motion": '{ kind = "stationary" }',
     "task.desired": '"centred"',
@@ -52,7 +57,7 @@ def ended(robot: Any) -> Iterator[Any]:
 
 
 @contextmanager
-def ur(cell: Cell) -> Iterator[Driver]:
+def ur(cell: Cell, _: Mapping[str, str]) -> Iterator[Driver]:
     protocol, rendered = import_module("protocol_ur"), import_module("rendered")
     with ended(protocol.Robot()) as robot:
         made = protocol.Ur(robot.address, **protocol.BUSY)
@@ -60,7 +65,7 @@ def ur(cell: Cell) -> Iterator[Driver]:
 
 
 @contextmanager
-def franka(cell: Cell) -> Iterator[Driver]:
+def franka(cell: Cell, _: Mapping[str, str]) -> Iterator[Driver]:
     protocol, camera = import_module("protocol_franka"), import_module("rendered").Rendered(cell)
     with ended(protocol.Robot()) as robot:
         driver = robot.open(seeing(cell, camera, protocol.RATE_HZ))
@@ -69,24 +74,24 @@ def franka(cell: Cell) -> Iterator[Driver]:
 
 
 @contextmanager
-def so101(cell: Cell) -> Iterator[Driver]:
+def so101(cell: Cell, _: Mapping[str, str]) -> Iterator[Driver]:
     protocol, camera = import_module("protocol_so101"), import_module("rendered").Rendered(cell)
     with ended(protocol.Servos()) as servos:
         yield servos.open(seeing(cell, camera, 100.0), rate_hz=20.0)
 
 
 @contextmanager
-def ros2(_: Cell) -> Iterator[Driver]:
+def ros2(_: Cell, settings: Mapping[str, str]) -> Iterator[Driver]:
     protocol = import_module("protocol_ros2")
-    with ended(protocol.Robot(images="mono8", cell=["ur5", protocol.SETTINGS])) as robot:
+    with ended(protocol.Robot(images="mono8", cell=["ur5", settings])) as robot:
         images = {"wrist": f"{robot.space}/wrist/image_raw"}
         yield robot.open(protocol.SEEING, images=images)
 
 
 @contextmanager
-def socket(cell: Cell) -> Iterator[Driver]:
+def socket(cell: Cell, settings: Mapping[str, str]) -> Iterator[Driver]:
     port = "5017"
-    words = [sys.executable, "robot.py", "ur5", port, *(f"{k}={v}" for k, v in SOCKET.items())]
+    words = [sys.executable, "robot.py", "ur5", port, *(f"{k}={v}" for k, v in settings.items())]
     folder = ROOT / "examples" / "hardware"
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL) as robot:
         try:
@@ -95,37 +100,40 @@ def socket(cell: Cell) -> Iterator[Driver]:
             robot.kill()
 
 
-MAKES: dict[str, Callable[[Cell], Any]] = {
+MAKES: dict[str, Callable[[Cell, Mapping[str, str]], Any]] = {
     "franka": franka, "ros2": ros2, "so101": so101, "socket": socket, "ur": ur,
 }  # fmt: skip
 
 
-def cell_of(name: str) -> Cell:
-    if name == "socket":
-        return load_cell("ur5", SOCKET)
-    if name == "ur":
-        return load_cell("ur5", UR)
-    cell: Cell = import_module(f"protocol_{name}").CELL
-    return cell
+def settings_of(name: str, moving: bool) -> tuple[str, Mapping[str, str]]:
+    """Return the cell that a robot is tried with, and what is set in it."""
+    cell, settings = {"socket": ("ur5", SOCKET), "ur": ("ur5", UR)}.get(name, ("", {}))
+    if not cell:
+        protocol = import_module(f"protocol_{name}")
+        cell, settings = protocol.CELL.name, protocol.SETTINGS
+    return cell, {**settings, **MOVING} if moving else settings
 
 
-def told(run: Run, camera: str) -> tuple[float, int, int]:
-    """Return the final error, px, how many features were not found in an image, and of how many."""
+def told(run: Run, camera: str, moving: bool) -> tuple[float, int, int]:
+    """Return the error, px, how many features were not found in an image, and of how many."""
     trace = run.cameras[camera]
-    return float(np.nanmean(trace.error_px[-LAST:])), int((~trace.found).sum()), trace.found.size
+    error = trace.error_px[len(trace.error_px) // 2 :]
+    final = np.sqrt(np.nanmean(error**2)) if moving else np.nanmean(error[-LAST:])
+    return float(final), int((~trace.found).sum()), trace.found.size
 
 
-def main(name: str) -> None:
+def main(name: str, moving: bool) -> None:
     sys.path.insert(0, str(ROOT / "tests" / "drivers"))
-    cell = cell_of(name)
+    cell_name, settings = settings_of(name, moving)
+    cell = load_cell(cell_name, settings)
     camera = cell.task.camera
-    simulated = told(run_cell(cell), camera)
+    simulated = told(run_cell(cell), camera, moving)
     runs = []
     for _ in range(RUNS):
-        with MAKES[name](cell) as driver:
+        with MAKES[name](cell, settings) as driver:
             run = run_driver(cell, driver, (), images=True)
             driver.close()
-        runs.append((*told(run, camera), run.outcome.kind.value))
+        runs.append((*told(run, camera, moving), run.outcome.kind.value))
     errors = [error for error, *_ in runs]
     print(
         f"| `{name}` | `{cell.name}` | {simulated[0]:.2f} | "
@@ -136,4 +144,4 @@ def main(name: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1], "--moving" in sys.argv[2:])
