@@ -28,10 +28,7 @@ from vergence.runtime import Driver, Run
 
 ROOT = Path(__file__).parents[1]
 RUNS, LAST = 3, 10  # runs over the protocol, and images at the end whose error is taken
-MOVING = {
-    "target.motion": '{ kind = "circle", radius_m = 0.02, period_s = 8 }',
-    "duration_s": "16",
-}
+ROUND_M = {"so101": 0.004}  # radius of the circle: its arm is slow
 SOCKET = {
     "target.motion": '{ kind = "stationary" }',
     "task.desired": '"centred"',
@@ -111,7 +108,10 @@ def settings_of(name: str, moving: bool) -> tuple[str, Mapping[str, str]]:
     if not cell:
         protocol = import_module(f"protocol_{name}")
         cell, settings = protocol.CELL.name, protocol.SETTINGS
-    return cell, {**settings, **MOVING} if moving else settings
+    if moving:
+        motion = f'{{ kind = "circle", radius_m = {ROUND_M.get(name, 0.02)}, period_s = 8 }}'
+        settings = {**settings, "target.motion": motion, "duration_s": "16"}
+    return cell, settings
 
 
 def told(run: Run, camera: str, moving: bool) -> tuple[float, int, int]:
