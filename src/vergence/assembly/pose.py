@@ -107,9 +107,14 @@ def follow_pose(
 
 
 def by_outline(model: "ObjectModel") -> bool:
-    """Tell whether a target is followed by its outline: it has a mesh, but few sharp edges."""
-    from vergence.vision.known_object import shown_by_edges
+    """Tell whether a target is followed by its outline: it has a mesh, but no corners.
 
+    One with corners is followed by them, from any number of cameras, however round the rest of it.
+    """
+    from vergence.vision.known_object import has_corners, shown_by_edges
+
+    if has_corners(model):
+        return False
     return bool(len(model.triangles)) and not shown_by_edges(model)
 
 

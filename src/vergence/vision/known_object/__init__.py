@@ -8,7 +8,7 @@ from vergence.vision.known_object.corner_extractor import (
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement, EdgeMemory
 from vergence.vision.known_object.edge_tracker import EdgeTracker
 from vergence.vision.known_object.loading import load_object_model, object_model_of
-from vergence.vision.known_object.modality import as_followed, shown_by_edges
+from vergence.vision.known_object.modality import as_followed, has_corners, shown_by_edges
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette_tracker import (
     SilhouetteMeasurement,
@@ -17,6 +17,7 @@ from vergence.vision.known_object.silhouette_tracker import (
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes
 
 __all__ = [
+    "has_corners",
     "CornerExtractor",
     "CornerMeasurements",
     "EdgeMeasurement",

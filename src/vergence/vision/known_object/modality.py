@@ -26,9 +26,14 @@ def shown_by_edges(model: ObjectModel) -> bool:
     return float(np.mean(shares)) >= LEAST_SHARE
 
 
+def has_corners(model: ObjectModel) -> bool:
+    """Tell whether sharp edges of an object meet: the points of a box that stand for it do not."""
+    return bool((model.corner_edges >= 0).any())
+
+
 def as_followed(model: ObjectModel) -> ObjectModel:
     """Return an object with the points that stand for it: its corners, or those of a box inside."""
-    return model if shown_by_edges(model) else model.boxed()
+    return model if has_corners(model) or shown_by_edges(model) else model.boxed()
 
 
 def _share_on_edges(model: ObjectModel, turn: FloatArray) -> float:
