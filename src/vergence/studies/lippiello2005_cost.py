@@ -24,7 +24,7 @@ from vergence.simulation import SimulatedDriver
 
 BUDGET = 16
 CAMERAS = (2, 64)  # few and many
-_TICKS = 100
+_TICKS = 60
 
 
 class Cost(NamedTuple):
@@ -102,6 +102,11 @@ class _TimedPerception:
             settings=PerceptionSettings(budget=BUDGET, budget_in_doubt=BUDGET),
         )
 
+    @property
+    def lost(self) -> bool:
+        """Whether it no longer follows its target, so that a tick costs nothing."""
+        return bool(self._perception.lost)
+
     def tick(self, k: int) -> Cost:
         """Look at the k-th image with every camera."""
         frames = [replace(self._image, camera=name, time=k / 26.0) for name in self._names]
@@ -114,6 +119,7 @@ def measure_costs(cell: Cell, counts: Sequence[int]) -> tuple[Cost, ...]:
     """Time perception with several numbers of cameras at a fixed budget of features.
 
     They take turns tick by tick, so that whatever else the machine does falls on all of them alike.
+    NaN if one of them loses the target.
 
     Args:
         cell: with a camera `fixed`.
@@ -125,4 +131,6 @@ def measure_costs(cell: Cell, counts: Sequence[int]) -> tuple[Cost, ...]:
     finally:
         driver.close()
     laps = np.array([[rival.tick(k) for rival in rivals] for k in range(_TICKS)])
+    if any(rival.lost for rival in rivals):
+        return (Cost(np.nan, np.nan, np.nan),) * len(counts)
     return tuple(Cost(*least) for least in laps[_TICKS // 4 :].min(axis=0))
