@@ -9,7 +9,14 @@ from vergence.app.figures.arm import CLEAR_OF, clearance, normalized
 from vergence.app.figures.constraints import constraint_names
 from vergence.arrays import FloatArray
 from vergence.runtime import ArmInfo
-from vergence.runtime.results import POOR_AXES, UNDER_ACTUATED, ArmTrace, CameraTrace, Run
+from vergence.runtime.results import (
+    FREE_DIRECTIONS,
+    POOR_AXES,
+    UNDER_ACTUATED,
+    ArmTrace,
+    CameraTrace,
+    Run,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +172,11 @@ _RATES = {
     "joint margin": "rad/s or m/s",
 }  # of limits that can be relaxed; the others have no length
 
-_EVENTS = {UNDER_ACTUATED: "unserved directions", POOR_AXES: "poor axes"}
+_EVENTS = {
+    UNDER_ACTUATED: "unserved directions",
+    POOR_AXES: "poor axes",
+    FREE_DIRECTIONS: "free directions",
+}
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
     "duration_s",
     "final_error_px",

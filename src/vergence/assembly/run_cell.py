@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 
 from vergence.assembly.axis_advice import axis_advice
+from vergence.assembly.free_directions import free_directions
 from vergence.assembly.parts import Parts
 from vergence.assembly.self_calibrating import SELF_CALIBRATION, SelfCalibrating, words
 from vergence.assembly.tag import with_tag_in_view
@@ -17,7 +18,7 @@ from vergence.runtime import Listener, Loop, Run, RunInfo, RunRecorder
 from vergence.runtime.driver import Driver
 from vergence.runtime.following import FollowingBound
 from vergence.runtime.listeners import Listeners
-from vergence.runtime.results import POOR_AXES, UNDER_ACTUATED
+from vergence.runtime.results import FREE_DIRECTIONS, POOR_AXES, UNDER_ACTUATED
 from vergence.signals import Frame, Outcome
 from vergence.simulation import SimulatedDriver
 
@@ -113,6 +114,8 @@ def run_driver(
             Listeners(everyone).event(0.0, UNDER_ACTUATED, limits)
         if advice := axis_advice(parts.context):
             Listeners(everyone).event(0.0, POOR_AXES, advice)
+        if free := free_directions(parts.context):
+            Listeners(everyone).event(0.0, FREE_DIRECTIONS, free)
         calibrating: SelfCalibrating | None = None
         if self_calibration and len(cell.tasks) <= 1 and SelfCalibrating.suits(parts.context):
             calibrating = SelfCalibrating(parts.context)

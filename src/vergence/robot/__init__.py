@@ -20,7 +20,11 @@ from vergence.robot.manipulability import (
     transmissibility_measure,
     yoshikawa_measure,
 )
-from vergence.robot.unserved_directions import UnservedDirections, unserved_directions
+from vergence.robot.unserved_directions import (
+    UnservedDirections,
+    unmeasured_directions,
+    unserved_directions,
+)
 
 __all__ = [
     "goal_configurations",
@@ -39,6 +43,7 @@ __all__ = [
     "manipulability_measure",
     "per_joint_limit_penalty",
     "transmissibility_measure",
+    "unmeasured_directions",
     "unserved_directions",
     "world_jacobian",
     "yoshikawa_measure",

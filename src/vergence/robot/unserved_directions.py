@@ -21,9 +21,9 @@ class UnservedDirections(NamedTuple):
         return bool(self.impossible or self.tied)
 
     def __str__(self) -> str:
-        words = [f"cannot {_listed(self.impossible, 'or')}"] if self.impossible else []
+        words = [f"cannot {listed(self.impossible, 'or')}"] if self.impossible else []
         if self.tied:
-            words.append(f"can {_listed(self.tied, 'and')} only in combination")
+            words.append(f"can {listed(self.tied, 'and')} only in combination")
         return " and ".join(words)
 
 
@@ -39,7 +39,24 @@ def unserved_directions(J: FloatArray, length_m: float) -> UnservedDirections:
     scale = np.repeat((1.0 / length_m, 1.0), 3)
     U, values, _ = np.linalg.svd(scale[:, None] * J)
     rank = np.count_nonzero(values > _ZERO * max(values.max(initial=0.0), 1e-12))
-    share = np.sum(U[:, rank:] ** 2, axis=1)
+    return _named(U[:, rank:])
+
+
+def unmeasured_directions(H: FloatArray, length_m: float) -> UnservedDirections:
+    """Return the directions of a twist that change nothing of a quadratic ½ vᵀ H v.
+
+    Args:
+        H: (6, 6), positive semi-definite.
+        length_m: as for `unserved_directions`.
+    """
+    scale = np.repeat((length_m, 1.0), 3)
+    values, vectors = np.linalg.eigh(scale[:, None] * H * scale)
+    return _named(vectors[:, values <= _ZERO**2 * max(float(values[-1]), 1e-12)])
+
+
+def _named(basis: FloatArray) -> UnservedDirections:
+    """Name the directions of an orthonormal basis (6, k)."""
+    share = np.sum(basis**2, axis=1)
     named = list(zip(_DIRECTIONS, share.tolist(), strict=True))
     return UnservedDirections(
         tuple(name for name, part in named if part > _ALL),
@@ -47,7 +64,7 @@ def unserved_directions(J: FloatArray, length_m: float) -> UnservedDirections:
     )
 
 
-def _listed(names: tuple[str, ...], word: str) -> str:
-    """Return names as a list in a sentence."""
+def listed(names: tuple[str, ...], word: str) -> str:
+    """Return names as a list in a sentence, with a word such as "and" before the last."""
     *first, last = names
     return f"{', '.join(first)} {word} {last}" if first else last

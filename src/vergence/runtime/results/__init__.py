@@ -7,7 +7,13 @@ from vergence.runtime.results.pose_errors import (
     pose_errors,
     tick_pose_errors,
 )
-from vergence.runtime.results.run import POOR_AXES, UNDER_ACTUATED, Event, Run
+from vergence.runtime.results.run import (
+    FREE_DIRECTIONS,
+    POOR_AXES,
+    UNDER_ACTUATED,
+    Event,
+    Run,
+)
 from vergence.runtime.results.run_recorder import RunRecorder
 from vergence.runtime.results.summary import summarise
 from vergence.runtime.results.tick_rows import (
@@ -20,6 +26,7 @@ from vergence.runtime.results.tick_rows import (
 from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace, largest
 
 __all__ = [
+    "FREE_DIRECTIONS",
     "POOR_AXES",
     "UNDER_ACTUATED",
     "ArmTrace",

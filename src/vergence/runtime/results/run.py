@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UNDER_ACTUATED = "under-actuated"  # the event that tells which directions an arm cannot serve
+FREE_DIRECTIONS = "free directions"  # the event that tells what the objectives leave free
 POOR_AXES = "poor axes"  # the event that tells which axes of a law hardly move its features
 
 
