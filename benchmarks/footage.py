@@ -1,6 +1,6 @@
 """Measures perception on images that nobody rendered, beside ViSP and OpenCV.
 
-    python benchmarks/footage.py [--json] [--markdown FILE] [KIND...]
+    python benchmarks/footage.py [--json] [--markdown FILE] [--figure FILE] [KIND...]
 
 The kinds are objects, points, tags, boards and pairs. The exit code is 1 when an aim does not hold,
 and 2 where the images are not installed.
@@ -12,6 +12,7 @@ import json
 import sys
 from pathlib import Path
 
+from footage_figure import draw
 from footage_rows import Row, markdown
 from real_images import IMAGES, INSTALL
 
@@ -38,6 +39,7 @@ def main() -> int:
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)} (all)")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the objects there")
     options = parser.parse_args()
     if unknown := sorted(set(options.kinds) - set(KINDS)):
         parser.error(f"no kind {', '.join(unknown)}; there are: {', '.join(KINDS)}")
@@ -48,6 +50,8 @@ def main() -> int:
     text = "\n".join(f"## {KINDS[kind]}\n\n{markdown(rows)}\n" for kind, rows in found.items())
     if options.markdown:
         options.markdown.write_text(text)
+    if options.figure and "objects" in found:
+        draw(found["objects"], options.figure)
     if options.json:
         records = [row.record for rows in found.values() for row in rows]
         print(json.dumps({"footage": records}))
