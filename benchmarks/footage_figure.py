@@ -29,7 +29,6 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         axes.barh(place, share, left=left, height=0.85, color=color, label=name)
         left += share
     axes.set_yticks(place, [f"{row.case}: {row.who}" for row in shown], fontsize=7)
-    axes.set_axisbelow(True)
     axes.invert_yaxis()
     axes.margins(y=0.01)
     axes.set_xlim(0, 100)

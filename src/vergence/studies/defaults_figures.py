@@ -54,7 +54,6 @@ def _endings(found: Mapping[str, Sequence[Tried]]) -> "Drawing":
         look = {"color": COLORS[color], "hatch": "/////" * again, "edgecolor": "white"}
         axes.barh(names, share, left=left, label=end.value, linewidth=0.0, **look)
         left += share
-    axes.set_axisbelow(True)
     axes.invert_yaxis()
     axes.set_xlabel("runs (%)")
     axes.set_xlim(0, 100)
@@ -83,7 +82,6 @@ def _combinations(tried: Sequence[Tried]) -> "Drawing":
     axes.set_yticks(range(len(rows)), rows)
     axes.invert_yaxis()
     axes.set_xlabel("reached (%)")
-    axes.set_axisbelow(True)
     legend(axes)
     return drawing
 

@@ -53,7 +53,6 @@ def _ends(ends: Counter[tuple[str, str]]) -> Any:
         left = [a + b for a, b in zip(left, share, strict=True)]
     axes.set_xlabel("runs (%)")
     axes.set_xlim(0, 100)
-    axes.set_axisbelow(True)
     axes.grid(visible=False, axis="y")
     legend(axes)
     return drawing

@@ -38,7 +38,6 @@ def scores_figure(scores: Sequence[Score]) -> Panels:
         bars.barh(names, counts, left=left, color=_LOOKS[ending][0], label=ending.value)
         left += counts
     bars.invert_yaxis()
-    bars.set_axisbelow(True)
     bars.grid(visible=False, axis="y")
     bars.set_xlabel("runs")
     bars.locator_params(axis="x", integer=True)

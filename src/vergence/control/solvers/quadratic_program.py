@@ -34,8 +34,10 @@ _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
 _APPROACH_RATE_HZ = 2.0
 _PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
 _DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
+_NEARLY, _SINGULAR = 1e-6, 1e-3  # w' and smallest singular value of a singular configuration
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _UNSTEADY = 0.5  # share of the highest change of rates in a period that noise may cause
+_KEPT = 0.9  # share of the rates now to which joints keep against noise: ten images long
 _STALL_S = 0.5  # at rest, before the limit on manipulability yields
 _STOPS_HERE = 0.25  # of a pair's margin that braking may use up and need not be looked at
 _YIELD_RATE = 2.0  # 1/s, at which it does
@@ -106,26 +108,37 @@ class BoundProgram:
             problem.q,
             problem.velocity,
             Task(problem.H, problem.g, problem.H_joints, problem.g_joints,
-                 problem.null_space_rates, self._damping_of(problem)),
+                 *self._preferred(problem)),
             scene,
             self._setting.period_s,
             self._with_depths(problem.depth_share),
             self._avoidance,
         )  # fmt: skip
         self._yield_at_rest(answer)
+        if self._is_singular(problem.q, answer):
+            answer.active[SINGULARITY] = max(answer.active[SINGULARITY], 1.0)
         if self._clearance is None or near is None:
             return Solution(*answer)
         return Solution(*answer, clearance=self._clearance.least(near))
 
-    def _damping_of(self, problem: Problem) -> FloatArray:
-        """Return what the joint rates weigh, (n,): more, the more the noise would change them.
+    def _is_singular(self, q: FloatArray, answer: ConstrainedRates) -> bool:
+        """Tell whether there is a direction in which no joint rates move the tip any more."""
+        if not answer.manipulability < _NEARLY:  # far from it, without a decomposition
+            return False
+        smallest = np.linalg.svd(self._setting.arm.jacobian(q), compute_uv=False)[-1]
+        return bool(smallest < _SINGULAR)
 
-        Near a singularity, a little noise asks for rates that no joint can follow. This is the
-        most likely answer if the rates that are asked for are of the order of those that can be
-        reached at once.
+    def _preferred(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
+        """Return rates that the joints prefer, (n,), and the weights (n,) with which they do.
+
+        Near a singularity, a little noise asks for rates that no joint can follow. Joints keep
+        to most of what they do now, the more, the more noise alone would change it. All of it
+        would add the noise up; none of it would make the way to the goal endless.
         """
-        damping: FloatArray = problem.variance / self._steady**2
-        return damping + max(self._damping, problem.null_space_weight)
+        steady = problem.variance / self._steady**2
+        free = max(self._damping, problem.null_space_weight)
+        rates: FloatArray = free * problem.null_space_rates + _KEPT * steady * problem.velocity
+        return rates / (free + steady), free + steady
 
     def _with_depths(self, share: float) -> ConstraintSettings:
         """Return the settings with bounds on the depth from its deviation, where that is known."""
