@@ -1,0 +1,111 @@
+"""What the cameras look at for a task, and the truth of it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.camera import Camera
+from vergence.cell.cell import Cell
+from vergence.cell.schema import FollowTable, Task, TrackTable
+from vergence.errors import InputError
+from vergence.features import inverse_depth_plane
+from vergence.geometry import se3_inverse, transform_points
+from vergence.runtime.task_ends import looks_for_target
+from vergence.signals import FrameTruth
+from vergence.simulation.world import World
+from vergence.vision import CurveTracking
+
+
+class Subject:
+    """The features of target or tool, and where they truly are in an image.
+
+    Args:
+        cell: whose target and tool they are.
+        world: as it is now.
+    """
+
+    def __init__(self, cell: Cell, world: World) -> None:
+        self._cell, self._world = cell, world
+        self._curve: CurveTracking | None = None
+        self._inside = False  # whether the features lie inside the target
+        self.features = np.empty((0, 3))  # in the target's frame, m
+
+    def take_up(self, task: Task, images: bool) -> None:
+        """Look at what a task follows, as far as it is known.
+
+        Without images nobody picks features: they are spread over the middle of the task's image.
+        """
+        tracker = getattr(task, "tracker", None)
+        self._curve = tracker if isinstance(tracker, CurveTracking) else None
+        self._inside = False
+        known = self._cell.target.features
+        if known:
+            self.features = np.array(known, dtype=np.float64)
+        elif isinstance(task, FollowTable) or looks_for_target(task.until):
+            from vergence.vision.known_object import as_followed, object_model_of
+
+            model = object_model_of(self._world.model, "target")
+            followed = as_followed(model)
+            self._inside = followed is not model
+            self.features = followed.corners
+        elif images or not isinstance(task, TrackTable):
+            self.features = np.empty((0, 3))
+        else:
+            camera = self._world.cameras[task.camera]
+            points_px = _grid(camera.width, camera.height, task.feature_count)
+            self.features = self._world.anchor(task.camera, points_px)
+
+    def truth(self, camera: str, blind: bool) -> FrameTruth:
+        """Return what is true of an image that a camera takes now."""
+        T_world_target, features = self._seen_by(camera)
+        T_world_camera = self._world.camera_pose(camera)
+        T_camera_target = se3_inverse(T_world_camera) @ T_world_target
+        points = transform_points(T_camera_target, features)
+        intrinsics = self._world.cameras[camera]
+        depth = points[:, 2].copy()
+        in_front = depth > 1e-3
+        points_px = np.full((len(points), 2), np.nan)
+        points_px[in_front] = intrinsics.project(points[in_front])
+        visible = intrinsics.in_view(points) & in_front & np.bool_(not blind)
+        in_sight = np.flatnonzero(visible)
+        if len(in_sight):
+            points_world = transform_points(T_world_target, features[in_sight])
+            visible[in_sight] = self._world.sees(camera, points_world, self._inside)
+        truth = FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
+        return truth if self._curve is None else _truth_of_curve(truth, self._curve, intrinsics)
+
+    def _seen_by(self, camera: str) -> tuple[FloatArray, FloatArray]:
+        """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""
+        tool = self._cell.tool
+        if tool is None or tool.camera != camera:
+            return self._world.target_pose(), self.features
+        return self._world.tool_pose(), np.array(tool.features)
+
+
+def _truth_of_curve(truth: FrameTruth, curve: CurveTracking, camera: Camera) -> FrameTruth:
+    """Return the truth of the points that stand for a curve, from points on it."""
+    before: BoolArray = np.isfinite(truth.points_px[:, 0])
+    nothing = replace(truth, visible=np.zeros(len(before), dtype=np.bool_))
+    if not len(before) or not before.all():
+        return nothing
+    try:
+        points_px = curve.points_on(truth.points_px, (camera.width, camera.height))
+    except InputError:  # a circle on edge, a line seen end on
+        return nothing
+    between = np.linalg.norm(points_px[:, None] - truth.points_px[None], axis=2)
+    A, B, C = inverse_depth_plane(camera.normalize(truth.points_px), truth.depth_m)
+    x, y = camera.normalize(points_px).T
+    depth_m = 1.0 / (A * x + B * y + C)
+    nearest = between.argmin(axis=1)
+    in_sight = truth.visible | ~camera.contains(truth.points_px)
+    visible = in_sight[nearest] & camera.contains(points_px)
+    return replace(truth, points_px=points_px, depth_m=depth_m, visible=visible)
+
+
+def _grid(width: int, height: int, count: int) -> FloatArray:
+    """Return points (count, 2) spread over the middle of an image; one alone in its centre."""
+    side = int(np.ceil(np.sqrt(count)))
+    share = (np.arange(side) + 0.5) / side
+    u, v = np.meshgrid(width * (0.25 + 0.5 * share) - 0.5, height * (0.25 + 0.5 * share) - 0.5)
+    return np.column_stack((u.ravel(), v.ravel()))[:count]
