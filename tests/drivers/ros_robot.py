@@ -238,9 +238,12 @@ class Camera:
         self.renders = None
         if "cell" in settings:
             from vergence.cell import load_cell
-            from vergence.simulation import SimulatedDriver
+            from vergence.simulation import SimulatedDriver, target_pose
 
-            self.renders = SimulatedDriver(load_cell(*settings["cell"]))
+            cell = load_cell(*settings["cell"])
+            self.renders, self.rested = SimulatedDriver(cell), 0.0
+            self.start: list[float] = []
+            self.pose = target_pose(cell.target, cell.target.motion, cell.seed)
 
     def exposed(self, now: float, q: list[float]) -> tuple[Any, Any]:
         import cv2
@@ -249,7 +252,11 @@ class Camera:
         grey = np.tile(np.arange(self.width, dtype=np.uint8), (self.height, 1))
         if self.renders is not None:
             (arm,) = self.renders.arms
+            self.start = self.start or q
+            if q == self.start:  # the target waits for the arm
+                self.rested = now
             self.renders.world.place_arm(arm, np.array(q))
+            self.renders.world.move_target(self.pose(now - self.rested))
             self.renders.world.update()
             grey = self.renders.first_frame("wrist").image
         info = CameraInfo(height=self.height, width=self.width, distortion_model="plumb_bob")
