@@ -8,7 +8,7 @@ from vergence.assembly.own_parts import started_tracker
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.tag import TagFinder
 from vergence.cell.schema import TrackTable
-from vergence.errors import Absent, InputError
+from vergence.errors import InputError
 from vergence.estimation import TrackedPoints
 from vergence.geometry import se3_inverse, transform_points
 from vergence.parts import kind_of
@@ -118,9 +118,8 @@ def _tag_points(context: LawContext, camera: str, frame: Frame) -> FloatArray:
     finder = TagFinder(tag)
     found = finder.tag(frame)
     if isinstance(found, str):
-        given = f"{found} by camera {camera} at the start; {finder.seen_instead(frame)}"
-        allowed = f"one marker {tag.id} of {tag.dictionary} in view"
-        raise InputError(str(context.cell.path), "target.tag", Absent(given), allowed)
+        source, where = str(context.cell.path), f"by camera {camera} at the start"
+        raise finder.refusal(frame, source, "target.tag", where, "in view")
     return found.corners_px
 
 

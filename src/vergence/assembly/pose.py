@@ -15,7 +15,6 @@ from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
-    Find,
     FollowedPose,
     HeldTarget,
     IndexSelection,
@@ -75,12 +74,13 @@ def follow_pose(
     expected = table.believed_noise_px or table.noise_px  # as wide as the windows must allow for
     rig = CameraRig.of({name: cameras[name] for name in cell.watched}, expected)
     surroundings = _surroundings(context)
+    finder = TagFinder(cell.target.tag) if images and cell.target.tag is not None else None
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
         "settings": PerceptionSettings(
             budget=table.budget, margin_px=table.border_px, apart_px=table.feature_distance_px
         ),
-        "find": _find(context, images),
+        "find": finder.find if finder is not None else None,
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
     if by_outline(model):  # no image: points inside it, which it does not hide, stand for it
@@ -94,7 +94,7 @@ def follow_pose(
         rig,
         shape,
         surroundings.camera_pose,
-        _measure(context, model, images),
+        _measure(context, model, images, finder),
         target_filter,
         start,
         **parts,
@@ -147,13 +147,15 @@ def _outline_pose(context: LawContext, model: "ObjectModel", begin: float) -> Fo
     return perception if tip_pose is None else HeldTarget(perception, tip_pose)
 
 
-def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure:
+def _measure(
+    context: LawContext, model: "ObjectModel", images: bool, finder: TagFinder | None
+) -> Measure:
     """Return what measures corners, as a cell describes it."""
     cell = context.cell
     table = cell.perception
     measure: Measure
-    if images and (tag := cell.target.tag) is not None:
-        measure = TagFinder(tag)
+    if finder is not None:
+        measure = finder
     elif images:
         measure = CornerWindows(model, context.cameras)
     else:
@@ -163,12 +165,6 @@ def _measure(context: LawContext, model: "ObjectModel", images: bool) -> Measure
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
     return measure
-
-
-def _find(context: LawContext, images: bool) -> Find | None:
-    """Return what finds the target in a whole image, if anything does."""
-    tag = context.cell.target.tag
-    return TagFinder(tag).find if images and tag is not None else None
 
 
 class Surroundings(NamedTuple):

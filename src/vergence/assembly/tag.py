@@ -26,17 +26,38 @@ _KNOWN = 3.0  # standard deviations of the first pose that the start is believed
 class TagFinder:
     """Finds a tag in whole images; a `Measure` and a `Find` of perception.
 
+    Whatever is asked of one frame, its image is searched once.
+
     Args:
         tag: which.
     """
 
     def __init__(self, tag: TagTable) -> None:
         self._detector, self._tag = MarkerDetector(tag.dictionary), tag
+        self._frame: Frame | None = None  # the last, and what it shows
+        self._seen: OneTag | str = ""
 
     def tag(self, frame: Frame) -> OneTag | str:
         """Return the tag, or why it is not found."""
-        assert frame.image is not None
-        return one_tag(self._detector, frame.image, self._tag.id)
+        if frame is not self._frame:
+            assert frame.image is not None
+            self._seen = one_tag(self._detector, frame.image, self._tag.id)
+            self._frame = frame
+        return self._seen
+
+    def refusal(self, frame: Frame, source: str, key: str, where: str, shown: str) -> InputError:
+        """Return the error that a frame without the tag is, and what it shows instead.
+
+        Args:
+            frame: that does not show it.
+            source: the cell file.
+            key: in it.
+            where: it was looked for, such as "by camera eye at the start".
+            shown: where it has to be, such as "in view".
+        """
+        given = Absent(f"{self.tag(frame)} {where}; {self.seen_instead(frame)}")
+        allowed = f"one marker {self._tag.id} of {self._tag.dictionary} {shown}"
+        return InputError(source, key, given, allowed)
 
     def seen_instead(self, frame: Frame) -> str:
         """Return in words which markers an image shows."""
@@ -123,10 +144,8 @@ def _first_pose(context: LawContext, driver: StartedDriver, finder: TagFinder) -
     if views:
         return pose_from_points(views)
     frame = driver.frames[context.cell.task.camera]
-    why = f"{finder.tag(frame)} by camera {frame.camera} at the start; "
-    given = Absent(why + finder.seen_instead(frame))
-    allowed = f"one marker {tag.id} of {tag.dictionary} in view"
-    raise InputError(source, "target.tag", given, allowed)
+    where = f"by camera {frame.camera} at the start"
+    raise finder.refusal(frame, source, "target.tag", where, "in view")
 
 
 def _placed(context: LawContext, fit: PoseFit) -> LawContext:

@@ -16,7 +16,7 @@ from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.tag import TagFinder
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable, TrackTable
-from vergence.errors import Absent, InputError
+from vergence.errors import InputError
 from vergence.parts import kind_of
 from vergence.planning import Path, PlanFailure, Trajectory
 from vergence.planning.replanner import Replanner
@@ -38,8 +38,7 @@ def tag_reach_parts(
     Raises:
         InputError: if the goal's image does not show the tag, or a key has no use.
     """
-    track, desired = _as_track(context, task, driver, images)
-    context = replace(context, cell=context.cell.model_copy(update={"task": track}))
+    context, track, desired = _as_track(context, task, driver, images)
     points_px, perception = first_points(context, "target", task.camera, driver, images)
     context = context.with_points({task.camera: points_px})
 
@@ -62,8 +61,7 @@ def plan_tag_reach(
     context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
 ) -> Path | PlanFailure:
     """Plan the path from where the tag is seen to where the goal's image has it."""
-    track, desired = _as_track(context, task, driver, images)
-    context = replace(context, cell=context.cell.model_copy(update={"task": track}))
+    context, track, desired = _as_track(context, task, driver, images)
     points_px, _ = first_points(context, "target", task.camera, driver, images)
     found = plan_approach(context, track, points_px, desired, context.joints[task.arm])
     return found.path if isinstance(found, Trajectory) else found
@@ -71,8 +69,8 @@ def plan_tag_reach(
 
 def _as_track(
     context: LawContext, task: ReachTable, driver: StartedDriver, images: bool
-) -> tuple[TrackTable, FloatArray]:
-    """Return the task of tracking the tag to where the goal's image has it, (4, 2), px."""
+) -> tuple[LawContext, TrackTable, FloatArray]:
+    """Return context and task of tracking the tag to where the goal's image has it, (4, 2), px."""
     _require_used(context, task)
     desired = goal_corners(context, task, driver, images)
     track = TrackTable(
@@ -82,7 +80,9 @@ def _as_track(
         desired=tuple((u, v) for u, v in desired.tolist()),
         approach="auto",
     )
-    return track.model_copy(update={"tracker": task.tracker, "until": task.until}), desired
+    track = track.model_copy(update={"tracker": task.tracker, "until": task.until})
+    cell = context.cell.model_copy(update={"task": track})
+    return replace(context, cell=cell), track, desired
 
 
 def goal_corners(
@@ -104,9 +104,8 @@ def goal_corners(
     finder = TagFinder(tag)
     found = finder.tag(frame)
     if isinstance(found, str):
-        given = Absent(f"{found} in the goal's image; {finder.seen_instead(frame)}")
-        allowed = f"one marker {tag.id} of {tag.dictionary} in it"
-        raise InputError(str(context.cell.path), "task.goal", given, allowed)
+        source = str(context.cell.path)
+        raise finder.refusal(frame, source, "task.goal", "in the goal's image", "in it")
     return found.corners_px
 
 
