@@ -146,7 +146,7 @@ def _answer(name: str, result: "Run", folder: Path, report: Path) -> Mapping[str
 
 
 def _tell_outcome(result: "Run") -> None:
-    from vergence.runtime.results import FREE_DIRECTIONS, POOR_AXES, UNDER_ACTUATED
+    from vergence.runtime.results import ADVICE
 
     summary = result.summary
     say(str(result.outcome))
@@ -163,5 +163,5 @@ def _tell_outcome(result: "Run") -> None:
     ]
     say("  " + " · ".join(text for text, key in words if key in summary))
     for event in result.events:
-        if event.name in (UNDER_ACTUATED, POOR_AXES, FREE_DIRECTIONS):
+        if event.name in ADVICE:
             say(f"  {event.text}")

@@ -9,14 +9,7 @@ from vergence.app.figures.arm import CLEAR_OF, clearance, normalized
 from vergence.app.figures.constraints import constraint_names
 from vergence.arrays import FloatArray
 from vergence.runtime import ArmInfo
-from vergence.runtime.results import (
-    FREE_DIRECTIONS,
-    POOR_AXES,
-    UNDER_ACTUATED,
-    ArmTrace,
-    CameraTrace,
-    Run,
-)
+from vergence.runtime.results import ADVICE, ArmTrace, CameraTrace, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +28,9 @@ def run_rows(run: Run) -> list[Row]:
     if run.info.seed is not None:
         rows.append(Row("seed", str(run.info.seed), "", "of everything drawn at random"))
     rows += [
-        Row(_EVENTS[event.name], "some", "", event.text)
+        Row(ADVICE[event.name], "some", "", event.text)
         for event in run.events
-        if event.name in _EVENTS
+        if event.name in ADVICE
     ]
     return rows + [
         _summary_row(name, value)
@@ -172,11 +165,6 @@ _RATES = {
     "joint margin": "rad/s or m/s",
 }  # of limits that can be relaxed; the others have no length
 
-_EVENTS = {
-    UNDER_ACTUATED: "unserved directions",
-    POOR_AXES: "poor axes",
-    FREE_DIRECTIONS: "free directions",
-}
 _DERIVED = {  # what the rows of cameras and arms say as well, from the recording itself
     "duration_s",
     "final_error_px",

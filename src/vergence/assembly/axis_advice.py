@@ -23,9 +23,7 @@ def axis_advice(context: LawContext) -> str:
     seen = context.points_px.get(name)
     if not isinstance(objective, OptimalTracking) or seen is None or not len(seen):
         return ""
-    T_camera, T_target = context.model.camera_pose(name), context.model.target_pose()
-    distance = float(np.linalg.norm(T_target[:3, 3] - T_camera[:3, 3]))
-    camera = context.camera()
+    distance, camera = context.distance_m, context.camera()
     found = camera_directions(
         camera.normalize(seen), np.full(len(seen), max(distance, 1e-3)), camera.focal_px
     )

@@ -26,8 +26,7 @@ def free_directions(context: LawContext) -> str:
     seen = context.points_px.get(name)
     if not isinstance(law, ServoSettings) or seen is None or not len(seen) or context.is_fixed:
         return ""
-    T_camera, T_target = context.model.camera_pose(name), context.model.target_pose()
-    distance = max(float(np.linalg.norm(T_target[:3, 3] - T_camera[:3, 3])), _LEAST)
+    distance = max(context.distance_m, _LEAST)
     features = Points(context.camera().normalize(seen), np.full(len(seen), distance))
     state, H = state_of(features, features), np.zeros((6, 6))
     for term in law.objectives:

@@ -117,6 +117,12 @@ class LawContext:
         """Return the arm that carries a camera, with the camera as its tip."""
         return self.model.arm_to_camera(name)
 
+    @property
+    def distance_m(self) -> float:
+        """From the task's camera to the target, where the model has them, m."""
+        T_camera, T_target = self.model.camera_pose(self.camera_name), self.model.target_pose()
+        return float(np.linalg.norm(T_target[:3, 3] - T_camera[:3, 3]))
+
     def T_world_camera(self, name: str | None = None) -> FloatArray | None:
         """Return the pose (4, 4) of a fixed camera; None of one that an arm carries.
 

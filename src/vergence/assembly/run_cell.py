@@ -23,6 +23,12 @@ from vergence.signals import Frame, Outcome
 from vergence.simulation import SimulatedDriver
 
 _LOG = logging.getLogger(__name__)
+# What is said at the start of a run, each by the event of its name.
+_ADVICE = {
+    UNDER_ACTUATED: under_actuation,
+    POOR_AXES: axis_advice,
+    FREE_DIRECTIONS: free_directions,
+}
 
 
 def run_cell(cell: Cell, listeners: Sequence[Listener] = (), images: bool = True) -> Run:
@@ -110,12 +116,9 @@ def run_driver(
     if isinstance(parts, Outcome):
         outcome = parts
     else:
-        if limits := under_actuation(parts.context):
-            Listeners(everyone).event(0.0, UNDER_ACTUATED, limits)
-        if advice := axis_advice(parts.context):
-            Listeners(everyone).event(0.0, POOR_AXES, advice)
-        if free := free_directions(parts.context):
-            Listeners(everyone).event(0.0, FREE_DIRECTIONS, free)
+        for name, advise in _ADVICE.items():
+            if advice := advise(parts.context):
+                Listeners(everyone).event(0.0, name, advice)
         calibrating: SelfCalibrating | None = None
         if self_calibration and len(cell.tasks) <= 1 and SelfCalibrating.suits(parts.context):
             calibrating = SelfCalibrating(parts.context)

@@ -1,7 +1,5 @@
 """What an arm of fewer than six joints cannot do for its task, in a sentence."""
 
-import numpy as np
-
 from vergence.assembly.law_context import LawContext
 from vergence.robot import unserved_directions
 
@@ -13,8 +11,7 @@ def under_actuation(context: LawContext) -> str:
     arm, name = context.arm, context.cell.task.arm
     if arm.joint_count >= 6:
         return ""
-    T_camera, T_target = context.model.camera_pose(context.camera_name), context.model.target_pose()
-    distance = float(np.linalg.norm(T_target[:3, 3] - T_camera[:3, 3])) or _LENGTH_M
+    distance = context.distance_m or _LENGTH_M
     unserved = unserved_directions(arm.jacobian(context.joints[name]), distance)
     moved = "the target" if context.is_fixed else f"camera {context.camera_name}"
     return (

@@ -8,6 +8,7 @@ from vergence.runtime.results.pose_errors import (
     tick_pose_errors,
 )
 from vergence.runtime.results.run import (
+    ADVICE,
     FREE_DIRECTIONS,
     POOR_AXES,
     UNDER_ACTUATED,
@@ -26,6 +27,7 @@ from vergence.runtime.results.tick_rows import (
 from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace, largest
 
 __all__ = [
+    "ADVICE",
     "FREE_DIRECTIONS",
     "POOR_AXES",
     "UNDER_ACTUATED",

@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 UNDER_ACTUATED = "under-actuated"  # the event that tells which directions an arm cannot serve
 FREE_DIRECTIONS = "free directions"  # the event that tells what the objectives leave free
 POOR_AXES = "poor axes"  # the event that tells which axes of a law hardly move its features
+# Events that advise a person, and what the table of a run calls them.
+ADVICE = {
+    UNDER_ACTUATED: "unserved directions",
+    POOR_AXES: POOR_AXES,
+    FREE_DIRECTIONS: FREE_DIRECTIONS,
+}
 
 
 @dataclass(frozen=True, slots=True)
