@@ -6,7 +6,7 @@ from itertools import compress
 
 from vergence.studies import Check
 
-HEADINGS = ("check", "claim", "bound", "measured", "median (range)", "unit", "holds", "note")
+HEADINGS = ("check", "claim", "bound", "measured", "median (range)", "unit", "holds")
 NUMBERS = ("measured", "median (range)")
 
 
@@ -25,7 +25,7 @@ def as_json(check: Check) -> Mapping[str, object]:
 
 
 def table(checks: Sequence[Check]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return headings and rows of the checks' table, without the columns that are empty."""
+    """Return headings and rows of the checks' table, without notes and columns that are empty."""
     rows = [_cells(check) for check in checks]
     filled = [any(cells) for cells in zip(*rows, strict=True)]
     headings = tuple(compress(HEADINGS, filled))
@@ -40,16 +40,15 @@ def _cells(check: Check) -> tuple[str, ...]:
         holds = f"{held} of {seeds}"
         spread = f"{median:.3g} ({low:.3g} … {high:.3g})"
     measured = f"{check.measured:.4g}"
-    return (check.name, check.paper, check.bound, measured, spread, check.unit, holds, check.note)
+    return (check.name, check.paper, check.bound, measured, spread, check.unit, holds)
 
 
 def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
     headings, rows = table(checks)
-    shown = [heading for heading in headings if heading != "note"]
-    head = "".join(f'<th scope="col">{heading}</th>' for heading in shown)
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(
-        _html_row(shown, cells, check.holds) + _note(check.note, len(shown))
+        _html_row(headings, cells, check.holds) + _note(check.note, len(headings))
         for cells, check in zip(rows, checks, strict=True)
     )
     return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>'
@@ -60,7 +59,7 @@ _KINDS = {**dict.fromkeys(NUMBERS, "number"), "unit": "unit"}
 
 def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str:
     row = []
-    for heading, cell in zip(headings, map(escape, cells), strict=False):  # the note is below
+    for heading, cell in zip(headings, map(escape, cells), strict=True):
         if heading == "check":
             row.append(f'<th scope="row">{cell}</th>')
         elif heading == "holds":

@@ -63,7 +63,7 @@ def reproduce(
 def _remark(paper: str, result: "StudyResult", quick: bool, imaging: str | None) -> str:
     seeds = f"seeds {result.seed} to {result.seed + result.seeds - 1}" if result.seeds > 1 else ""
     images = f"imaging {imaging}" if imaging else ""
-    shorter = FEWER if RENDERED.get(paper, paper == "imaging") else QUICK
+    shorter = QUICK if RENDERED.get(paper) is False else FEWER
     return "; ".join(filter(None, (shorter if quick else "", seeds, images)))
 
 
@@ -98,16 +98,13 @@ def _tell(result: "StudyResult", report: Path, remark: str) -> None:
 
     from vergence.app.check import NUMBERS, table
 
-    headings, rows = table(result.checks)
-    shown = [
-        k for k, heading in enumerate(headings) if heading != "note"
-    ]  # too long: in the report
+    headings, rows = table(result.checks)  # notes would be too long: they are in the report
     drawn = Table(box=box.SIMPLE_HEAD)
-    for heading in (headings[k] for k in shown):
+    for heading in headings:
         right = heading in NUMBERS
         drawn.add_column(heading, justify="right" if right else "left", no_wrap=heading == "check")
     for cells in rows:
-        drawn.add_row(*(cells[k] for k in shown))
+        drawn.add_row(*cells)
     say(f"{result.title}{f' ({remark})' if remark else ''}")
     Console(width=None if sys.stdout.isatty() else 120).print(drawn)
     say(f"  report  {report}")
