@@ -13,6 +13,7 @@ from vergence.camera import Camera
 from vergence.estimation.object_follower import Sighting
 from vergence.geometry import se3, so3_exp, so3_log
 from vergence.simulation.tag_plate import tag_image
+from vergence.vision.marks import MarkerDetector, OneTag, one_tag
 
 CAMERA = Camera(640, 480, 700.0, 700.0, 319.5, 239.5)
 TAG = tag_of_option("apriltag_36h11:7:0.05")
@@ -95,3 +96,22 @@ def test_bad_options_are_named(
         main()
     assert end.value.code == 2
     assert words in capsys.readouterr().err  # type: ignore[attr-defined]
+
+
+def test_an_image_is_searched_once_whatever_is_asked_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched = []
+
+    def counted(detector: MarkerDetector, grey: np.ndarray, number: int) -> OneTag | str:
+        searched.append(grey)
+        return one_tag(detector, grey, number)
+
+    monkeypatch.setattr("vergence.assembly.tag.one_tag", counted)
+    follower = TagFollower(TAG, CAMERA)
+    nothing = np.full((480, 640), 128, np.uint8)
+    images = [image(pose(0)), image(pose(1)), nothing, image(pose(3))]
+    for k, shown in enumerate(images):
+        follower.follow(shown, k / 30)
+    assert len(searched) == len(images)
+    assert all(map(np.array_equal, searched, images))
