@@ -287,9 +287,12 @@ class Servo:
                 velocity = camera.normalize_velocity(reference.velocity_px, desired)[found]
             desired = desired[found]
         at_goal = reference.desired_depth_m
-        covariance_px = view.covariance_px[found]
-        weights = point_weights(covariance_px)
-        covariance = camera.normalize_covariance(covariance_px, points[found])
+        weights, variance = None, 0.0
+        if self._kernel is None:  # which takes all features for equally sure
+            covariance_px = view.covariance_px[found]
+            weights = point_weights(covariance_px)
+            covariance = camera.normalize_covariance(covariance_px, points[found])
+            variance = row_variance(weights, covariance)
         return CameraState(
             self._mountings[name],
             points[found],
@@ -305,7 +308,7 @@ class Servo:
             time=joints.time,
             depth_share=share,
             weights=weights,
-            variance=row_variance(weights, covariance),
+            variance=variance,
             **self._pose(name, joints.position),
         )
 
