@@ -129,7 +129,8 @@ protected:
   const Setup &setup_;
 };
 
-class Points : public Kind {
+// One feature for each corner or side.
+template <class Feature> class Several : public Kind {
 public:
   using Kind::Kind;
   void begin(vpServo &task, const vpHomogeneousMatrix &start, const vpHomogeneousMatrix &goal) override {
@@ -143,42 +144,41 @@ public:
   void see(const vpHomogeneousMatrix &cMo) override { set(now_, cMo); }
 
 private:
-  void set(std::vector<vpFeaturePoint> &features, const vpHomogeneousMatrix &cMo) const {
-    for (size_t i = 0; i < features.size(); ++i) {
-      const vpColVector p = place_of(cMo, setup_.x[i], setup_.y[i]);
-      features[i].buildFrom(p[0] / p[2], p[1] / p[2], p[2]);
-    }
+  virtual void build(Feature &feature, size_t i, const vpHomogeneousMatrix &cMo) const = 0;
+  void set(std::vector<Feature> &features, const vpHomogeneousMatrix &cMo) const {
+    for (size_t i = 0; i < features.size(); ++i)
+      build(features[i], i, cMo);
   }
-  std::vector<vpFeaturePoint> now_, goal_;
+  std::vector<Feature> now_, goal_;
 };
 
-class Lines : public Kind {
+class Points : public Several<vpFeaturePoint> {
 public:
-  using Kind::Kind;
-  void begin(vpServo &task, const vpHomogeneousMatrix &start, const vpHomogeneousMatrix &goal) override {
-    now_.resize(setup_.x.size());
-    goal_.resize(now_.size());
-    set(goal_, goal);
-    set(now_, start);
-    for (size_t i = 0; i < now_.size(); ++i)
-      task.addFeature(now_[i], goal_[i]);
-  }
-  void see(const vpHomogeneousMatrix &cMo) override { set(now_, cMo); }
+  using Several::Several;
 
 private:
-  void set(std::vector<vpFeatureLine> &features, const vpHomogeneousMatrix &cMo) const {
-    const size_t count = features.size();
-    for (size_t i = 0; i < count; ++i) { // the side from corner i to the next: z = 0, and a plane across
-      const double x = setup_.x[i], y = setup_.y[i];
-      const double a = setup_.y[(i + 1) % count] - y, b = x - setup_.x[(i + 1) % count];
-      const double length = std::hypot(a, b);
-      vpLine line;
-      line.setWorldCoordinates(0, 0, 1, 0, a / length, b / length, 0, -(a * x + b * y) / length);
-      line.track(cMo);
-      vpFeatureBuilder::create(features[i], line);
-    }
+  void build(vpFeaturePoint &feature, size_t i, const vpHomogeneousMatrix &cMo) const override {
+    const vpColVector p = place_of(cMo, setup_.x[i], setup_.y[i]);
+    feature.buildFrom(p[0] / p[2], p[1] / p[2], p[2]);
   }
-  std::vector<vpFeatureLine> now_, goal_;
+};
+
+class Lines : public Several<vpFeatureLine> {
+public:
+  using Several::Several;
+
+private:
+  // The side from corner i to the next: z = 0, and a plane across.
+  void build(vpFeatureLine &feature, size_t i, const vpHomogeneousMatrix &cMo) const override {
+    const size_t next = (i + 1) % setup_.x.size();
+    const double x = setup_.x[i], y = setup_.y[i];
+    const double a = setup_.y[next] - y, b = x - setup_.x[next];
+    const double length = std::hypot(a, b);
+    vpLine line;
+    line.setWorldCoordinates(0, 0, 1, 0, a / length, b / length, 0, -(a * x + b * y) / length);
+    line.track(cMo);
+    vpFeatureBuilder::create(feature, line);
+  }
 };
 
 class Ellipse : public Kind {
