@@ -13,9 +13,9 @@ from vergence.camera.calibration import (
     fit_mounting,
     free_parameters,
 )
+from vergence.camera.calibration.board_pose import board_pose
 from vergence.camera.calibration.hand_eye import Mounting, closed_form
 from vergence.camera.calibration.joint_fit import PARAMETERS, JointProblem, State
-from vergence.camera.calibration.lens_fit import board_pose
 from vergence.camera.calibration.normal_equations import steps_without
 from vergence.camera.calibration.reprojection import lens_of, reproject, residuals, rms
 from vergence.geometry import (

@@ -2,19 +2,16 @@
 
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vergence.app import markup
+from vergence.app.calibration.calibration import Calibration
 from vergence.app.calibration.estimates import Estimate, rotation_error_deg
 from vergence.app.figures.calibration import residual_bars_figure, residual_field_figure
 from vergence.app.report import REPORT
 from vergence.app.table import Row
 from vergence.camera.calibration import coverage
-
-if TYPE_CHECKING:
-    from vergence.app.calibrate import Calibration
 
 _ASSUMES = (
     "Deviations are standard deviations from the normal equations. They assume that the errors of "
@@ -26,7 +23,7 @@ _ASSUMES = (
 )
 
 
-def write_calibration_page(folder: Path, name: str, found: "Calibration") -> Path:
+def write_calibration_page(folder: Path, name: str, found: Calibration) -> Path:
     """Write a page that needs nothing but itself into a folder; return where it is."""
     parts = [
         _header(name, found),
@@ -41,7 +38,7 @@ def write_calibration_page(folder: Path, name: str, found: "Calibration") -> Pat
     return path
 
 
-def _header(name: str, found: "Calibration") -> str:
+def _header(name: str, found: Calibration) -> str:
     warnings = found.warnings
     words = "no warnings" if not warnings else f"warnings: {len(warnings)}"
     remarks = "".join(f"<li>{escape(text)}</li>" for text in warnings)
@@ -53,14 +50,14 @@ def _header(name: str, found: "Calibration") -> str:
     )
 
 
-def _bad(found: "Calibration") -> str:
+def _bad(found: Calibration) -> str:
     """Return how many images were not used; empty if all were."""
     count = len(found.bad)
     images = "one image was" if count == 1 else f"{count} images were"
     return markup.badge(f"{images} not used", False) if count else ""
 
 
-def _result(found: "Calibration") -> str:
+def _result(found: Calibration) -> str:
     heads = ["", "estimate", "deviation", "leaving out", "truth", "error", "unit"]
     if found.truth is None:
         heads = [head for head in heads if head not in ("truth", "error")]
@@ -76,7 +73,7 @@ def _row(e: Estimate, truth: bool) -> str:
     return f'<tr><th scope="row">{e.name}</th>{cells}<td class="unit">{e.unit}</td></tr>'
 
 
-def _numbers(found: "Calibration") -> list[str]:
+def _numbers(found: Calibration) -> list[str]:
     lens, mounting = found.lens, found.mounting
     covered = coverage(lens.sightings, found.data.width, found.data.height)
     rows = [
@@ -124,7 +121,7 @@ def _numbers(found: "Calibration") -> list[str]:
     return [*cards, markup.table("Mounting", rows)]
 
 
-def _left_out(found: "Calibration") -> str:
+def _left_out(found: Calibration) -> str:
     rows = [
         Row(b.name, "–" if np.isnan(b.residual_px) else f"{b.residual_px:.2f}", "px", b.reason)
         for b in found.bad
@@ -132,7 +129,7 @@ def _left_out(found: "Calibration") -> str:
     return markup.table("Images that were not used", rows)
 
 
-def _figures(found: "Calibration") -> list[str]:
+def _figures(found: Calibration) -> list[str]:
     lens, mounting = found.lens, found.mounting
     figures = [
         markup.figure(

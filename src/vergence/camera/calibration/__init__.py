@@ -4,18 +4,20 @@
 together. `fit_lens` and `fit_mounting` do the same with corners that were found already.
 """
 
+from vergence.camera.calibration.calibration_board import CalibrationBoard
 from vergence.camera.calibration.cautions import coverage
 from vergence.camera.calibration.failure import CalibrationFailure
+from vergence.camera.calibration.fit_lens import MODELS, fit_lens, free_parameters
+from vergence.camera.calibration.fit_mounting import SCALE_DEVIATION, fit_mounting
 from vergence.camera.calibration.from_folder import (
     BoardImages,
-    CalibrationBoard,
     calibrate_lens,
     calibrate_mounting,
     find_board,
 )
 from vergence.camera.calibration.joint_fit import Noise
-from vergence.camera.calibration.lens_fit import MODELS, LensFit, fit_lens, free_parameters
-from vergence.camera.calibration.mounting_fit import SCALE_DEVIATION, MountingFit, fit_mounting
+from vergence.camera.calibration.lens_fit import LensFit
+from vergence.camera.calibration.mounting_fit import MountingFit
 from vergence.camera.calibration.reprojection import LENS
 from vergence.camera.calibration.sighting import BadImage, Sighting
 

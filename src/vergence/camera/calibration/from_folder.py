@@ -5,15 +5,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from vergence.arrays import ImageArray
 from vergence.camera.calibration.arm_poses import read_poses
+from vergence.camera.calibration.calibration_board import CalibrationBoard
 from vergence.camera.calibration.failure import CalibrationFailure
-from vergence.camera.calibration.lens_fit import FEWEST_IMAGES, LensFit, fit_lens
-from vergence.camera.calibration.mounting_fit import SCALE_DEVIATION, MountingFit, fit_mounting
+from vergence.camera.calibration.fit_lens import FEWEST_IMAGES, fit_lens
+from vergence.camera.calibration.fit_mounting import SCALE_DEVIATION, fit_mounting
+from vergence.camera.calibration.lens_fit import LensFit
+from vergence.camera.calibration.mounting_fit import MountingFit
 from vergence.camera.calibration.sighting import BadImage, Sighting
 from vergence.camera.image_file import image_files
 from vergence.camera.image_folder import grey_images
@@ -24,22 +27,6 @@ _THREADS = 4
 _IN_MEMORY = 8  # images at a time
 _EXPLAINED = 3  # images without a board that are searched for another
 _NOT_FOUND = "no board found: is all of it in view, sharp, with the right numbers of corners?"
-
-
-class CalibrationBoard(Protocol):
-    """What finds its corners in an image, such as `vergence.vision.Board`."""
-
-    def find(self, image: ImageArray, name: str) -> Sighting | None:
-        """Find the board in a grey image; None where it is not seen."""
-        ...
-
-    def orientations(self, seen: Sighting) -> tuple[Sighting, ...]:
-        """Return a sighting as it is, and turned in each way in which the board looks the same."""
-        ...
-
-    def seen_instead(self, image: ImageArray) -> str:
-        """Return in words which other board an image shows; empty if none."""
-        ...
 
 
 class BoardImages(NamedTuple):

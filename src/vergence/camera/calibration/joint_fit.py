@@ -7,8 +7,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera.calibration.arm_noise import likeliest_deviations
+from vergence.camera.calibration.board_pose import board_pose
 from vergence.camera.calibration.hand_eye import Mounting
-from vergence.camera.calibration.lens_fit import board_pose
 from vergence.camera.calibration.normal_equations import Share
 from vergence.camera.calibration.reprojection import camera_with, reproject, residuals, rms
 from vergence.camera.calibration.sighting import Sighting
