@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, frozen
-from vergence.camera import Camera
 from vergence.control._tracking_tick import TrackingTickLaw
-from vergence.control.image_motion import ImageMotion, MotionSettings
+from vergence.control.image_motion import MotionSettings
 from vergence.control.limits import Limits, pack_features
 from vergence.control.mounting import CameraMounting
 from vergence.control.objectives import (
@@ -20,7 +19,13 @@ from vergence.control.objectives import (
     OptimalTracking,
     TrackingSetup,
 )
-from vergence.control.point_weights import point_weights, row_variance
+from vergence.control.servo_camera import (
+    NOTHING_SEEN,
+    Cameras,
+    ServoCamera,
+    depth_for,
+    mountings_by_name,
+)
 from vergence.control.solvers import (
     Obstacles,
     Problem,
@@ -32,11 +37,10 @@ from vergence.control.solvers import (
 )
 from vergence.control.solvers.solver import NO_JOINTS, Solution
 from vergence.control.term import Term
-from vergence.errors import NOTHING, Absent, InputError, nearest
+from vergence.errors import Absent, InputError, nearest
 from vergence.features import Points
 from vergence.robot import Arm, Clearance
 from vergence.signals import (
-    ImagePoints,
     JointCommand,
     JointState,
     Observation,
@@ -44,8 +48,6 @@ from vergence.signals import (
     Reference,
 )
 
-Cameras: TypeAlias = Camera | CameraMounting | Mapping[str, CameraMounting]
-_STALE_S = 0.3  # beside other cameras, what one saw longer ago no longer counts
 _PLAN_WEIGHT = 1e-3  # of a plan's joint rates: where the image says little, joints go its way
 AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
 NO_FEATURES = pack_features(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
@@ -110,16 +112,26 @@ class Servo:
         situation: Situation | None = None,
     ) -> None:
         self._arm, self._situation = arm, situation or Situation()
-        self._mountings = _by_name(cameras)
-        self._first = next(iter(self._mountings))
-        self._terms = _terms(objectives, self._mountings)
-        self._depth_m = {name: _depth(depth_m, name) for name in self._mountings}
+        mountings = mountings_by_name(cameras)
+        self._cameras = {
+            name: ServoCamera(
+                arm,
+                mounting,
+                depth_for(depth_m, name),
+                self._situation.motion,
+                self._situation.features.get(name),
+                self._situation.period_s,
+            )
+            for name, mounting in mountings.items()
+        }
+        self._first = next(iter(mountings))
+        self._main = self._cameras[self._first]
+        self._terms = _terms(objectives, mountings)
         solver = QuadraticProgram() if solver is None else solver
-        mounting = self._mountings[self._first]
         self._solver = solver.bind(
             Setting(
                 arm,
-                mounting,
+                self._main.mounting,
                 limits,
                 self._situation.period_s,
                 self._situation.obstacles,
@@ -128,14 +140,6 @@ class Servo:
                 self._situation.clearance,
             )
         )
-        motion = self._situation.motion
-        self._motions = {
-            name: None
-            if motion.as_it_is
-            else ImageMotion(arm, mounting, motion, features=self._situation.features.get(name))
-            for name, mounting in self._mountings.items()
-        }
-        self._views: dict[str, ImagePoints] = {}
         self._rest = np.zeros(arm.joint_count)
         self._kernel = self._tracking_kernel(solver)
 
@@ -144,17 +148,17 @@ class Servo:
         """The setup of [Nelson1995] in one kernel, where the servo is just that, else None."""
         if self._kernel is None:
             return None
-        return self._kernel.setup(len(self._believed(self._first)))
+        return self._kernel.setup(len(self._main.depth_m))
 
     def believed_depth(self, count: int, camera: str | None = None) -> FloatArray:
         """Return the believed depth of a camera's features, (count,), m; by default the first's."""
-        depth = self._believed(self._first if camera is None else camera)
-        return np.full(count, depth[0]) if len(depth) == 1 else depth
+        chosen = self._main if camera is None else self._cameras[camera]
+        return chosen.believed_depth(count)
 
     @property
     def feeds_forward(self) -> bool:
         """Whether features or depth are carried to now, or the target's motion is fed forward."""
-        return self._motions[self._first] is not None
+        return self._main.feeds_forward
 
     def take_over(self, previous: object) -> bool:
         """Go on with the target's motion in the image and the depth as another servo has them.
@@ -167,29 +171,31 @@ class Servo:
         if not isinstance(previous, Servo):
             return False
         if self._situation.motion == previous._situation.motion:
-            for name in self._motions.keys() & previous._motions.keys():
-                self._motions[name] = previous._motions[name]
+            for name in self._cameras.keys() & previous._cameras.keys():
+                self._cameras[name].take_over(previous._cameras[name])
         return True
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
     ) -> JointCommand:
         """Return joint rates for the next outer period."""
-        if len(self._mountings) == 1:
-            self._views[self._first] = observation.views[-1] if observation.views else _NOTHING
-        else:
-            self._views |= {view.camera: view for view in observation.views}
-        fresh = {
-            name: view
-            for name, view in self._views.items()
-            if len(self._mountings) == 1 or joints.time - view.time <= _STALE_S
-        }
-        if self._first in fresh and (fault := self._too_few(fresh[self._first], observation)):
+        alone = len(self._cameras) == 1
+        if alone:
+            self._main.view = observation.views[-1] if observation.views else NOTHING_SEEN
+        for view in () if alone else observation.views:
+            if view.camera in self._cameras:
+                self._cameras[view.camera].view = view
+        fresh = [
+            name for name, each in self._cameras.items() if alone or each.is_fresh(joints.time)
+        ]
+        if self._first in fresh and (fault := self._too_few(observation)):
             return JointCommand(self._rest, np.zeros(6), fault=fault)
+        weighted = self._kernel is None  # which takes all features for equally sure
         states = {
-            name: self._state(name, view, observation, reference, joints)
-            for name, view in fresh.items()
-            if name in self._mountings
+            name: self._cameras[name].state(
+                observation, self._reference(name, reference), joints, weighted=weighted
+            )
+            for name in fresh
         }
         if self._kernel is not None:
             return self._kernel.command(states[self._first], joints.position)
@@ -209,24 +215,14 @@ class Servo:
         n = self._arm.joint_count
         position = frozen(q, (n,), "q")
         now = frozen(np.zeros(n) if velocity is None else velocity, (n,), "velocity")
-        state = CameraState(
-            self._mountings[self._first],
-            features.points,
-            features.depth_m,
-            np.zeros_like(features.points),
-            desired.points,
-            desired_depth_m=desired.depth_m,
-            count=len(features.points),
-            period_s=self._situation.period_s,
-            **self._pose(self._first, position),
-        )
+        state = self._main.state_of(features, desired, position)
         joints = JointState(0.0, position, now)
         return self._solve({self._first: state}, joints, None).velocity
 
     def _tracking_kernel(self, solver: Solver) -> TrackingTickLaw | None:
         """Return the kernel of [Nelson1995] where the servo asks for nothing else."""
-        alone = len(self._terms) == len(self._mountings) == 1
-        mounting, objective = self._mountings[self._first], self._terms[0].objective
+        alone = len(self._terms) == len(self._cameras) == 1
+        mounting, objective = self._main.mounting, self._terms[0].objective
         if not (alone and mounting.at_tip and self._terms[0].weight == 1.0):
             return None
         if not (isinstance(objective, OptimalTracking) and isinstance(solver, PseudoInverse)):
@@ -242,93 +238,20 @@ class Servo:
             feeds_forward=self.feeds_forward,
         )
 
-    def _believed(self, camera: str) -> FloatArray:
-        depth = self._depth_m[camera]
-        if depth is None:
-            raise InputError("Servo", "depth_m", NOTHING, "the depth of the features in metres")
-        return depth
+    def _reference(self, camera: str, reference: Reference) -> Reference:
+        """Return the desired values in a camera's image."""
+        if camera == self._first:
+            return reference
+        return Reference(reference.time, reference.elsewhere_px[camera])
 
-    def _too_few(
-        self, view: ImagePoints, observation: Observation
-    ) -> tuple[OutcomeKind, str] | None:
+    def _too_few(self, observation: Observation) -> tuple[OutcomeKind, str] | None:
+        view = self._main.view
         found = int(view.found.sum())
         if found >= self._situation.fewest or observation.target is not None:
             return None
         fewest = self._situation.fewest
         reason = f"{found} of {len(view.found)} features found; the servo needs {fewest} at least"
         return OutcomeKind.TARGET_LOST, reason
-
-    def _state(
-        self,
-        name: str,
-        view: ImagePoints,
-        observation: Observation,
-        reference: Reference,
-        joints: JointState,
-    ) -> CameraState:
-        """Return what the objectives know of a camera, with features at the time of the joints."""
-        camera = self._mountings[name].camera
-        if name != self._first:
-            reference = Reference(reference.time, reference.elsewhere_px[name])
-        depth = self._depth_of(name, reference, len(view.found))
-        motion, share = self._motions[name], float("nan")
-        if motion is None:
-            points = camera.normalize(view.points_px)
-            flow = np.zeros_like(points)
-        else:
-            points, flow, depth, share = motion.update(view, depth, joints, observation.target)
-            if self._situation.motion.prediction:
-                reference = reference.at(joints.time)
-        found = view.found
-        desired = velocity = None
-        if reference.points_px is not None:
-            desired = camera.normalize(reference.points_px)
-            if reference.velocity_px is not None:
-                velocity = camera.normalize_velocity(reference.velocity_px, desired)[found]
-            desired = desired[found]
-        at_goal = reference.desired_depth_m
-        weights, variance = None, 0.0
-        if self._kernel is None:  # which takes all features for equally sure
-            covariance_px = view.covariance_px[found]
-            weights = point_weights(covariance_px)
-            covariance = camera.normalize_covariance(covariance_px, points[found])
-            variance = row_variance(weights, covariance)
-        return CameraState(
-            self._mountings[name],
-            points[found],
-            depth[found],
-            flow[found],
-            desired,
-            velocity,
-            None if at_goal is None else at_goal[found],
-            count=len(found),
-            period_s=self._situation.period_s,
-            target=observation.target,
-            T_camera_target=reference.T_camera_target,
-            time=joints.time,
-            depth_share=share,
-            weights=weights,
-            variance=variance,
-            **self._pose(name, joints.position),
-        )
-
-    def _depth_of(self, name: str, reference: Reference, count: int) -> FloatArray:
-        if reference.depth_m is not None:
-            return reference.depth_m
-        if count == 0:
-            return np.empty(0)
-        return self.believed_depth(count, name)
-
-    def _pose(self, name: str, q: FloatArray) -> dict[str, Any]:
-        """Return the arm's part of a camera's state."""
-        mounting = self._mountings[name]
-        if mounting.at_tip:
-            return {"arm": self._arm, "q": q}
-        T_world_tip = self._arm.forward_kinematics(q)
-        return {
-            "arm": self._arm, "q": q, "A": mounting.twist_map(T_world_tip),
-            "T_world_tip": T_world_tip,
-        }  # fmt: skip
 
     def _solve(
         self, states: Mapping[str, CameraState], joints: JointState, rates: FloatArray | None
@@ -401,25 +324,10 @@ def command_of(solution: Solution, A: FloatArray, names: tuple[str, ...]) -> Joi
     )
 
 
-_NOTHING = ImagePoints(
-    "", 0.0, np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0, dtype=np.bool_), ()
-)
-
-
 def _nonsense(*parts: FloatArray) -> tuple[OutcomeKind, str] | None:
     if all(np.isfinite(values).all() for values in parts):
         return None
     return OutcomeKind.INFEASIBLE, "an objective returned numbers that are not finite"
-
-
-def _by_name(cameras: Cameras) -> dict[str, CameraMounting]:
-    if isinstance(cameras, Camera):
-        return {"": CameraMounting(cameras)}
-    if isinstance(cameras, CameraMounting):
-        return {"": cameras}
-    if not cameras:
-        raise InputError("Servo", "cameras", Absent("none"), "one camera or more")
-    return dict(cameras)
 
 
 def _terms(
@@ -438,14 +346,3 @@ def _terms(
             raise InputError("Servo", "objectives", name, nearest(name, cameras))
         terms.append(Term(term.objective, term.weight, name))
     return terms
-
-
-def _depth(given: ArrayLike | Mapping[str, ArrayLike] | None, camera: str) -> FloatArray | None:
-    if isinstance(given, Mapping):
-        given = given.get(camera)
-    if given is None:
-        return None
-    depth = frozen(np.atleast_1d(np.asarray(given, dtype=np.float64)), (None,), "depth_m")
-    if not (depth > 0).all():
-        raise InputError("Servo", "depth_m", given, "depths above zero")
-    return depth
