@@ -44,6 +44,20 @@ class ClearBraking:
         start, end = self._room[pairs], self._rooms(self._braked(setpoint, last))[pairs]
         return self._between(setpoint, pairs, (0, start), (last, end))
 
+    def stays_clear(self, q: FloatArray, fastest: FloatArray, seconds: float) -> bool:
+        """Tell whether nothing can hinder set-points that start at q, for sure.
+
+        Args:
+            q: joint positions, (n,).
+            fastest: what no rate exceeds, (n,).
+            seconds: for which they move.
+        """
+        most = fastest * seconds + fastest**2 / (2.0 * self._arm.acceleration_max)
+        if self._known_clear(q, most):
+            return True
+        self._q, self._room, self._others = q, self._rooms(q), self._clearance.others()
+        return self._known_clear(q, most)
+
     def _known_clear(self, q: FloatArray, most: FloatArray) -> bool:
         """Tell whether the distances known are large enough for all that the joints may move."""
         if self._q is None or (self._clearance.others() != self._others).any():

@@ -135,6 +135,36 @@ def guarded_steps(
 
 
 @njit(cache=True, error_model="numpy")
+def same_steps(
+    position: FloatArray,
+    velocity: FloatArray,
+    commanded: FloatArray,
+    limits: FloatArray,
+    dt: float,
+    count: int,
+) -> GuardedStep:
+    """Return what `guarded_step` comes to, to the last bit, when it is taken many times.
+
+    Args:
+        position: as for `guarded_step`, and so are the rest.
+        velocity: (n,).
+        commanded: (n,).
+        limits: (4, n).
+        dt: inner period, s.
+        count: how many steps, at least one.
+
+    Returns:
+        The last step; at a limit are the joints that one held back at every step.
+    """
+    step = guarded_step(position, velocity, commanded, limits, dt)
+    at_limit = step.at_limit
+    for _ in range(count - 1):
+        step = guarded_step(step.position, step.velocity, commanded, limits, dt)
+        at_limit &= step.at_limit
+    return GuardedStep(step.position, step.velocity, at_limit)
+
+
+@njit(cache=True, error_model="numpy")
 def _room(room: float, speed: float, a: float, dt: float) -> float:
     """Return what is left of the room when a speed is braked with a, by `guarded_step`'s bound."""
     return room - a * dt * dt / 8.0 - speed * (speed + a * dt) / (2.0 * a)
@@ -172,6 +202,16 @@ class Braking(Protocol):
 
     def hindrance(self, setpoint: Setpoint) -> str:
         """Return what the arm would touch if it braked from here; else nothing."""
+        ...
+
+    def stays_clear(self, q: FloatArray, fastest: FloatArray, seconds: float) -> bool:
+        """Tell whether, for sure, no set-point is hindered that moves for so long from q (n,).
+
+        Args:
+            q: joint positions, (n,).
+            fastest: what no rate exceeds, (n,).
+            seconds: for which they move.
+        """
         ...
 
 
@@ -245,6 +285,30 @@ class Guard:
             return self.brake()
         self._position, self._velocity, self.at_limit = position, velocity, at_limit
         return self.setpoint
+
+    def steps(self, rates: ArrayLike, count: int) -> Setpoint | None:
+        """Take many steps on the way to the same joint rates (n,) at once.
+
+        Returns:
+            The last set-point; None, and no step is taken, where each must be looked at.
+        """
+        self._wanted[:] = as_floats(rates, (self.joint_count,), "rates")
+        if self.hindrance or not self._stays_clear(count):
+            return None
+        self._position, self._velocity, self.at_limit = same_steps(
+            self._position, self._velocity, self._wanted, self._limits, self._dt, count
+        )
+        return self.setpoint
+
+    def _stays_clear(self, count: int) -> bool:
+        """Tell whether the next steps need not be looked at one by one."""
+        if self._braking is None:
+            return True
+        q, (low, high, rate_max, _) = self._position, self._limits
+        fastest = np.maximum(np.abs(self._wanted), np.abs(self._velocity))
+        # A joint outside its range is brought back at a rate of its own.
+        fastest = np.where((q < low) | (q > high), rate_max, np.minimum(fastest, rate_max))
+        return self._braking.stays_clear(q, fastest, count * self._dt)
 
     def brake(self) -> Setpoint:
         """Return the next set-point on the way to rest, also where that is outside the range."""

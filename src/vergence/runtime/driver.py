@@ -66,6 +66,29 @@ class HasOutputs(Protocol):
 
 
 @runtime_checkable
+class ExactDriver(Protocol):
+    """A driver of one arm that is where it is told to be, exactly: an ideal one.
+
+    So the loop knows all that it could read until an image is taken or arrives, and may hand over
+    the last of the set-points until then.
+    """
+
+    @property
+    def quiet_ticks(self) -> int:
+        """After how many inner ticks the next image is taken or arrives."""
+        ...
+
+    def advance(self, setpoints: Mapping[str, Setpoint], ticks: int) -> None:
+        """Let so many ticks pass, after which the arm is at its set-point.
+
+        Args:
+            setpoints: by name of the arm.
+            ticks: no more than `quiet_ticks`.
+        """
+        ...
+
+
+@runtime_checkable
 class HasSimTime(Protocol):
     """A driver whose time may pass in `step` only, such as a simulator's."""
 

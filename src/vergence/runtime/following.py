@@ -126,6 +126,15 @@ class Follower:
         self._lag.add(setpoint)
         return setpoint
 
+    def steps(self, rates: FloatArray, count: int) -> Setpoint | None:
+        """Return the set-point after many steps at desired rates (n,), by `Guard.steps`.
+
+        It is for an arm that is where it is told to be: one that lags or is held is None.
+        """
+        if self.holding is not None or self._scale != 1.0 or self._lag.ticks:
+            return None
+        return self.guard.steps(rates, count)
+
     def ahead(self, joints: JointState) -> JointState:
         """Return measured joints as they will be when a command is felt, one servo lag later."""
         return self._lag.ahead(joints)

@@ -13,7 +13,7 @@ from vergence.robot import Clearance
 from vergence.runtime import endings
 from vergence.runtime.arrival import Goal
 from vergence.runtime.border import Border
-from vergence.runtime.driver import Driver
+from vergence.runtime.driver import Driver, ExactDriver
 from vergence.runtime.endings import Fault
 from vergence.runtime.following import Follower, FollowingBound
 from vergence.runtime.interrupt import Interrupt
@@ -77,6 +77,8 @@ class Loop:
         self._driver, self._arm = driver, arm
         self._timeouts, self._following = timeouts or Timeouts(), following or FollowingBound()
         self._next_stages = next_stages
+        alone = isinstance(driver, ExactDriver) and len(driver.arms) == 1
+        self._exact: ExactDriver | None = driver if alone else None  # type: ignore[assignment]
         self._period_s, self._half_tick_s = 1.0 / outer_rate_hz, 0.5 / driver.inner_rate_hz
         self._schedule = Schedule(driver.inner_rate_hz, outer_rate_hz)
         age_s = max(self._timeouts.image_s, _IMAGE_AGE_S)
@@ -87,7 +89,7 @@ class Loop:
         self._part = "driver"  # the one at work, to be named if it raises
         self._followers: dict[str, Follower] = {}
         self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
-        self._tick, self._now = 0, 0.0
+        self._tick, self._now, self._end = 0, 0.0, np.inf
         self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
         self._held = ""  # kind of what the arm is held for, as it was told last
         self.take_up(Stages(perception, planner, law, self._timeouts, goal))
@@ -202,8 +204,9 @@ class Loop:
                 names = self._driver.arms[self._arm].names
                 at_limit = [name for name, held in zip(names, stuck, strict=True) if held]
                 return endings.joint_limit(at_limit, self._now)
-        if self._now > (end := self._task.end(duration_s)) - self._half_tick_s:
-            return self._completed(end, sample)
+        self._end = self._task.end(duration_s)
+        if self._now > self._end - self._half_tick_s:
+            return self._completed(self._end, sample)
         if not turns:
             return None
         sample = self._border.in_run_time(sample)
@@ -275,20 +278,39 @@ class Loop:
         rates = self._rates()
         if isinstance(rates, Fault):
             return Outcome(*rates, self._now)
-        setpoints = {
-            name: follower.step(rates if name == self._arm else self._rest[name])
-            for name, follower in self._followers.items()
-        }
+        if not self._advanced(rates):
+            setpoints = {
+                name: follower.step(rates if name == self._arm else self._rest[name])
+                for name, follower in self._followers.items()
+            }
+            self._part = "driver"
+            self._driver.step(setpoints)
+            self._tick += 1
         self._stuck &= self._followers[self._arm].guard.at_limit
-        self._part = "driver"
-        self._driver.step(setpoints)
-        self._tick += 1
         hindrance = self._followers[self._arm].guard.hindrance
         return endings.collision(hindrance, self._now) if hindrance else None
 
+    def _advanced(self, rates: FloatArray) -> bool:
+        """Take all ticks until the next event at once, where nothing can happen in them."""
+        if self._exact is None or self._inner_law is not None:
+            return False
+        until_end = int((self._end - self._now) * self._driver.inner_rate_hz)
+        due = self._schedule.ticks_left(self._tick)
+        ticks = min(self._exact.quiet_ticks, due, until_end)
+        last = self._now + (ticks - 1) / self._driver.inner_rate_hz
+        if ticks < 2 or (self._command is not None and self._share_at(last) < 1.0):
+            return False
+        setpoint = self._followers[self._arm].steps(rates, ticks)
+        if setpoint is None:
+            return False
+        self._part = "driver"
+        self._exact.advance({self._arm: setpoint}, ticks)
+        self._tick += ticks
+        return True
+
     def _rates(self) -> FloatArray | Fault:
         """Return the rates to move at: the command's, less what its age has taken from them."""
-        share = self._share
+        share = self._share_at(self._now)
         self._part = "law"
         if share == 0.0:
             self._command = None
@@ -303,12 +325,11 @@ class Loop:
                 return fault
         return rates if share == 1.0 else share * rates
 
-    @property
-    def _share(self) -> float:
-        """How much is left of the command."""
+    def _share_at(self, time: float) -> float:
+        """Return how much is left of the command at a time."""
         if self._command is None:
             return 0.0
-        return command_share(self._now - self._last_image, self._period_s, self._timeouts.decay_s)
+        return command_share(time - self._last_image, self._period_s, self._timeouts.decay_s)
 
     def _tell_of_hold(self) -> None:
         holding = self._followers[self._arm].holding
@@ -325,7 +346,7 @@ class Loop:
     ) -> None:
         commands = {}
         if self._command is not None:
-            share, asked = self._share, self._command
+            share, asked = self._share_at(self._now), self._command
             faded = replace(asked, velocity=share * asked.velocity, v_camera=share * asked.v_camera)
             commands = {self._arm: asked if share == 1.0 else faded}
         setpoints = {name: follower.guard.setpoint for name, follower in self._followers.items()}

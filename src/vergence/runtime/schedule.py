@@ -35,6 +35,10 @@ class Schedule:
         self._last_due = self._last_image = -1
         self.period_over = False  # whether a period of the camera ends with this tick
 
+    def ticks_left(self, tick: int) -> int:
+        """Return how many ticks it is until the next period begins."""
+        return self._due - tick
+
     def turns(self, tick: int, images: bool) -> bool:
         """Tell whether the loop turns at a tick, which may bring images."""
         overdue = self._last_image <= self._last_due

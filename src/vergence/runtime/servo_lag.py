@@ -15,9 +15,13 @@ class ServoLag:
     Args:
         ticks: of lag.
         dt: inner period, s.
+
+    Attributes:
+        ticks: of lag.
     """
 
     def __init__(self, ticks: int, dt: float) -> None:
+        self.ticks = ticks
         self._lag_s = ticks * dt
         self._told: deque[FloatArray] = deque(maxlen=ticks + 1)
 

@@ -23,8 +23,11 @@ class TaskWatch:
     def __init__(
         self, stages: Stages, begun: float, rate_max: FloatArray, listeners: Listeners
     ) -> None:
-        planner = self._planner = stages.planner
+        planner = stages.planner
+        # Asked here once: to ask it of a protocol costs as much as a short tick's law.
         self._plans_again = planner if isinstance(planner, PlansAgain) else None
+        self._tells = planner if isinstance(planner, Tells) else None
+        self._ends = planner if isinstance(planner, EndsTask) else None
         self._until = stages.until
         self._begun, self._duration_s = begun, stages.duration_s
         self._listeners, self._losses = listeners, LossReports(listeners)
@@ -62,14 +65,14 @@ class TaskWatch:
                 self._plans_again.stalled(time, self._arrival.points_px, q)
 
     def _tell_of_plans(self) -> None:
-        if isinstance(self._planner, Tells):
-            for event in self._planner.events():
+        if self._tells is not None:
+            for event in self._tells.events():
                 self._listeners.event(*event)
 
     def planned_end(self, time: float) -> Outcome | None:
         """Tell what the planner has to tell; return how the task ends by it, once it does."""
         self._tell_of_plans()
-        return self._planner.conclusion(time) if isinstance(self._planner, EndsTask) else None
+        return None if self._ends is None else self._ends.conclusion(time)
 
     def asked_end(
         self, time: float, q: FloatArray, observation: Observation, reference: Reference
@@ -81,8 +84,8 @@ class TaskWatch:
 
     def time_over(self, end: float, time: float) -> Outcome:
         """Return how the task ends whose time is over."""
-        if isinstance(self._planner, EndsTask):
-            return self._planner.unfinished(time)
+        if self._ends is not None:
+            return self._ends.unfinished(time)
         if self._until is not None:
             reason = "the time of the run is over before the task is"
             return Outcome(OutcomeKind.NOT_REACHED, reason, time)

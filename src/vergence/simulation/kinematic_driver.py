@@ -14,6 +14,7 @@ from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
 from vergence.simulation.motions import TargetPoses
 
 ARM, CAMERA = "arm", "camera"
+_POSES = 64  # of the target that are made at once
 
 # From joint positions (n,) and T_world_target (4, 4) to the features that nothing hides, (M,).
 Sees = Callable[[FloatArray, FloatArray], BoolArray]
@@ -51,6 +52,7 @@ class KinematicDriver:
         self._tick = self._exposed = 0
         self._position, self._velocity = np.array(cell.start), np.zeros(len(cell.start))
         self._queue: deque[tuple[int, Frame]] = deque()
+        self._poses = np.empty((0, 4, 4))  # of the target, at a run of images
         self._expose()
 
     @property
@@ -83,9 +85,19 @@ class KinematicDriver:
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
         """Put the joints where they should be."""
+        self.advance(setpoints, 1)
+
+    @property
+    def quiet_ticks(self) -> int:
+        """After how many inner ticks the next image is taken or arrives."""
+        events = [self._tick_of(self._exposed), *(tick for tick, _ in self._queue)]
+        return min(events) - self._tick
+
+    def advance(self, setpoints: Mapping[str, Setpoint], ticks: int) -> None:
+        """Put the joints where they should be after so many ticks."""
         self._position = setpoints[ARM].position
         self._velocity = setpoints[ARM].velocity
-        self._tick += 1
+        self._tick += ticks
         if self._tick >= self._tick_of(self._exposed):
             self._expose()
 
@@ -94,21 +106,33 @@ class KinematicDriver:
 
     def frame(self) -> Frame:
         """Return what the camera sees now."""
-        return Frame(CAMERA, self.time, None, {ARM: self._position}, self._truth())
+        return self._frame(self._cell.target(np.array([self.time]))[0])
+
+    def _frame(self, T_world_target: FloatArray) -> Frame:
+        return Frame(CAMERA, self.time, None, {ARM: self._position}, self._truth(T_world_target))
 
     def _expose(self) -> None:
         arrival = self._tick_of(self._exposed + self._cell.latency_frames)
+        T_world_target = self._pose_at(self._exposed)
         self._exposed += 1
         if self._rng.random() >= self._cell.dropped:
-            self._queue.append((arrival, self.frame()))
+            self._queue.append((arrival, self._frame(T_world_target)))
+
+    def _pose_at(self, image: int) -> FloatArray:
+        """Return the target's pose (4, 4) at an image; a run of them is made at once."""
+        at = image % _POSES
+        if at == 0:
+            ticks = [self._tick_of(image + k) for k in range(_POSES)]
+            self._poses = self._cell.target(np.array(ticks) / self.inner_rate_hz)
+        pose: FloatArray = self._poses[at]
+        return pose
 
     def _tick_of(self, image: int) -> int:
         return image_tick(image, self._cell.inner_rate_hz, self._cell.rate_hz)
 
-    def _truth(self) -> FrameTruth:
+    def _truth(self, T_world_target: FloatArray) -> FrameTruth:
         cell = self._cell
         T_world_camera = cell.arm.forward_kinematics(self._position)
-        T_world_target = cell.target(np.array([self.time]))[0]
         points = transform_points(se3_inverse(T_world_camera) @ T_world_target, cell.features)
         depth = points[:, 2].copy()
         in_front = depth > 1e-3
