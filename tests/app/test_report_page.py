@@ -69,6 +69,26 @@ def test_no_text_of_a_chart_is_cut_off_in_the_browser(browser: Browser) -> None:
     assert outside == []
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itself(
+    browser: Browser, scheme: str
+) -> None:
+    wide = {"width": 1000, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.call("Emulation.setDeviceMetricsOverride", **wide | {"width": 420})
+    try:
+        assert browser.value("document.documentElement.scrollWidth") <= 420
+        smallest = browser.value(
+            "Math.min(...[...document.querySelectorAll('svg.chart text')]"
+            ".map((text) => text.getBoundingClientRect().height))"
+        )
+        assert smallest > 9.0
+        notes = "[...document.querySelectorAll('.card .note')].map((note) => note.clientWidth)"
+        assert min(browser.value(notes)) > 200
+        assert accessibility.complaints(browser, scheme) == []
+    finally:
+        browser.call("Emulation.setDeviceMetricsOverride", **wide)
+
+
 @pytest.mark.parametrize(("scheme", "bright"), [("light", True), ("dark", False)])
 def test_a_chart_has_the_ground_of_the_readers_scheme(
     browser: Browser, scheme: str, bright: bool

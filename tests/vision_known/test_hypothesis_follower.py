@@ -3,12 +3,18 @@
 import cv2
 import numpy as np
 import pytest
-from known_scene import CAMERA, HALF, box_model, clutter, pose
+from known_scene import CAMERA, HALF, SIGNS, box_model, clutter, drawn_image, pose
 from numpy.typing import NDArray
 
 from vergence.arrays import FloatArray
 from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import Sighting, Step
+from vergence.estimation.object_follower import (
+    LEAST_SHARE,
+    FollowRule,
+    ObjectFollower,
+    Sighting,
+    Step,
+)
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import EdgeTracker, ObjectModel
 from vergence.vision.known_object.look_alikes import apart_rad, symmetries
@@ -105,3 +111,29 @@ def test_a_lost_object_is_found_again_where_it_comes_back() -> None:
     assert Sighting.SEEN not in sightings[4:18]
     assert sightings[-1] is Sighting.SEEN
     assert np.linalg.norm(step.T_camera_target[:3, 3] - elsewhere[:3, 3]) < 0.004
+
+
+def test_a_smaller_share_is_offered_only_where_it_would_let_the_image_count() -> None:
+    offered = []
+    for hidden in (0.0, 0.5, 0.55, 0.6, 1.0):
+        rule = FollowRule()
+        sightings = []
+        for each in (rule, rule.with_least_share(LEAST_SHARE)):
+            random = np.random.default_rng(0)
+            follower = ObjectFollower(
+                EdgeTracker(box_model()), CAMERA, pose(), 0.0, 1.0 / RATE_HZ, each
+            )
+            for _ in range(4):
+                follower.follow(drawn_image(pose(), random), 0.0)
+            image = drawn_image(pose(), random)
+            corners = CAMERA.project(HALF * SIGNS @ pose()[:3, :3].T + pose()[:3, 3])[:, 0]
+            covered = round(float(corners.min() + hidden * np.ptp(corners))) + 1
+            image[:, : covered if hidden else 0] = 128
+            step = follower.follow(image, 1.0 / RATE_HZ)
+            sightings.append(step.sighting)
+            if each is rule:
+                offered.append(step.share_decided)
+        helps = sightings == [Sighting.PREDICTED, Sighting.SEEN]
+        assert offered[-1] == helps, hidden
+    assert offered[0] is offered[-1] is False
+    assert True in offered

@@ -139,25 +139,21 @@ def _follower(
     from vergence.app.tracking.start import starting_poses
     from vergence.errors import InputError
     from vergence.estimation.hypothesis_follower import HypothesisFollower
+    from vergence.estimation.object_follower import LEAST_SHARE
 
     for key, value in (("--contrast", options.contrast), ("--jolt", options.jolt)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("track", key, value, "a number above zero")
     share = options.share
-    if share is not None and not 0.2 <= share <= 1.0:
-        allowed = "0.2 … 1: with less of it an object cannot be distinguished from its background"
+    if share is not None and not LEAST_SHARE <= share <= 1.0:
+        allowed = f"{LEAST_SHARE} … 1: with less of it an object cannot be distinguished from its background"
         raise InputError("track", "--share", share, allowed)
     assert options.start is not None
     starts = starting_poses(options.start, camera)
     tracker, usual = _tracker(options, model, first)
     rule = replace(usual, jolt_px=options.jolt)
     if share is not None:
-        rule = replace(
-            rule,
-            least_of_all=share,
-            least_share=min(usual.least_share, share + 0.07),
-            surprising_share=max(usual.surprising_share, share),
-        )
+        rule = rule.with_least_share(share)
     return HypothesisFollower(tracker, camera, starts, 0.0, 1.0 / footage.rate_hz, rule)
 
 
@@ -306,7 +302,7 @@ def _outcome(steps: "list[Step]") -> Outcome:
         before = [step.time for step in steps if step.sighting is Sighting.SEEN]
         since = f"last seen at {before[-1]:.2f} s" if before else "never seen"
         reason = f"{since}; {last.reason}"
-    if last.reason.endswith("needed"):
+    if last.share_decided:
         reason += " (--share lowers that)"
     return Outcome(OutcomeKind.TARGET_LOST, reason, last.time)
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from vergence.signals import ImagePoints
 from vergence.vision.known_object import ObjectModel
 
 CAMERA = "camera"
+LEAST_SHARE = 0.2  # with less of it, an object cannot be distinguished from its background
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
 
@@ -128,6 +129,7 @@ class Step:
     samples_px: FloatArray  # (N, 2) the places looked at
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
     alternatives: tuple[FloatArray, ...] = ()  # T_camera_target (4, 4) of turned poses, if any
+    share_decided: bool = False  # the image was rejected, and counts with lower shares
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +146,27 @@ class FollowRule:
     turn_max_rad: float = 0.25
     distance_max: float = 0.2  # and of the position, as a share of the distance
 
+    def with_least_share(self, share: float) -> "FollowRule":
+        """Return the rule by which an image counts if it shows this share of the object."""
+        return replace(
+            self,
+            least_of_all=share,
+            least_share=min(self.least_share, share + 0.07),
+            surprising_share=max(self.surprising_share, share),
+        )
+
 
 # Lines across an outline are found or not each for itself, and half of it may be hidden.
 OUTLINE_RULE = FollowRule(
     least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25
 )
+
+
+class _Doubt(NamedTuple):
+    """Why an image is rejected."""
+
+    reason: str = ""  # empty if it is not
+    share_decided: bool = False  # whether it counts with `LEAST_SHARE`
 
 
 class ObjectFollower:
@@ -249,11 +267,12 @@ class ObjectFollower:
             InputError: if the image is not of the camera's size.
         """
         belief = self._filter.predict(self._belief, time)
-        seen, reason = self._look(image, belief, belief.T_world_target)
-        if reason and self._missed == 0:
+        seen, doubt = self._look(image, belief, belief.T_world_target)
+        if doubt.reason and self._missed == 0:
             # It may have stopped: look where it was, too.
             again = self._look(image, belief, self._belief.T_world_target)
-            seen, reason = again if not again[1] else (seen, reason)
+            seen, doubt = again if not again[1].reason else (seen, doubt)
+        reason = doubt.reason
         if not reason:
             view = view_of(_points(seen, time), self._camera, np.eye(4), seen.points)
             update = self._filter.update(without_unseen(belief, seen.unseen), view)
@@ -281,27 +300,34 @@ class ObjectFollower:
             seen.share,
             seen.samples_px,
             seen.samples_found,
+            share_decided=doubt.share_decided,
         )
 
     def _look(
         self, image: ImageArray, belief: Belief, T_camera_target: FloatArray
-    ) -> tuple[Measurement, str]:
-        """Search around a pose; return what is seen, and why it is not to be believed."""
+    ) -> tuple[Measurement, _Doubt]:
+        """Search around a pose; return the measurement, and whether and why it is rejected."""
         covariance = shown_covariance(belief, self._unseen)[:6, :6]
         seen: Measurement = self._tracker.measure(
             image, self._camera, T_camera_target, covariance, self._memory
         )
         return seen, self._doubt(belief, seen)
 
-    def _doubt(self, belief: Belief, seen: Measurement) -> str:
-        """Say why an image is not to be believed; empty if it is.
-
-        The more an image surprises, the more of the object it has to show.
-        """
-        rule, sought = self._rule, self._tracker.sought
+    def _doubt(self, belief: Belief, seen: Measurement) -> _Doubt:
+        """Return whether and why an image is rejected."""
         if not seen.expected:
-            return "the object is outside the image"
+            return _Doubt("the object is outside the image")
         surprise = min(1.0, _surprise(belief, seen.T_camera_target) / _SURPRISING)
+        reason = self._shortfall(seen, surprise, self._rule)
+        lowest = self._rule.with_least_share(LEAST_SHARE)
+        return _Doubt(reason, reason != "" and not self._shortfall(seen, surprise, lowest))
+
+    def _shortfall(self, seen: Measurement, surprise: float, rule: FollowRule) -> str:
+        """Return what an image shows too little of; empty if it shows enough.
+
+        The farther an image is from the prediction, the more of the object it has to show.
+        """
+        sought = self._tracker.sought
         for share, least, what in (
             (seen.usual, rule.least_share, f"{sought} expected"),
             (seen.share, rule.least_of_all, f"all of {sought}"),
