@@ -146,7 +146,8 @@ def _follower(
             raise InputError("track", key, value, "a number above zero")
     share = options.share
     if share is not None and not LEAST_SHARE <= share <= 1.0:
-        allowed = f"{LEAST_SHARE} … 1: with less of it an object cannot be distinguished from its background"
+        reason = "with less, an object cannot be distinguished from its background"
+        allowed = f"{LEAST_SHARE} … 1: {reason}"
         raise InputError("track", "--share", share, allowed)
     assert options.start is not None
     starts = starting_poses(options.start, camera)
