@@ -171,7 +171,7 @@ def test_poses_that_are_all_alike_end_with_a_reason_and_code_1(
         (2, "001.png,0,0,0,one,0,0,0", "row 3: quaternion_wxyz", "4 finite numbers"),
         (2, "001.png,0,0,0,2,0,0,0", "row 3: quaternion_wxyz", "a unit quaternion w, x, y, z"),
         (2, "001.png,436,200,10,1,0,0,0", "row 3: position_m", "metres"),
-        (2, "000.png,0,0,0,1,0,0,0", "row 3", "one pose an image"),
+        (2, "000.png,0,0,0,1,0,0,0", "row 3", "one pose per image"),
         (2, "999.png,0,0,0,1,0,0,0", "999.png", "000.png"),
         (0, "image,x,y,z,qw,qx,qy,qz", "row 1", "x_m"),
         (2, "x" * 200_000, "row 2", "a row of CSV"),

@@ -84,6 +84,7 @@ def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itse
         assert smallest > 9.0
         notes = "[...document.querySelectorAll('.card .note')].map((note) => note.clientWidth)"
         assert min(browser.value(notes)) > 200
+        browser.wait("document.querySelector('figure:has(> [data-time])').tabIndex === 0")
         assert accessibility.complaints(browser, scheme) == []
     finally:
         browser.call("Emulation.setDeviceMetricsOverride", **wide)

@@ -391,7 +391,11 @@ def test_a_python_without_rclpy_and_wrong_settings_are_refused() -> None:
         Ros2(sys.base_prefix + "/bin/python3").open(BLIND)
     with pytest.raises(InputError, match=r"address: given /bin/false, which does not run the br"):
         Ros2("/bin/false").open(BLIND)
-    with pytest.raises(InputError, match=r"driver.joints: given 2 names; allowed: 6, one a joint"):
+    with pytest.raises(
+        InputError,
+        match=r"driver.joints: given 2 names; allowed: 6, one "
+        r"per joint",
+    ):
         Ros2(joints=("a", "b")).open(BLIND)
     with pytest.raises(InputError, match=r"driver.images: given wirst; allowed: "):
         Ros2(images={"wirst": "/w"}).open(SEEING)

@@ -156,7 +156,11 @@ def test_a_bus_that_is_not_complete_is_refused(servos: Servos, words: str, said:
 def test_wrong_settings_and_ports_are_refused() -> None:
     with pytest.raises(DriverSilent, match="port /dev/nowhere cannot be opened"):
         So101("/dev/nowhere").open(BLIND)
-    with pytest.raises(InputError, match=r"driver.signs: given 2 values; allowed: 5, one a joint"):
+    with pytest.raises(
+        InputError,
+        match=r"driver.signs: given 2 values; allowed: 5, one "
+        r"per joint",
+    ):
         So101(signs=(1, 1)).open(BLIND)
     with pytest.raises(InputError, match=r"driver.cameras.side: missing"):
         open_driver(CELL, "so101")

@@ -73,7 +73,7 @@ def test_what_is_no_answer_is_refused_by_name(answer: object, said: str) -> None
 
 def test_a_matcher_that_finds_nothing_and_does_not_say_why_is_named() -> None:
     nothing = OwnMatcher(Answers(Matches(POINTS[:0], POINTS[:0], "")), "cell.toml")
-    assert "Answers finds nothing in common" in nothing.match(None, None).reason
+    assert "Answers finds no matches" in nothing.match(None, None).reason
 
 
 def test_matchers_are_asked_in_turn_with_their_finer_twins(monkeypatch) -> None:

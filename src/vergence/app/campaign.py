@@ -69,14 +69,14 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
 
 
 def names_in(option: str, text: str) -> tuple[str, ...]:
-    """Split names with commas between.
+    """Split names separated by commas.
 
     Raises:
         InputError: if there are none.
     """
     given = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not given:
-        raise InputError(option, "", text, "names with commas between")
+        raise InputError(option, "", text, "names separated by commas")
     return given
 
 

@@ -30,7 +30,12 @@ def goal(options: "GoalOptions") -> int:
         raise InputError("--out", "", options.out, "a file name that ends in .png or .jpg")
     cell = load_cell(options.cell, overrides(options.settings))
     if options.driver is not None and options.at is not None:
-        raise InputError("--at", "", options.at, "only without --driver: move the robot there")
+        raise InputError(
+            "--at",
+            "",
+            options.at,
+            "only without --driver; with it, move the robot to the goal first",
+        )
     driver = open_driver(cell, options.driver) if options.driver else SimulatedDriver(cell)
     try:
         frame = _frame(cell, driver, options.at)
@@ -75,7 +80,7 @@ def _frame(cell: "Cell", driver: "Driver", at: str | None) -> "Frame":
         try:
             given = [float(number) for number in at.split(",")]
         except ValueError:
-            raise InputError("--at", "", at, "numbers with commas, one a joint") from None
+            raise InputError("--at", "", at, "numbers separated by commas, one per joint") from None
         arm = driver.arms[cell.task.arm]
         try:
             q = joint_positions(cell, "--at", given, arm)

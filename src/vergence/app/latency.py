@@ -77,7 +77,7 @@ def _keys(cell: "Cell", driver: str, camera: str, found: "Latencies") -> dict[st
 
 def _words(name: str, delay: "Delay") -> str:
     if delay.reason:
-        return f"  {name}: the data do not tell ({delay.reason})"
+        return f"  {name}: not determined ({delay.reason})"
     return f"  {name}: {1e3 * delay.seconds:.1f} ± {1e3 * delay.deviation_s:.1f} ms late"
 
 

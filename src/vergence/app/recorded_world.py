@@ -26,14 +26,14 @@ class RecordedWorld:
     def of(cls, info: RunInfo) -> Self | str:
         """Return the world of a recorded run, or why it cannot be put up here."""
         if not info.text:
-            return "It says nothing of a cell."
+            return "The recording names no cell."
         for source in (info.path, info.cell):
             try:
                 cell = load_cell(source, _settings(info.text), info.seed)
             except InputError:
                 continue
             if _plain(cell.text) != _plain(info.text):
-                return f"{source} is not what it was when the recording was made."
+                return f"{source} has changed since the recording was made."
             choose_renderer(needed=False)
             try:
                 return cls(World(cell))

@@ -161,7 +161,7 @@ def _images(run: Run, camera: str) -> tuple[str, str]:
     if not isinstance(run, Recording):
         return "", ""
     images = camera_images(run, camera)
-    player = markup.film(images.film, f"what {camera} saw", marks_legend(run.cameras[camera]))
+    player = markup.film(images.film, f"images of {camera}", marks_legend(run.cameras[camera]))
     stills = "".join(
         markup.image(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in images.key_frames
     )
@@ -249,7 +249,7 @@ def _events(run: Run) -> str:
 
 def _cell(run: Run) -> str:
     text = escape(run.info.text)
-    folded = f"<details><summary>as it was run</summary><pre>{text}</pre></details>"
+    folded = f"<details><summary>as run, with all --set values</summary><pre>{text}</pre></details>"
     return markup.section("Cell file", folded if text else "")
 
 

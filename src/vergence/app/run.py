@@ -120,7 +120,7 @@ def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | No
         _tell_interrupted(recorder)
         raise SystemExit(FAILURE) from None
     finally:
-        reason = "the run broke off before it could say why"
+        reason = "the run ended unexpectedly, without a reason"
         recorder.close(Outcome(OutcomeKind.STOPPED, reason, recorder.now), {})
 
 

@@ -128,7 +128,7 @@ def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
     ):
         position = np.abs(normalized(info, q))
         rate = np.abs(rates) / np.where(np.isfinite(info.rate_max), info.rate_max, np.nan)
-        for name, shares in (("nearest a joint limit", position), ("fastest", rate)):
+        for name, shares in (("closest to a joint limit", position), ("fastest", rate)):
             if np.isfinite(shares).any():
                 row, joint = np.unravel_index(np.nanargmax(shares), shares.shape)
                 where = f"of the limit: {info.names[joint]} at {trace.time[row]:.2f}\u00a0s; {note}"
@@ -175,7 +175,7 @@ _DERIVED = {  # what the rows of cameras and arms say as well, from the recordin
 }
 
 _NOTES = {
-    "real_time": "simulated seconds in a second of computing",
+    "real_time": "simulated seconds per second of computation",
     "final_target_error": "estimated target from the true one, last image",
     "max_target_error": "estimated target from the true one, any image",
     "final_pose_error": "task's camera from its desired pose, last image",

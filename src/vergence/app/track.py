@@ -88,7 +88,7 @@ def _tag(options: "TrackOptions") -> "TagTable | None":
     fields = type(options).__dataclass_fields__
     for key in ("model", "start", "scale", "contrast", "jolt", "share", "by"):
         if (given := getattr(options, key)) != fields[key].default:
-            raise InputError("track", f"--{key}", given, "none beside --tag, which needs none")
+            raise InputError("track", f"--{key}", given, "nothing together with --tag")
     return tag_of_option(options.tag)
 
 
@@ -343,13 +343,13 @@ def _tell(tracked: Tracked, files: Mapping[str, Any], folder: Path) -> None:
     say(
         f"  seen in {tracked.seen} of {tracked.frames} images · standard deviation up to "
         f"{1e3 * tracked.deviation_max_m:.2g} mm, {np.rad2deg(tracked.deviation_max_rad):.2g}° · "
-        f"{tracked.median_ms:.1f} ms an image"
+        f"{tracked.median_ms:.1f} ms per image"
     )
     if tracked.free:
         say(f"  {tracked.free}; its standard deviation is that of an unknown angle, 104°")
     say(f"  poses    {files['poses']}  (with covariances: {files['poses_with_covariance'].name})")
     if tracked.alike:
-        say(f"  turned by {_listed(tracked.alike)} its edges are the same: the start decides")
+        say(f"  symmetric: its edges look the same turned by {_listed(tracked.alike)}")
     if tracked.note:
         say(f"  {tracked.note}")
     if files["overlay"]:

@@ -126,7 +126,7 @@ class LineEnd:
 
     def unfinished(self, time: float) -> Outcome:
         """Return how it ends if the time of the run is over."""
-        reason = f"its time is over {1e3 * self._off_m():.1f} mm before the end of the line"
+        reason = f"out of time {1e3 * self._off_m():.1f} mm before the end of the line"
         return Outcome(OutcomeKind.NOT_REACHED, reason, time)
 
     def events(self) -> tuple[tuple[float, str, str], ...]:

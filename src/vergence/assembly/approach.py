@@ -103,7 +103,9 @@ def plan_approach(
     goal = _pose_in_camera(context, task, desired_px)
     if now is None or goal is None:
         where = "at the start" if now is None else "as desired"
-        return PlanFailure(Obstacle.START, f"the features {where} do not fix the target's pose")
+        return PlanFailure(
+            Obstacle.START, f"the features {where} do not determine the target's pose"
+        )
     arm = context.arm_to_camera(task.camera)
     T_world_target = arm.forward_kinematics(q) @ now
     problem = PlanningProblem(

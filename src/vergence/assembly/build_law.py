@@ -181,9 +181,7 @@ def _depth(context: LawContext, names: list[str]) -> Depth:
                 raise InputError(str(context.cell.path), "law.depth", "from_camera", allowed)
     if law.feed_forward and not depth.estimates_motion:
         given = f"true, with the depth {kind_of(depth)}"
-        allowed = (
-            "from_features, from_pose or from_camera for depth: else a wrong depth feigns motion"
-        )
+        allowed = "depth from_features, from_pose or from_camera; a wrong depth looks like motion"
         raise InputError("law", "feed_forward", given, allowed)
     return depth
 

@@ -40,7 +40,9 @@ def first_points(
     now = max(frame.time, 0.0)
     if any(begin <= now < end for begin, end in context.cell.cameras[camera].blind_s):
         given = f"at the start camera {camera} is blind, by cameras.{camera}.blind_s"
-        raise InputError(str(context.cell.path), key, given, "a camera that sees at the start")
+        raise InputError(
+            str(context.cell.path), key, given, "a camera that is not blind at the start"
+        )
     if not images:
         return _exact_points(context, key, camera, frame)
     assert frame.image is not None
@@ -69,7 +71,7 @@ def _first_curve(context: LawContext, tracker: PointTracker, image: ImageArray) 
     tracks = tracker.track(image)
     if not tracks.found.all():
         given = f"{kind_of(context.curve)}, {next(filter(None, tracks.reasons))} in the first image"
-        raise InputError(str(context.cell.path), "task.tracker", given, "a curve that is seen")
+        raise InputError(str(context.cell.path), "task.tracker", given, "a curve in view")
     return tracks.points_px
 
 
@@ -90,7 +92,7 @@ def _exact_points(
         given = f"at the start it does not fill the middle of camera {camera}'s image: "
         given += _whereabouts(context, camera)
         source = str(context.cell.path)
-        raise InputError(source, "target", given, "features, or a start before it")
+        raise InputError(source, "target", given, "features, or a start in front of the target")
     return view.points_px, perception
 
 

@@ -41,10 +41,12 @@ def require_motion(
         return
     ways = f"{len(q)} joint{'s' if len(q) > 1 else ''}"
     if most == 0:
-        given = f"{camera}, which no motion of its arm ({ways}) brings nearer to what is desired"
+        given = f"{camera}, whose arm ({ways}) has no motion that reduces the error"
     else:
-        given = f"{camera}, which its arm ({ways}) moves in {most} ways that show in the image"
-    allowed = f"a camera that can be moved in {asked}, as the law asks, or fewer axes for the law"
+        given = f"{camera}, whose arm ({ways}) can change the image in {most} independent ways"
+    allowed = (
+        f"a camera that can be moved in {asked}, as the law requires, or a law with fewer axes"
+    )
     raise InputError(source, "task.camera", given, allowed)
 
 

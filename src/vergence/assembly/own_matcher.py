@@ -54,7 +54,7 @@ class OwnMatcher:
             raise self._refused("points that are not finite")
         reason = str(found.reason)
         if not len(points[0]) and not reason:
-            reason = f"{kind_of(self._part)} finds nothing in common"
+            reason = f"{kind_of(self._part)} finds no matches"
         return Matches(points[0], points[1], reason)
 
     def _refused(self, what: str) -> InputError:

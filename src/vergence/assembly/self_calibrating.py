@@ -59,7 +59,7 @@ class SelfCalibrating:
 def words(found: SelfCalibration) -> str:
     """Return in words what a run told, and what its motion was not enough for."""
     if found.reason:
-        return f"the run tells nothing of the camera: {found.reason}"
+        return f"the run does not determine the camera's parameters: {found.reason}"
     s, told = found.deviations, found.told
     rotation, place = np.rad2deg(found.rotation_rad), 1e3 * found.distance_m
     parts = (
@@ -68,7 +68,7 @@ def words(found: SelfCalibration) -> str:
             told[1:4].all(),
             f"camera turned by {rotation:.2f} ± {np.rad2deg(s[1:4].max()):.2f}° from its place",
         ),
-        (told[4:7].all(), f"{place:.1f} ± {1e3 * s[4:7].max():.1f} mm off it"),
+        (told[4:7].all(), f"{place:.1f} ± {1e3 * s[4:7].max():.1f} mm away from it"),
         (told[7], f"focal length times {found.focal:.4f} ± {s[7]:.4f}"),
     )
     known = [text for there, text in parts if there]

@@ -86,11 +86,15 @@ class OutputWait:
             self._set_at = time
         if not self._told or time - self._set_at < self._task.wait_s:
             return None
-        return Outcome(OutcomeKind.REACHED, f"{self._text} and waited for", time)
+        return Outcome(
+            OutcomeKind.REACHED, f"{self._text} and waited {self._task.wait_s:g} s", time
+        )
 
     def unfinished(self, time: float) -> Outcome:
         """Return how it ends if the time of the run is over."""
-        return Outcome(OutcomeKind.NOT_REACHED, "its time is over before the output's", time)
+        return Outcome(
+            OutcomeKind.NOT_REACHED, "out of time before the output's wait was over", time
+        )
 
     def events(self) -> tuple[tuple[float, str, str], ...]:
         """Return that the output was set, once."""

@@ -117,6 +117,6 @@ def _require_used(context: LawContext, task: ReachTable) -> None:
         key for key in ("planner", "matcher") if kind_of(getattr(task, key)) != fields[key].default
     ]
     if changed:
-        given = f"{changed[0]}, which a target with a tag has no use for"
-        allowed = "a reach without it: the tag tells pose and scale"
+        given = f"{changed[0]}, which has no effect for a target with a tag"
+        allowed = "none: the tag determines pose and scale"
         raise InputError(str(context.cell.path), f"task.{changed[0]}", given, allowed)

@@ -55,7 +55,7 @@ def until_of(context: LawContext) -> Until | None:
     if task.until is None:
         return None
     if isinstance(task, SwitchTable) and looks_for_target(task.until):
-        given = f"{kind_of(task.until)}, in a task that looks at nothing"
+        given = f"{kind_of(task.until)}, in a task that uses no images"
         raise InputError(
             str(cell.path), "task.until", given, "wait_s, or an end that needs no image"
         )

@@ -94,7 +94,7 @@ def _lens(path: Path, image: ImageArray, camera: Camera) -> Camera:
         return camera
     focal_mm = _focal_35mm(path)
     if focal_mm is None:
-        given = f"an image of {width} x {height} by a camera that is not known"
+        given = f"an image of {width} x {height} by an unknown camera"
         allowed = (
             f"{camera.width} x {camera.height}, as the arm's camera; or a camera file "
             f"{_camera_file(path).name} beside it; or Exif data with the focal length"

@@ -98,7 +98,7 @@ def _unit(arm: Arm) -> FloatArray:
 
 
 def _in_si(cell: Cell, key: str, given: float | Sequence[float], arm: Arm) -> FloatArray:
-    """Return numbers of a cell file in rad or m, one a joint."""
+    """Return numbers of a cell file in rad or m, one per joint."""
     if isinstance(given, Sequence):
         numbers, count = np.array(given, dtype=np.float64), f"{len(given)} values"
     else:

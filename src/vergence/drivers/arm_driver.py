@@ -90,7 +90,9 @@ class ArmDriver:
             if self._reading.time != last:
                 last, deadline = self._reading.time, now + self._timeout_s
             if now > deadline:
-                raise DriverSilent(f"the controller's clock has stood for {self._timeout_s:g} s")
+                raise DriverSilent(
+                    f"the controller's clock has not advanced for {self._timeout_s:g} s"
+                )
             sleep(min(max(left - _POLL_S, _POLL_S), 0.01))  # each reading costs more than sleep
 
     def _note(self) -> None:

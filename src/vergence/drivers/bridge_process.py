@@ -128,4 +128,4 @@ class BridgeProcess:
     def _last_error(self) -> str:
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else "it hung up"
+        return lines[-1] if lines else "it closed the connection"

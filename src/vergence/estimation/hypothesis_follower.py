@@ -150,7 +150,7 @@ class HypothesisFollower:
         if better:
             taken, step_of_it = max(better, key=lambda each: each[0].evidence.over(self._evidence))
             turn = between(step.T_camera_target, step_of_it.T_camera_target)
-            self.note = f"the object is turned by {turn}: that explains the images better"
+            self.note = f"the object is turned by {turn}: this explains the images better"
             self._main, self._evidence, step = taken.follower, taken.evidence, step_of_it
             kept = [each for each in kept if taken.evidence.over(each[0].evidence) < DECIDED]
             kept = [each for each in kept if each[0] is not taken]
@@ -160,5 +160,8 @@ class HypothesisFollower:
             return step
         poses = tuple(seen.T_camera_target for seen in found)
         turns = " or ".join(str(between(step.T_camera_target, pose)) for pose in poses)
-        reason = f"turned by {turns} it explains the images as well; another view would tell"
+        reason = (
+            f"turned by {turns} it explains the images as well; an image from "
+            "another direction would decide"
+        )
         return replace(step, sighting=Sighting.AMBIGUOUS, reason=reason, alternatives=poses)

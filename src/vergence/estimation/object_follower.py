@@ -351,7 +351,8 @@ class ObjectFollower:
         distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
         if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
             return (
-                f"what is seen of {self._tracker.sought} leaves the pose open: {place:.3g} m and "
+                f"what is seen of {self._tracker.sought} does not determine the pose: "
+                f"{place:.3g} m and "
                 f"{np.rad2deg(turn):.2g} degrees of standard deviation"
             )
         return ""

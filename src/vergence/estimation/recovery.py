@@ -109,7 +109,9 @@ def settle(
         return NoPose("no pose explains the points")
     best = minima[0]
     if np.linalg.cond(best.information) > 1e14:
-        return NoPose("the points leave the pose open: they lie on a line, or too close together")
+        return NoPose(
+            "the points do not determine the pose: they lie on a line, or too close together"
+        )
     scale = max(1.0, best.square / max(2 * seen.size - POSE, 1))
     if scale > CONTRADICTION:
         return NoPose(
@@ -134,7 +136,7 @@ def settle(
     return NoPose(
         f"{_NUMBERS.get(len(fits), 'several')} different poses explain the points, the likeliest "
         f"{angle:.0f}° apart with odds of {odds[0] / odds[1]:.2g} to 1; another camera, a nearer "
-        "image or points farther off the target's plane would tell them apart",
+        "image or points farther off the target's plane would distinguish them",
         fits,
     )
 

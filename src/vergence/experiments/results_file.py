@@ -40,7 +40,7 @@ class ResultsFile:
                 str(folder),
                 "",
                 f"results of another campaign: {', '.join(changed)} differ",
-                "an empty folder, or the one of the same campaign to go on with it",
+                "an empty folder, or one of the same campaign, to resume it",
             )
         self.results = _readable(lines[1:])
         with self.path.open("w", encoding="utf-8") as file:  # without lines that were cut off

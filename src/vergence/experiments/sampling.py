@@ -92,7 +92,7 @@ class Sampling:
                 break
         else:
             given = f"{self.spread:g}: {_MOST_TRIES} draws, and none of them sees the target"
-            raise InputError("spread", "", given, "a smaller share")
+            raise InputError("spread", "", given, "a smaller spread")
         changes: dict[str, Any] = {}
         if "starts" in self.vary:
             unit = np.where(arm.sliding, 1.0, np.pi / 180)

@@ -85,7 +85,7 @@ class PotentialFieldPlanner:
         if end != ARRIVED:
             what = "came to rest" if end == STUCK else f"did not arrive in {self.steps_max} steps"
             return PlanFailure(
-                Obstacle.LOCAL_MINIMUM, f"the walk down the potential field {what} before the goal"
+                Obstacle.LOCAL_MINIMUM, f"the descent of the potential field {what} before the goal"
             )
         if path.joint_margin < 0.0:
             joint = int(np.abs(path.joints_normalized).max(axis=0).argmax())

@@ -202,5 +202,5 @@ def _within(rate_max: FloatArray, most: FloatArray, names: tuple[str, ...]) -> F
 def _one_each(values: float | FloatArray, n: int, name: str) -> FloatArray:
     given = np.asarray(values, dtype=np.float64)
     if given.shape not in ((), (n,)):
-        raise InputError("arm", name, f"{given.size} values", f"one, or {n}, one a joint")
+        raise InputError("arm", name, f"{given.size} values", f"one, or {n}, one per joint")
     return np.broadcast_to(given, (n,))

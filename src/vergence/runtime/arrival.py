@@ -13,7 +13,8 @@ _WINDOW_S = 1.0  # over which errors are averaged and rest is judged
 _FALLING = 0.1  # share of the error by which it is less in the later half of a window, if it falls
 _FALLING_PX = 0.01  # and by how much at least
 _NO_LIMIT = (
-    "no limit: this is a local minimum of the law, or its features leave the rest of the way free"
+    "no limit: this is a local minimum of the law, or its features do not "
+    "determine the rest of the motion"
 )
 _REST = 1e-3  # share of the rate limits up to which an arm is at rest
 _DESIRED_MOVED_PX = 0.1  # in a window, up to which the desired features are at rest
@@ -128,7 +129,7 @@ class Arrival:
             return endings.completed(duration_s, time)
         if self.reached:
             return endings.reached(self.error_px, time)
-        return endings.not_reached(self.error_px, "its time is over", time)
+        return endings.not_reached(self.error_px, "out of time", time)
 
     def _rests(self) -> bool:
         if not self._rows or self._rows[-1].time - self._rows[0].time < 0.9 * _WINDOW_S:

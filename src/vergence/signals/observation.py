@@ -77,6 +77,6 @@ class Observation:
     """All that one outer tick has seen."""
 
     time: float  # s, of the newest image in it
-    views: tuple[ImagePoints, ...]  # one an image that arrived
+    views: tuple[ImagePoints, ...]  # one per image that arrived
     target: TargetState | None = None
     needs_target: bool = True  # whether the arm is held while the target is not seen

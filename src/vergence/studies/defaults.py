@@ -22,7 +22,7 @@ from vergence.studies.guarantees_random import CAMERA, SQUARE
 from vergence.studies.processes import processes, try_all
 from vergence.studies.reach_scene import Scene
 
-TITLE = "Defaults that arrive: every setting against the others"
+TITLE = "Default settings compared with the alternatives"
 CELLS = ("ur5", "panda", "gantry")
 STARTS, STARTS_QUICK = 300, 4
 STARTS_SEED = 11

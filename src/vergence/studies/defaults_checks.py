@@ -68,7 +68,7 @@ def _others(found: Mapping[str, Sequence[Tried]]) -> tuple[Check, ...]:
         ),
         Check(
             "defaults.stalled_unnamed",
-            "every stall names what holds it, and a trial without limits bears it out: 0",
+            "every stall names the limits that hold it, confirmed by a trial without them: 0",
             unnamed,
             "runs",
             unnamed == 0,

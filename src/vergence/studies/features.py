@@ -19,7 +19,7 @@ from vergence.studies.figure_files import save_figures
 from vergence.studies.ideal_loop import Ending
 from vergence.studies.processes import processes, try_all
 
-TITLE = "Servoing by every kind of feature, beside ViSP"
+TITLE = "Servoing with every kind of feature, compared with ViSP"
 STARTS, QUICK_STARTS = 300, 20
 _POSES, _QUICK_POSES = 1000, 50
 _ERROR_MAX = 1e-6

@@ -32,7 +32,7 @@ from vergence.studies.guarantees_runs import (
 )
 from vergence.studies.processes import processes, try_all
 
-TITLE = "Limits are promises: the constrained servo and the guard"
+TITLE = "Guarantees of the constrained servo and the guard"
 ATTEMPTS, ATTEMPTS_QUICK = 10_000, 400
 PAIRS, PAIRS_QUICK = 300, 12
 ENCOUNTERS, ENCOUNTERS_QUICK = 2_000, 64  # with obstacles

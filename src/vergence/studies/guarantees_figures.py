@@ -34,7 +34,7 @@ def draw(
             "How servoing ends from random starts to random goals on the gantry, inside view and "
             "joint limits or not at all.",
         ),
-        "singularity": (_singular(singular), "Through the wrist's singularity with the target."),
+        "singularity": (_singular(singular), "Following a target through the wrist's singularity."),
     }
     return save_figures(out, drawn)
 

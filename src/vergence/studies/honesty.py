@@ -1,4 +1,4 @@
-"""How honest the estimates are: random scenes of every kind, errors beside stated deviations.
+"""Do errors agree with their stated uncertainty? Random scenes, errors beside stated deviations.
 
 A wrong answer is one whose error lies beyond five of its own deviations, as does every explanation
 that it holds if it is ambiguous; an answer where there is nothing to be found is wrong, too, and a
@@ -19,7 +19,7 @@ from vergence.studies.figure_files import save_figures
 from vergence.studies.honesty_answer import Answer
 from vergence.studies.processes import processes, try_all
 
-TITLE = "How honest the estimates are"
+TITLE = "Do errors agree with their stated uncertainty?"
 SCENES = {"two_views": 4000, "poses": 6000, "points": 6000, "tags": 4000}  # random scenes each
 QUICK = 40  # times fewer
 BATCH = 25

@@ -14,7 +14,7 @@ from vergence.studies.figure_files import save_figures
 from vergence.studies.imaging_cases import CASES, IMAGINGS, Case, Measured, Trial, measure
 from vergence.studies.processes import processes, try_all
 
-TITLE = "Laws and trackers through a camera as bad as a real one"
+TITLE = "Laws and trackers with a realistic camera"
 SEEDS, QUICK_SEEDS = 3, 1
 _QUICK = ("points", "region")
 _FACTOR = 3.0  # by which the final error may grow …

@@ -210,7 +210,7 @@ def _slave(trials: Trials) -> list[Check]:
         ),
         Check(
             "slave.camera_configuration_ratio",
-            "the hand's error is not affected by the camera configuration",
+            "the end effector's error is not affected by the camera configuration",
             ratio_m, "",
             all(within(ratio, 1.0 / _ALIKE, _ALIKE) for ratio in (ratio_m, ratio_deg)),
             "fixed camera over both, relative to the estimated object frame; orientation "

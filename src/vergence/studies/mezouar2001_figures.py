@@ -65,7 +65,7 @@ def draw(
         ),
         "figure_space": (
             _in_space(section),
-            "The camera's way from start to goal; strokes show where it looks.",
+            "The camera's path from start to goal; strokes show its viewing direction.",
         ),
         "figure_classical": (
             _classical(section.scene, classical),

@@ -47,9 +47,11 @@ def _other_markers(board: Board, image: ImageArray) -> str:
     if ids.max() >= count:
         return (
             f"markers up to number {ids.max()} are seen, and a board of {board.columns} x "
-            f"{board.rows} inner corners has {count}, from 0: other counts"
+            f"{board.rows} inner corners has {count}, from 0: wrong counts"
         )
-    return f"{len(ids)} of its markers are seen, but not its corners: other counts of columns, rows"
+    return (
+        f"{len(ids)} of its markers are seen, but not its corners: wrong counts of columns and rows"
+    )
 
 
 def _markers(image: ImageArray, dictionaries: tuple[str, ...]) -> tuple[str, IntArray]:

@@ -64,7 +64,7 @@ class DrivenArm:
             if np.abs(goal - self.position).max() < _THERE and not self._follower.guard.moving:
                 return
             self.step(self._rates(goal - self.position))
-        raise DriverSilent(f"{self._name} does not get where it is driven")
+        raise DriverSilent(f"{self._name} does not reach the commanded position")
 
     def step(self, rates: FloatArray | None = None) -> None:
         """Step at rates (n,), or hold."""
@@ -75,7 +75,7 @@ class DrivenArm:
         if fault := self._follower.observe(sample.time, measured, robot):
             raise DriverSilent(f"{fault.kind.value}: {fault.reason}")
         if hindrance := self._follower.guard.hindrance:
-            raise DriverSilent(f"{self._name} was braked before {hindrance}")
+            raise DriverSilent(f"{self._name} was braked, as {hindrance}")
         self._hear(sample)
 
     def brake(self) -> None:

@@ -64,7 +64,9 @@ def write_bag_images(
         return None
     if len(taken) < _FEWEST_STOPS:
         given = f"images at {len(taken)} stops of the arm"
-        allowed = "ten stops or more, each of half a second: moving images are not sure of a pose"
+        allowed = (
+            "at least ten stops of half a second; an image taken in motion has no reliable pose"
+        )
         raise InputError(str(path), "", given, allowed)
     file = folder / "poses.csv"
     write_poses(file, taken)

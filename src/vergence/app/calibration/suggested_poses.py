@@ -35,7 +35,7 @@ def board_pose(camera: Camera, board: Board, image: ImageArray) -> FloatArray:
         if found:
             T: FloatArray = se3(so3_exp(np.ravel(w).astype(float)), np.ravel(t).astype(float))
             return T
-    given = "an image without it where the arm is now"
+    given = "no board in the image at the arm's present position"
     raise InputError("calibrate", "--board", given, "the board in view at the start")
 
 

@@ -126,7 +126,7 @@ class Studio:
             if self._sees():
                 T_world_base = placement_pose(self._cell.arms[self.arm])
                 return se3_inverse(T_world_base) @ self._flange()
-        given = f"{self._cell.name}, in which {self.arm} finds no pose that shows the board"
+        given = f"{self._cell.name}, in which no pose of {self.arm} shows the board"
         raise InputError("calibrate", "--synthetic", given, "another cell or camera")
 
     def corners(self, name: str, noise_px: float) -> Sighting:

@@ -42,7 +42,8 @@ class CampaignOptions:
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder to write to, instead of runs/NAME-TIME. Runs in it are not repeated."
+            help="Folder to write to, instead of runs/NAME-TIME. Runs already in it are "
+            "not repeated."
         ),
     ] = None
     settings: Settings = None
@@ -75,7 +76,7 @@ class CompareOptions(CampaignOptions):
         typer.Option(
             min=0.0,
             max=1.0,
-            help="Spread of the draws: for starts, as a fraction of each joint's range; for "
+            help="Spread of the random draws: for starts, as a fraction of each joint's range; for "
             "targets, as a fraction of their distance.",
         ),
     ] = 0.2

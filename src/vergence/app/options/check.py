@@ -18,7 +18,7 @@ class CheckOptions:
         str,
         typer.Option(
             metavar="NAME[:ADDRESS]",
-            help="The robot: a driver by its name, or module:Class of your own.",
+            help="Driver of the robot: its name, or module:Class for your own.",
             autocompletion=names.drivers,
         ),
     ]

@@ -38,7 +38,7 @@ Driver = Annotated[
     str | None,
     typer.Option(
         metavar="NAME[:ADDRESS]",
-        help="Use a real robot: a driver by its name, or module:Class of your own.",
+        help="Run on a real robot with this driver: its name, or module:Class for your own.",
         autocompletion=names.drivers,
     ),
 ]

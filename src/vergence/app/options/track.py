@@ -81,7 +81,7 @@ class TrackOptions:
     by: Annotated[
         Modality,
         typer.Option(
-            help="What is followed: sharp edges, or the outline by its colours. Default: edges "
+            help="What to track: sharp edges, or the outline by its colours. Default: edges "
             "where most of the outline runs along them."
         ),
     ] = Modality.AUTO

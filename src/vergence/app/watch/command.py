@@ -57,7 +57,9 @@ def _watch_recording(options: "WatchOptions", path: Path) -> Mapping[str, object
         ("--driver", options.driver),
     ):
         if given is not None:
-            raise InputError("watch", option, given, "only with a cell: a recording is only shown")
+            raise InputError(
+                "watch", option, given, "only with a cell; a recording cannot be changed"
+            )
     from vergence.app.progress import working
     from vergence.app.watch.replay import Replay
     from vergence.app.watch.server import Server, listen

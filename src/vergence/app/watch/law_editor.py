@@ -148,7 +148,7 @@ class LawEditor:
 
     def _require_law(self, key: str, given: str) -> None:
         if not self._goes_by_law:
-            allowed = f"nothing while the task {self.stage.task.called} runs: it goes by no law"
+            allowed = f"nothing while the task {self.stage.task.called} runs, which uses no law"
             raise InputError("message", key, given, allowed)
 
     def _start_from(self, cell: Cell) -> None:

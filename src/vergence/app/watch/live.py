@@ -112,7 +112,7 @@ class Live:
 
     def close(self) -> None:
         """Let go of everything; a recording that is not finished is closed as it is."""
-        reason = "the run broke off before it could say why"
+        reason = "the run ended unexpectedly, without a reason"
         self._recorder.close(Outcome(OutcomeKind.STOPPED, reason, self._recorder.now), {})
         self.scene.close()
         self._driver.close()
@@ -262,7 +262,7 @@ class Live:
         frame = self._newest_frame()
         if frame.time != command.time:
             given = f"{command.time:g} s, which is not the newest image"
-            raise InputError("message", "time", given, "points picked while time stands still")
+            raise InputError("message", "time", given, "points picked while the run is paused")
         self._editor.track(command.points)
         self._picked_in = {frame.camera: replace(frame, time=frame.time + self._begun)}
         self._pace.resume()
@@ -293,12 +293,12 @@ class Live:
         self._goals += 1
         path = self.folder / f"goal-{self._goals}.png"
         keep_photograph(path, self._newest_frame(), self._driver)
-        self._say("goal taken", f"{path}; another run goes there with --goal {path}")
+        self._say("goal taken", f"saved as {path}; to go there, run with --goal {path}")
 
     def _newest_frame(self) -> Frame:
         frame = self._newest.frames.get(self._editor.cell.task.camera)
         if frame is None or frame.image is None:
-            raise InputError("message", "", Absent("no image yet"), "a run that looks at images")
+            raise InputError("message", "", Absent("no image yet"), "a run with images")
         return frame
 
     @property
@@ -312,7 +312,7 @@ class Live:
             self._loop.replace_law(law)
             self._law = law
         changes = self._editor.as_json()["settings"]
-        self._say("law changed", ", ".join(changes) or "back to the cell's own")
+        self._say("law changed", ", ".join(changes) or "reset to the cell's settings")
 
     def _take_changes(self) -> None:
         """Let a task that has just begun go by what was changed of its law since the run began."""

@@ -93,7 +93,7 @@ class LiveRobot:
 
     def close(self) -> None:
         """Let go of everything; a recording that is not finished is closed as it is."""
-        reason = "the run broke off before it could say why"
+        reason = "the run ended unexpectedly, without a reason"
         self._recorder.close(Outcome(OutcomeKind.STOPPED, reason, self._recorder.now), {})
         self.scene.close()
         self._mirror.close()
@@ -119,7 +119,7 @@ class LiveRobot:
 
     def _do(self, command: Command) -> None:
         if not isinstance(command, Stop):
-            raise InputError("message", "do", command.do, "stop: this is a real arm")
+            raise InputError("message", "do", command.do, "stop; a real arm takes no other command")
         self._asked_to_stop = True
         if self._loop is not None:
             self._loop.stop()

@@ -77,7 +77,7 @@ class Replay:
             ],
             "plots": [plot.as_json() for plot in self._playback.plots],
             "scene": self.scene is not None,
-            "no_scene": f"No view in space: {why_no_scene}",
+            "no_scene": f"No 3D view: {why_no_scene}",
             "draggable": False,
             "truth": self._playback.knows_truth,
         }

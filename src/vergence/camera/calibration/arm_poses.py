@@ -39,7 +39,7 @@ def read_poses(path: Path) -> dict[str, FloatArray]:
     for place, row in rows:
         name = Path(str(row["image"])).name
         if name in poses:
-            raise InputError(str(path), place, f"{name} a second time", "one pose an image")
+            raise InputError(str(path), place, f"{name} a second time", "one pose per image")
         poses[name] = _pose(row, str(path), place)
     return poses
 

@@ -57,7 +57,7 @@ def _guesses(A: FloatArray, T: FloatArray, fixed: bool) -> Iterator[_Guess]:
     yield _Guess(other + "poses were those of the base in the flange", back)
     scale = _scale(A, T)
     if 0.2 < scale < 5.0:
-        words = f"if the squares were {100 * scale:.1f} % of the size that was said"
+        words = f"if the squares were {100 * scale:.1f} % of the size given"
         yield _Guess(words, A, scale)
     recorded = A if fixed else back
     read = np.array([_scalar_last(pose) for pose in recorded])

@@ -39,5 +39,5 @@ class Posture:
             return middle
         if len(self.position) != arm.joint_count:
             given = f"{len(self.position)} values"
-            raise InputError("Posture", "position", given, f"{arm.joint_count}, one a joint")
+            raise InputError("Posture", "position", given, f"{arm.joint_count}, one per joint")
         return np.array(self.position)

@@ -26,7 +26,7 @@ def clock_findings(seen: Watched, rate_hz: float) -> Iterator[Finding]:
         "Hz",
         f"{rate_hz:g} ± 5 %",
         abs(rate / rate_hz - 1.0) <= _RATE_TOLERANCE,
-        "another rate of the robot, or a computer that is too busy",
+        "the robot runs at another rate, or the computer is too busy",
     )
     yield Finding(
         "longest time between two ticks",
@@ -51,7 +51,7 @@ def clock_findings(seen: Watched, rate_hz: float) -> Iterator[Finding]:
         "%",
         "at most 1",
         abs(drift) <= _CLOCK_TOLERANCE,
-        "time stamps are of another clock or another unit",
+        "time stamps come from another clock or have another unit",
     )
 
 
@@ -114,5 +114,5 @@ def image_findings(
             "ms",
             f"0 to {1e3 * _OLD_S:g}",
             0.0 <= age <= _OLD_S,
-            "stamps of another clock; see `vergence calibrate --latency`",
+            "time stamps from another clock; see `vergence calibrate --latency`",
         )

@@ -14,7 +14,7 @@ _SHARP_S = 0.003  # deviation of a delay that is worth telling
 class Delay(NamedTuple):
     """By how much a signal is late."""
 
-    seconds: float  # NaN if the data do not tell
+    seconds: float  # NaN if the data do not determine it
     deviation_s: float  # standard deviation
     correlation: float  # between the signals, the delay taken out
     reason: str = ""  # why the data do not tell

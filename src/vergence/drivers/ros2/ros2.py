@@ -94,7 +94,7 @@ class Ros2:
         if self.joints and len(self.joints) != arm.joint_count:
             given, allowed = (
                 f"{len(self.joints)} names",
-                f"{arm.joint_count}, one a joint of {name}",
+                f"{arm.joint_count}, one per joint of {name}",
             )
             raise InputError(equipment.source, "driver.joints", given, allowed)
         for output in self.output_values:

@@ -72,7 +72,7 @@ class ServoBus:
                 self._late = True
                 return None
         except _GONE as error:
-            raise DriverSilent(f"the port {self._name} is gone: check its cable") from error
+            raise DriverSilent(f"the port {self._name} has disappeared: check its cable") from error
         get = self._states.getData
         ticks, speed, temperature, fault = (
             np.array([get(number, address, size) for number in self._ids], dtype=np.int64)
@@ -89,7 +89,7 @@ class ServoBus:
         try:
             self._servos.groupSyncWrite.txPacket()
         except _GONE as error:
-            raise DriverSilent(f"the port {self._name} is gone: check its cable") from error
+            raise DriverSilent(f"the port {self._name} has disappeared: check its cable") from error
         finally:
             self._servos.groupSyncWrite.clearParam()
 
@@ -109,7 +109,7 @@ class ServoBus:
                     return
                 self._late = True
         except _GONE as error:
-            raise DriverSilent(f"the port {self._name} is gone: check its cable") from error
+            raise DriverSilent(f"the port {self._name} has disappeared: check its cable") from error
         raise DriverSilent(f"servo {number} does not answer on {self._name}: check its cable")
 
     def hold(self) -> None:

@@ -52,7 +52,7 @@ class So101:
         for key in ("ids", "zero_ticks", "signs"):
             given = getattr(self, key)
             if given and len(given) != n:
-                allowed = f"{n}, one a joint of {name}"
+                allowed = f"{n}, one per joint of {name}"
                 raise InputError(equipment.source, f"driver.{key}", f"{len(given)} values", allowed)
         sdk = optional_package("so101", *self.package)
         ids = self.ids or tuple(range(1, n + 1))

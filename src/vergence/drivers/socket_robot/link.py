@@ -45,9 +45,9 @@ class Link:
             try:
                 data = self._connection.recv(_CHUNK)
             except OSError as error:
-                raise LinkBrokenError(f"has hung up ({error.strerror})") from error
+                raise LinkBrokenError(f"closed the connection ({error.strerror})") from error
             if not data:
-                raise LinkBrokenError("has hung up")
+                raise LinkBrokenError("closed the connection")
             self._received += data
         return message
 
@@ -62,7 +62,7 @@ class Link:
                 if not self._ready(deadline, reading=False):
                     raise LinkBrokenError(f"has read nothing for {timeout_s:g} s") from None
             except OSError as error:
-                raise LinkBrokenError(f"has hung up ({error.strerror})") from error
+                raise LinkBrokenError(f"closed the connection ({error.strerror})") from error
 
     def close(self) -> None:
         """Hang up."""

@@ -46,7 +46,7 @@ class _Dashboard:
     def _answer(self) -> str:
         line = self._lines.readline(1000)
         if not line:
-            raise ConnectionError(0, "it hung up")
+            raise ConnectionError(0, "it closed the connection")
         return line.decode(errors="replace").strip()
 
 

@@ -92,16 +92,14 @@ class Closing:
     def where(self, displacement: Displacement) -> str:
         """Say how far the camera is from its goal."""
         where = in_words(displacement.distance_m, displacement.angle_rad)
-        return f"{where} from the goal; sure within {in_words(*self._at_most(displacement))}"
+        return f"{where} from the goal; certainly within {in_words(*self._at_most(displacement))}"
 
     def unfinished(self, time: float) -> Outcome:
         """Return how the task ends if its time is over."""
         displacement = self.points.displacement if self.points else None
-        reason = (
-            f"its time is over: {self._missed}" if self._missed else "its time is over on the way"
-        )
+        reason = f"out of time: {self._missed}" if self._missed else "out of time on the way"
         if self.begun and displacement is not None:
-            reason = f"its time is over at {self.where(displacement)}"
+            reason = f"out of time at {self.where(displacement)}"
         return Outcome(OutcomeKind.NOT_REACHED, reason, time)
 
     def _at_most(self, displacement: Displacement) -> tuple[float, float]:

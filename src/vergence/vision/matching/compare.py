@@ -154,5 +154,5 @@ def _explained(
     matches = matcher.match(matcher.describe(image), matcher.describe(mirrored))
     if isinstance(_motion_of(matches, camera), Compared):
         return replace(failure, reason=f"the goal image is mirrored ({failure.reason})")
-    reason = f"nothing of the goal image is recognised for sure ({failure.reason})"
+    reason = f"no part of the goal image is recognised with certainty ({failure.reason})"
     return replace(failure, reason=reason)

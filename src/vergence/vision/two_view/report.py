@@ -173,7 +173,7 @@ def _with_doubt(motions: list[TwoView], turned: int) -> TwoView:
         cure = "points off the plane, its normal" if best.planar else "more matches"
         doubts.append(
             f"{len(motions)} motions explain the matches, {apart} apart; {cure} or a third image "
-            "from farther aside would tell them apart"
+            "from farther aside would distinguish them"
         )
     if turned:
         doubts.append(

@@ -48,7 +48,7 @@ class Frames:
         """Return why a frame cannot be told in another, in a sentence; empty if it can."""
         if self.between(parent, child) is None:
             known = sorted(self._links.keys() | {parent for parent, _ in self._links.values()})
-            frames = f"it has {', '.join(known[:20])}" if known else "nobody tells it anything"
+            frames = f"it has {', '.join(known[:20])}" if known else "it has received no transforms"
             return f"TF does not connect {parent} with {child}; {frames}"
         up, down = self._line(_name(parent)), self._line(_name(child))
         moves = [frame for frame in {*up} ^ {*down} if frame in self._moving]

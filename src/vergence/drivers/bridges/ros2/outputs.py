@@ -73,7 +73,7 @@ class Outputs:
             return ""
         kinds = dict(self._node.get_service_names_and_types()).get(service, [])
         if not kinds:
-            return f"nobody listens on {service}, the topic of output {name}"
+            return f"no node listens on {service}, the topic of output {name}"
         if kinds[0] != _SERVICE:
             return f"{service}, the service of output {name}, is of {kinds[0]}, not of {_SERVICE}"
         try:

@@ -70,7 +70,7 @@ class Robot:
         if time == self._time:
             if self._stood_s > self._settings["timeout_s"]:
                 silent_s = self._settings["timeout_s"]
-                raise GoneError(f"the controller's clock has stood for {silent_s:g} s")
+                raise GoneError(f"the controller's clock has not advanced for {silent_s:g} s")
             return None
         self._time, self._stood_s = time, 0.0
         self.scale = min(max(float(receive.getTargetSpeedFraction()), 0.0), 1.0)
