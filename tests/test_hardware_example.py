@@ -87,7 +87,7 @@ def test_over_the_socket_the_arm_moves_as_it_does_directly(
     assert servo(driver, model, 1.5, tmp_path / "socket").succeeded
     driver.close()
     robot.join(60)
-    assert robot.end.endswith("has hung up; the arm is at rest")
+    assert robot.end.endswith("closed the connection; the arm is at rest")
     here, there = (Recording.open(tmp_path / way) for way in ("direct", "socket"))
     expected, actual = here.arms["puma"], there.arms["puma"]
     moved = np.ptp(expected.position, axis=0).max()
@@ -139,7 +139,7 @@ def test_an_arm_whose_client_is_killed_brakes_to_rest_within_its_limits(
     with moving_client(robot) as client:
         client.send_signal(signal.SIGKILL)
         robot.join(60)
-    assert robot.end.startswith("test has hung up")
+    assert robot.end.startswith("test closed the connection")
     assert_braked(robot.driver, model)
 
 
@@ -262,7 +262,7 @@ def test_whoever_does_not_say_who_it_is_keeps_no_client_out(
         driver.step({})
         driver.close()
     robot.join(60)
-    assert robot.end.endswith("has hung up; the arm is at rest")
+    assert robot.end.endswith("closed the connection; the arm is at rest")
 
 
 def framed(text: str) -> bytes:

@@ -42,6 +42,14 @@ def test_what_has_not_changed_is_kept(package: Path) -> None:
     assert kernels(package) == before
 
 
+def test_a_package_that_is_moved_keeps_its_kernels(package: Path, tmp_path: Path) -> None:
+    (tmp_path / "moved").mkdir()
+    moved = package.rename(tmp_path / "moved" / "vergence")
+    before = kernels(moved)
+    assert forget_stale_kernels(moved) == []
+    assert kernels(moved) == before
+
+
 def test_kernels_that_call_what_has_changed_go_with_it(package: Path) -> None:
     (package / "low/chain.py").write_text("def walk(): return 1\n")
     before = kernels(package)

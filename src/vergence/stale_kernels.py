@@ -1,14 +1,14 @@
-"""Compiled kernels that were made from sources as they are no longer.
+"""Deletes compiled kernels whose sources have changed since.
 
 numba keeps a compiled kernel beside its source file, and compiles it again when that file changes.
-But a kernel contains the kernels that it calls: after an update of a checkout it could go on with
-what another file said before, even with arrays laid out in another way.
+But a kernel contains the kernels that it calls: after an update of a checkout it could still
+contain an old version of those, which may even expect another array layout.
 """
 
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
 
@@ -20,9 +20,9 @@ _IMPORT = re.compile(r"^\s*(?:from|import)\s+(vergence[\w.]*)(?:\s+import\s+\(?(
 def forget_stale_kernels(package: Path = _PACKAGE) -> list[Path]:
     """Delete the compiled kernels of every file that, or an import of which, has changed.
 
-    What was compiled before this was first asked is taken for right, and so are the kernels that
-    came with a wheel. Costs some milliseconds, and
-    a tenth of a second after a change.
+    Kernels that are older than the first call count as valid, and so do those that came with a
+    wheel. A checkout may be moved or copied. Takes some milliseconds, and a tenth of a second after
+    a change.
 
     Returns:
         The files whose kernels were deleted.
@@ -30,17 +30,17 @@ def forget_stale_kernels(package: Path = _PACKAGE) -> list[Path]:
     if (package / "kernels.json").exists():
         return []
     note = package / "__pycache__" / _NOTED
-    times = {str(path): time for path, time in _sources(package)}
+    times = {str(path.relative_to(package)): time for path, time in _sources(package)}
     try:
         noted = json.loads(note.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         noted = {}
     if noted.get("times") == times:
         return []
-    marks = _marks([Path(path) for path in times], package.parent)
+    marks = _marks(times, package)
     before = noted.get("marks")
     changed = [] if before is None else [p for p in times if before.get(p) != marks[p]]
-    stale = [Path(path) for path in changed]
+    stale = [package / path for path in changed]
     try:
         for path in stale:
             for kernel in path.parent.glob(f"__pycache__/{path.stem}.*.nb[ic]"):
@@ -54,22 +54,24 @@ def forget_stale_kernels(package: Path = _PACKAGE) -> list[Path]:
     return stale
 
 
-def _sources(folder: Path) -> Iterator[tuple[str, int]]:
+def _sources(folder: Path) -> Iterator[tuple[Path, int]]:
     """Yield every source below a folder, and when it was last written, ns."""
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith(".py"):
-                yield entry.path, entry.stat().st_mtime_ns
+                yield Path(entry.path), entry.stat().st_mtime_ns
             elif entry.is_dir(follow_symlinks=False) and entry.name != "__pycache__":
                 yield from _sources(Path(entry.path))
 
 
-def _marks(paths: list[Path], root: Path) -> dict[str, str]:
-    """Return a mark of each file that changes with it and with all that it imports, by path."""
+def _marks(names: Iterable[str], package: Path) -> dict[str, str]:
+    """Return a mark of each file of a package that changes with it and with all that it imports."""
+    paths = {package / name: name for name in names}
     texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in paths}
+    root = package.parent
     imports = {path: set(_imported(text, root)) & texts.keys() for path, text in texts.items()}
     own = {path: blake2b(text.encode(), digest_size=8).hexdigest() for path, text in texts.items()}
-    return {str(path): _mark(path, imports, own) for path in paths}
+    return {name: _mark(path, imports, own) for path, name in paths.items()}
 
 
 def _imported(text: str, root: Path) -> Iterator[Path]:

@@ -124,7 +124,7 @@ def test_a_bridge_that_dies_is_told(camera: Camera) -> None:
     source = opened()
     taken(source, 0.2)
     source._bridge._process.send_signal(signal.SIGKILL)
-    with pytest.raises(DriverSilent, match="the bridge to camera wrist has hung up"):
+    with pytest.raises(DriverSilent, match="the bridge to camera wrist closed the connection"):
         taken(source, 2.0)
     source.close()
 

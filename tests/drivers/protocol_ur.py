@@ -173,7 +173,7 @@ def test_after_a_protective_stop_is_cleared_the_arm_moves_again(
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [("cable", "connection to the robot"), ("freeze", "clock has stood for 3 s")],
+    [("cable", "connection to the robot"), ("freeze", "clock has not advanced for 3 s")],
 )
 def test_a_robot_that_is_gone_is_told_by_name(robot: Robot, words: str, said: str) -> None:
     driver = Ur(robot.address, **BUSY).open(BLIND)

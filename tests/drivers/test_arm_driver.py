@@ -59,5 +59,5 @@ def test_speeds_make_up_for_a_short_pause_and_not_for_a_long_one() -> None:
 
 
 def test_a_clock_that_stands_is_a_silent_driver() -> None:
-    with pytest.raises(DriverSilent, match=r"clock has stood for 0.2 s"):
+    with pytest.raises(DriverSilent, match=r"clock has not advanced for 0.2 s"):
         ticks([0.01], 0.0, 2)

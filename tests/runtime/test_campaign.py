@@ -367,7 +367,7 @@ def test_a_cluster_runs_batches_too(source, quick_trials, quick_results, tmp_pat
     ("whom", "said"),
     [
         (slice(1, 3), "every worker that took it was killed, 1 in all"),
-        (slice(0, 1), "the scheduler is gone"),
+        (slice(0, 1), "the scheduler has disappeared"),
     ],
     ids=["workers", "scheduler"],
 )

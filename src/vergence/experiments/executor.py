@@ -95,7 +95,7 @@ class Executor:
                     what = f"every worker that took it was killed, {count} in all; out of memory?"
                     raise WorkersLostError(given[future], what) from None
                 except distributed.client.FutureCancelledError:
-                    raise WorkersLostError(given[future], "the scheduler is gone") from None
+                    raise WorkersLostError(given[future], "the scheduler has disappeared") from None
 
     @contextmanager
     def _client(self, count: int) -> Iterator[Any]:
