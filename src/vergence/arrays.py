@@ -22,7 +22,7 @@ def frozen(
 
     Args:
         values: anything NumPy turns into an array.
-        shape: the shape it must have; None stands for any length along that axis.
+        shape: the shape it must have; None means any length along that axis.
         name: what the caller's user calls it, for the message.
 
     Raises:
@@ -40,7 +40,7 @@ def as_floats(
 
     Args:
         values: anything NumPy turns into an array of numbers.
-        shape: the shape it must have; None stands for any length along that axis.
+        shape: the shape it must have; None means any length along that axis.
         name: what the caller's user calls it, for the message.
 
     Raises:

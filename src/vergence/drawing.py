@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, yellow left out: told apart by colour-blind readers, seen on white.
+# Okabe and Ito's palette, yellow left out: distinguished by colour-blind readers, seen on white.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 LIMIT = "#a33"
 INK = "#333"

@@ -21,22 +21,22 @@ class ShapeError(VergenceError, ValueError):
 
 
 class Absent(str):
-    """Words of ours, not of the user, for something that is not there, such as "no such file"."""
+    """Our own words, not the user's, for something that is missing, such as "no such file"."""
 
     __slots__ = ()
 
 
-NOTHING = Absent("nothing")  # where a value should stand
+NOTHING = Absent("nothing")  # where a value is expected
 
 
 class InputError(VergenceError, ValueError):
     """Something a user wrote that cannot be used.
 
     Attributes:
-        source: the file, command or argument it stands in.
+        source: the file, command or argument that contains it.
         key: where in it, such as ``arms.puma.start_deg``; empty if all of it is meant.
-        given: what stands there; `Absent` where something is missing.
-        allowed: what may stand there.
+        given: what was given; `Absent` where something is missing.
+        allowed: what is allowed there.
     """
 
     def __init__(self, source: str, key: str, given: object, allowed: str) -> None:
@@ -46,7 +46,7 @@ class InputError(VergenceError, ValueError):
 
 
 def _told(given: object, allowed: str) -> str:
-    """Tell what is wrong; what is missing was not given."""
+    """Return what is wrong."""
     if not isinstance(given, Absent):
         return f"given {echo(given)}; allowed: {allowed}"
     return f"{'missing' if given == NOTHING else echo(given)}; needed: {allowed}"
@@ -90,7 +90,7 @@ def echo(given: object) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Tell which names there are, the one probably meant first."""
+    """Return which names there are, the one probably meant first."""
     names = sorted(known)
     listing = ", ".join(echo(each) for each in names[:_MOST_NAMES]) if names else "none"
     if len(names) > _MOST_NAMES:

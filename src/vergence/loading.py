@@ -11,7 +11,7 @@ from vergence.registry import find, kinds
 
 
 class Place(NamedTuple):
-    """Where a table stands: for messages, and to find a user's own modules."""
+    """The place of a table: for messages, and to find a user's own modules."""
 
     source: str  # the file
     key: str  # where in it
@@ -23,13 +23,13 @@ class Place(NamedTuple):
 
 
 def load_part(role: str, given: Any, place: Place, usual: str = "") -> Any:
-    """Return the part that a table describes; a bare name stands for a table of that kind.
+    """Return the part that a table describes; a bare name means a table of that kind.
 
     Args:
         role: what it is for.
         given: a table with its kind, a name, or a part; the kind may be left out
             where the role has just one, or a usual one.
-        place: where it stands.
+        place: where it is.
         usual: the kind of a table that names none.
 
     Raises:
@@ -75,7 +75,7 @@ def part_class(role: str, kind: Any, place: Place) -> Any:
 
 
 def names_law(kind: Any, place: Place) -> bool:
-    """Tell whether a kind is a whole law of one's own, rather than an objective of the servo."""
+    """Return whether a kind is a whole law of a user's own, rather than an objective of the servo."""
     if not isinstance(kind, str):
         return False
     if ":" not in kind:

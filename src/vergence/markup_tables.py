@@ -75,7 +75,7 @@ def yaml_documents(text: str) -> list[Any]:
 def xml_table(text: str) -> dict[str, Any]:
     """Return an XML text as a table: an element with others in it is a table, any other its text.
 
-    What stands there several times becomes a list. Attributes are left out.
+    What occurs several times becomes a list. Attributes are left out.
 
     Raises:
         ValueError: in one line, if it is no such text, or declares a document type.

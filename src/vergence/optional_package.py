@@ -1,4 +1,4 @@
-"""Packages that not everybody needs: extras of vergence."""
+"""Optional packages, installed by extras of vergence."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -47,5 +47,5 @@ def optional_package(what: str, module: str, extra: str, source: str = "--driver
 
 
 def is_installed(module: str) -> bool:
-    """Tell whether a module can be found, without importing it."""
+    """Return whether a module can be found, without importing it."""
     return find_spec(module) is not None

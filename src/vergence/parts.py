@@ -1,7 +1,7 @@
 """Parts: whatever a user may choose or replace, declared once as a frozen, validated dataclass.
 
 The fields of a part are its constructor, its table in a cell file, its keys for ``--set``, its
-knobs on the live page and its entry in the documentation, so that these cannot disagree.
+settings on the live page and its entry in the documentation, so that these cannot disagree.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -111,23 +111,23 @@ def as_part(role: str | tuple[str, ...], kind: str = "") -> Callable[[C], C]:
 
 @dataclass_transform(frozen_default=True)
 def objective(cls: C) -> C:
-    """Declare a class with a method `quadratic` as an objective of one's own."""
+    """Declare a class with a method `quadratic` as an objective of a user's own."""
     return part("objective")(cls)
 
 
 @dataclass_transform(frozen_default=True)
 def limit(cls: C) -> C:
-    """Declare a class with a method `rows` as a limit of one's own."""
+    """Declare a class with a method `rows` as a limit of a user's own."""
     return part("limit")(cls)
 
 
 def feature(cls: C) -> C:
-    """Declare a class that inherits from `vergence.Feature` as a feature of one's own."""
+    """Declare a class that inherits from `vergence.Feature` as a feature of a user's own."""
     return as_part("feature")(cls)
 
 
 def is_part(value: object) -> bool:
-    """Tell whether a class, or what it is an instance of, was declared with `part`."""
+    """Return whether a class, or what it is an instance of, was declared with `part`."""
     return hasattr(value, "__part_roles__")
 
 

@@ -1,4 +1,4 @@
-"""Where cells and recordings are found by the names that people type."""
+"""Where cells and recordings are found by the names on the command line."""
 
 from itertools import takewhile
 from pathlib import Path
@@ -50,7 +50,7 @@ def find_recording(path: str | Path) -> Path:
     """Return the file of a recording.
 
     Args:
-        path: a run folder, or the recording alone under whatever name.
+        path: a run folder, or the recording alone under any name.
 
     Raises:
         InputError: if there is none.

@@ -25,7 +25,7 @@ def use_prebuilt_kernels() -> str:
         return ""
     if os.environ.get(SWITCH) == "native":
         return f"{SWITCH}=native"
-    import json  # at hand only where kernels came along: importing vergence takes milliseconds
+    import json  # at hand only where kernels were shipped: importing vergence takes milliseconds
     from importlib.metadata import version
 
     built = json.loads(_DESCRIBED.read_text(encoding="utf-8"))

@@ -134,7 +134,7 @@ def require_known(table: Mapping[str, Any], known: tuple[str, ...], source: str)
 def numbers(
     table: Mapping[str, Any], key: str, shape: tuple[int | None, ...], source: str
 ) -> FloatArray:
-    """Return a value as finite numbers of a shape, where None stands for any length.
+    """Return a value as finite numbers of a shape, where None means any length.
 
     Raises:
         InputError: if it is not that.

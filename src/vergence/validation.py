@@ -48,7 +48,7 @@ def explain(
 
 
 def _kind_at(values: Any, place: list[str]) -> str:
-    """Return the kind of the table at a place, as the file names it; else what stands for one."""
+    """Return the kind of the table at a place, as the file names it; else what represents one."""
     for part in place:
         if isinstance(values, Mapping) and part in values:
             values = values[part]
@@ -57,7 +57,7 @@ def _kind_at(values: Any, place: list[str]) -> str:
 
 
 def _allowed(complaint: ErrorDetails) -> str:
-    """Say what may stand there in the words of the file's format, not of pydantic's types."""
+    """Return what is allowed, in the words of the file's format, not of pydantic's types."""
     match complaint["type"]:
         case "dict_type" | "model_type" | "model_attributes_type" | "union_tag_not_found":
             return "a table"

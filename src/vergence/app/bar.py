@@ -19,7 +19,7 @@ class Bar(Progress):
     have come all at once.
 
     Args:
-        words: what stands beside the bar, as rich's `TextColumn` formats it.
+        words: the text beside the bar, as rich's `TextColumn` formats it.
     """
 
     def __init__(self, words: str) -> None:
@@ -54,7 +54,7 @@ class Bar(Progress):
         self._set_up_s = elapsed - self._compilations.spent_s
 
     def rest(self, task: Any) -> str:
-        """Say what is waited for: kernels, or so many seconds; empty before anything is done."""
+        """Return what is waited for: kernels, or so many seconds; empty before anything is done."""
         if self._compilations.under_way:
             return f"{COMPILING}, {self._compilations.count} so far"
         if not task.completed or not task.total:

@@ -32,12 +32,12 @@ class Running:
 
     @property
     def features(self) -> str:
-        """Say what features were."""
+        """Return what features were."""
         return "tracked in rendered images" if self.images else "exact projections"
 
     @property
     def motion(self) -> str:
-        """Say how arms moved."""
+        """Return how arms moved."""
         if self.options.physics or self.images:
             return "arms moved in simulated physics"
         return (

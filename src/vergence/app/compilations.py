@@ -12,7 +12,7 @@ class Compilations:
     """Tells each time a kernel is compiled how many have been so far.
 
     Args:
-        told: is given the count.
+        told: is called with the count.
     """
 
     def __init__(self, told: Callable[[int], None] | None = None) -> None:

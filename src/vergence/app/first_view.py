@@ -14,7 +14,7 @@ _CLEAR = 0.9  # of the way to the middle that nothing fixed may block
 
 
 def points_in_view(world: CellModel) -> FloatArray:
-    """Return what a view of a cell as it stands should show, (K, 3): from the arm to the target."""
+    """Return what a view of a cell in its present state should show, (K, 3): from the arm to the target."""
     data, cell = world.data, world.cell
     foot = np.array(cell.arms[cell.task.arm].position_m)
     bodies = [data.xpos[body] for arm in cell.arms for body in sorted(world.bodies_of(arm))]
@@ -41,7 +41,7 @@ def first_view(world: CellModel, points: FloatArray) -> Any:
 
 
 def _is_clear(world: CellModel, camera: Any, azimuth_deg: float) -> bool:
-    """Tell whether a free camera sees its middle past all that is fixed in the world."""
+    """Return whether a free camera sees its middle past all that is fixed in the world."""
     azimuth, elevation = np.deg2rad(azimuth_deg), np.deg2rad(camera.elevation)
     level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     forward = np.cos(elevation) * level + np.array([0.0, 0.0, np.sin(elevation)])

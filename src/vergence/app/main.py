@@ -247,7 +247,7 @@ def watch(options: WatchOptions) -> int:
 @takes(CompareOptions)
 def compare(options: CompareOptions) -> int:
     """Run several laws from the same random starts, and show where each of them fails."""
-    find_cell(options.cell)  # a mistake is told before all is loaded
+    find_cell(options.cell)  # report mistakes before loading everything
     from vergence.app.compare import compare as command
 
     return command(options)
@@ -257,7 +257,7 @@ def compare(options: CompareOptions) -> int:
 @takes(MapOptions)
 def map_region(options: MapOptions) -> int:
     """Map where a cell's law works: how far it follows the target, and how it fails."""
-    find_cell(options.cell)  # a mistake is told before all is loaded
+    find_cell(options.cell)  # report mistakes before loading everything
     from vergence.app.map_region import map_region as command
 
     return command(options)

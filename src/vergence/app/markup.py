@@ -78,7 +78,7 @@ def film(frames: Sequence[MarkedImage], name: str, caption: str) -> str:
     Args:
         frames: in order of time.
         name: of what is shown, for who cannot see it.
-        caption: HTML that stands below.
+        caption: HTML below it.
     """
     if len(frames) < 2:
         return ""

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def mounting(options: "CalibrateOptions") -> int:
-    """Say what a driver knows of the mountings of a cell's cameras; return the exit code.
+    """Return what a driver knows of the mountings of a cell's cameras; return the exit code.
 
     Raises:
         InputError: if the driver knows of none, or the cell file cannot be changed.

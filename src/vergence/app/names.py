@@ -59,7 +59,7 @@ def recordings(incomplete: str) -> list[str]:
 
 
 def laws(incomplete: str) -> list[str]:
-    """Return the lists of laws that a list with commas may go on to."""
+    """Return the lists of laws that a list with commas may continue to."""
     done, comma, begun = incomplete.rpartition(",")
     taken = done.split(",")
     return [done + comma + law for law in LAWS if law.startswith(begun) and law not in taken]

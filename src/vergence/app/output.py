@@ -31,7 +31,7 @@ def confirmed(question: str) -> bool:
 
 
 def emit(answer: Mapping[str, Any]) -> None:
-    """Write the one JSON object of a command; null stands for what is not a finite number."""
+    """Write the one JSON object of a command; null means a number that is not finite."""
     print(json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False))
 
 

@@ -1,4 +1,4 @@
-"""Draws what was looked for, tracked, desired and true into a camera's image.
+"""Draws what was searched for, tracked, desired and true into a camera's image.
 
 Pixel centres are at integers, here as everywhere; marks are placed to better than a
 quarter of a pixel, which is what OpenCV's lines allow.
@@ -35,7 +35,7 @@ class Marks:
 
     tracked_px: FloatArray  # (M, 2)
     found: BoolArray  # (M,)
-    asked: BoolArray  # (M,) whether it was looked for
+    asked: BoolArray  # (M,) whether it was searched for
     windows: SearchWindows  # around the predicted places
     desired_px: FloatArray  # (M, 2)
     true_px: FloatArray  # (M, 2)

@@ -26,7 +26,7 @@ def bar(words: str) -> "Bar":
     """Return a progress bar, which costs the import of rich.
 
     Args:
-        words: what stands beside it, as rich's `TextColumn` formats it.
+        words: the text beside it, as rich's `TextColumn` formats it.
     """
     from vergence.app.bar import Bar
 

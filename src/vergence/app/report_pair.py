@@ -13,7 +13,7 @@ from vergence.app.signals_csv import write_signals
 from vergence.app.table import Row, arm_rows, camera_rows, run_rows
 from vergence.runtime.recording import Recording
 
-Runs = Mapping[str, Recording]  # by the name that tells them apart
+Runs = Mapping[str, Recording]  # by the name that distinguishes them
 
 
 def write_pair(first: Path, second: Path, out: Path | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""The numbers of a run that stand at the top of its report."""
+"""The numbers of a run at the top of its report."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

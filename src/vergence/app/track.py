@@ -78,7 +78,7 @@ def _tag(options: "TrackOptions") -> "TagTable | None":
     """Return the tag that is followed, None for an object with a model.
 
     Raises:
-        InputError: if it is none, or stands beside options that have no use for it.
+        InputError: if it is not a tag, or is combined with options that do not apply to tags.
     """
     from vergence.app.tracking.tag_follower import tag_of_option
     from vergence.errors import InputError
@@ -288,7 +288,7 @@ def _summary(
 
 
 def _outcome(steps: "list[Step]") -> Outcome:
-    """Say how it ended: whatever the last image does not show is not held."""
+    """Return how it ended: whatever the last image does not show is not held."""
     from vergence.estimation.object_follower import Sighting
 
     last = steps[-1]

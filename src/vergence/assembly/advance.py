@@ -25,7 +25,7 @@ _SETTLE_S = 1.0  # for the joints to follow to the end
 def advance_parts(
     context: LawContext, task: AdvanceTable, driver: StartedDriver, images: bool
 ) -> Parts | Outcome:
-    """Put together what moves the tip along a line; or what stands in the way.
+    """Put together what moves the tip along a line; or what prevents that.
 
     Raises:
         InputError: if the cell cannot be run as it is written.
@@ -67,12 +67,12 @@ class NotLooking:
     """Perception of a motion that needs no images; that they come is seen to by the loop."""
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return that nothing was looked for."""
+        """Return that nothing was searched for."""
         return Observation(frames[-1].time, (), needs_target=False) if frames else None
 
 
 class LookingOnTheWay:
-    """Perception that looks for a target while the arm moves without it.
+    """Perception that searches for a target while the arm moves without it.
 
     Args:
         perception: of the target.

@@ -123,7 +123,7 @@ def plan_approach(
 
 
 def _can_plan(context: LawContext, task: TrackTable) -> bool:
-    """Tell whether a goal and a scale exist: stated points of known features at rest."""
+    """Return whether a goal and a scale exist: stated points of known features at rest."""
     if isinstance(task.desired, str) or context.known_features(task.camera) is None:
         return False
     return not context.is_fixed and task.tool is None and context.declared_stationary

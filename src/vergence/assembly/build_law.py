@@ -71,7 +71,7 @@ def build_law(context: LawContext) -> Law:
 
 
 def _own_law(context: LawContext) -> Law:
-    """Return the law that a part of one's own makes for the cell."""
+    """Return the law that a part of a user's own makes for the cell."""
     part, source = context.cell.law, str(context.cell.path)
     names = [context.camera_name, *(n for n in context.points_px if n != context.camera_name)]
     setting = LawSetting(

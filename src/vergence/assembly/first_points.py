@@ -63,7 +63,7 @@ def first_points(
 
 
 def _first_curve(context: LawContext, tracker: PointTracker, image: ImageArray) -> FloatArray:
-    """Return the points (M, 2) that stand for a curve where its tracker finds it.
+    """Return the points (M, 2) that represent a curve where its tracker finds it.
 
     Raises:
         InputError: if it does not.
@@ -97,14 +97,14 @@ def _exact_points(
 
 
 def _are_known(context: LawContext, camera: str) -> bool:
-    """Tell whether the file names the features that a camera looks at."""
+    """Return whether the file names the features that a camera looks at."""
     tool = context.cell.tool
     at_tool = tool is not None and tool.camera == camera
     return at_tool or context.cell.target.features is not None
 
 
 def _shows_tag(context: LawContext, camera: str) -> bool:
-    """Tell whether a camera looks at a target with a tag rather than at a tool."""
+    """Return whether a camera looks at a target with a tag rather than at a tool."""
     tool = context.cell.tool
     return context.cell.target.tag is not None and (tool is None or tool.camera != camera)
 
@@ -176,7 +176,7 @@ def _corners_near(image: ImageArray, points_px: FloatArray, radius_px: float) ->
 
 
 def _out_of_sight(context: LawContext, key: str, camera: str, missing: IntArray) -> InputError:
-    """Say which features a camera does not see, and why."""
+    """Return which features a camera does not see, and why."""
     which = "feature " + ", ".join(str(j) for j in missing)
     why = _reason(context, camera, missing)
     given = f"at the start camera {camera} does not see {which}{why}"
@@ -241,7 +241,7 @@ def _middle(width: int, height: int) -> BoolArray:
 
 
 def _whereabouts(context: LawContext, camera: str) -> str:
-    """Say where the target's placement is, as the camera sees it."""
+    """Return where the target's placement is, as the camera sees it."""
     model = context.model
     x, y, z = (se3_inverse(model.camera_pose(camera)) @ model.target_pose())[:3, 3]
     side = "ahead" if z > 0 else "behind"

@@ -158,7 +158,7 @@ class LawContext:
         return depth
 
     def target_corners(self) -> FloatArray:
-        """Return the points that stand for the target in its frame, (K, 3), m."""
+        """Return the points that represent the target in its frame, (K, 3), m."""
         from vergence.assembly.pose import target_shape
 
         return target_shape(self.cell, self.model).corners
@@ -208,7 +208,7 @@ class LawContext:
         return None if known is None else np.array(known)
 
     def _depth_of_curve(self, camera: str) -> FloatArray:
-        """Return the depth of the points that stand for a curve, (M,), m, by the placements.
+        """Return the depth of the points that represent a curve, (M,), m, by the placements.
 
         They lie on the plane of the features, or of the target's surface inside the curve.
         """

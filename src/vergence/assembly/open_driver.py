@@ -23,7 +23,8 @@ def open_driver(cell: Cell, named: str, *, mounted_as_told: bool = True) -> Driv
     Args:
         cell: whose arms and cameras it drives; its table `[driver]` has the settings, if it is of
             the same kind.
-        named: ``NAME``, or ``module:Class`` of one's own in a file beside the cell, in this folder
+        named: ``NAME``, or ``module:Class`` of a user's own in a file beside the cell, in this
+        folder
             or in an installed package; with ``:ADDRESS`` behind it where the driver takes one.
         mounted_as_told: whether cameras have to be mounted as the robot says, if it says.
 
@@ -116,7 +117,7 @@ def equipment(cell: Cell) -> Equipment:
 
 
 def _settings(cell: Cell, kind: str) -> tuple[dict[str, Any], Place]:
-    """Return the fields of the cell's `[driver]`, if that is of this kind, and where they stand."""
+    """Return the fields of the cell's `[driver]`, if that is of this kind, and their place in the file."""
     table = _table(cell, kind)
     if table is None:
         return {}, Place("--driver", "", cell.path.parent)

@@ -45,7 +45,7 @@ _START_VELOCITY = (0.1, 0.3)  # m/s and rad/s, standard deviations about rest
 
 
 def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
-    """Return the target's geometry; its features are the file's, else what stands for it."""
+    """Return the target's geometry; its features are the file's, else what represents it."""
     from vergence.vision.known_object import ObjectModel, as_followed, object_model_of
 
     if cell.target.tag is not None:
@@ -83,7 +83,7 @@ def follow_pose(
         "find": finder.find if finder is not None else None,
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
-    if by_outline(model):  # no image: points inside it, which it does not hide, stand for it
+    if by_outline(model):  # no image: points inside it, which it does not hide, represent it
         shape = TargetShape.from_points(model.corners)
     else:
         shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
@@ -107,7 +107,7 @@ def follow_pose(
 
 
 def by_outline(model: "ObjectModel") -> bool:
-    """Tell whether a target is followed by its outline: it has a mesh, but no corners.
+    """Return whether a target is followed by its outline: it has a mesh, but no corners.
 
     One with corners is followed by them, from any number of cameras, however round the rest of it.
     """

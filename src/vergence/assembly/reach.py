@@ -39,7 +39,7 @@ class TwoImages(NamedTuple):
 
     points_px: FloatArray  # (N, 2) px
     desired_px: FloatArray  # (N, 2)
-    perception: Perception  # goes on from the first
+    perception: Perception  # continues from the first
 
     def only(self, kept: BoolArray) -> "TwoImages":
         """Return the marks that are kept, (N,)."""
@@ -137,7 +137,7 @@ def measure_twice(
         The marks in both images, or which mark is out of sight in one of them.
 
     Raises:
-        InputError: if the arm cannot stand at the goal's joint positions, or there is no image from
+        InputError: if the arm cannot be at the goal's joint positions, or there is no image from
             there.
     """
     arm = context.model.arms[task.arm]

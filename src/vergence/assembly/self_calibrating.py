@@ -28,7 +28,7 @@ class SelfCalibrating:
 
     @staticmethod
     def suits(context: LawContext) -> bool:
-        """Tell whether a run can tell anything: points, a camera on the arm, a target at rest."""
+        """Return whether a run can tell anything: points, a camera on the arm, a target at rest."""
         carried = context.cell.cameras[context.camera_name].arm == context.cell.task.arm
         if not (carried and context.declared_stationary) or context.curve is not None:
             return False

@@ -52,7 +52,7 @@ class TagFinder:
             frame: that does not show it.
             source: the cell file.
             key: in it.
-            where: it was looked for, such as "by camera eye at the start".
+            where: it was searched for, such as "by camera eye at the start".
             shown: where it has to be, such as "in view".
         """
         given = Absent(f"{self.tag(frame)} {where}; {self.seen_instead(frame)}")
@@ -74,7 +74,7 @@ class TagFinder:
     ) -> ImagePoints:
         """Return the corners asked for, see `vergence.estimation.Measure`.
 
-        They are looked for in the whole image: a number tells the tag from all else.
+        They are searched for in the whole image: a number tells the tag from all else.
         """
         found = self.find(frame)
         if found is None:

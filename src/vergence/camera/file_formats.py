@@ -48,7 +48,7 @@ def own_table(table: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _from_matrix(table: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Return a camera of OpenCV or ROS, whose matrix stands in the file."""
+    """Return a camera of OpenCV or ROS, whose matrix is in the file."""
     own: dict[str, Any] = {}
     for ours, names in _SIZES.items():
         for theirs in names:

@@ -24,7 +24,7 @@ def read_camera(path: Path, width: int | None = None, height: int | None = None)
     Our own keys are width, height, fx, fy, cx, cy and distortion (k1, k2, p1, p2, k3). Read are
     also files and messages of ROS's camera_info, whose roi and binning change the matrix, OpenCV's
     matrices, one camera of Kalibr or EuRoC, and ViSP's XML. Further coefficients, as of the
-    rational model, may stand there if they are zero.
+    rational model, may be present if they are zero.
 
     Args:
         path: the file. Of several YAML documents all have to describe the same camera.
@@ -76,7 +76,7 @@ def camera_of(
         table: the values.
         width: of the images, px.
         height: of the images.
-        source: where it stands, for messages.
+        source: the file, for messages.
         prefix: of the keys in messages.
 
     Raises:

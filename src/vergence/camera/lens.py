@@ -24,7 +24,7 @@ def pixel_of(lens: FloatArray, x: float, y: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def is_one_to_one(lens: FloatArray, x: float, y: float) -> bool:
-    """Tell whether the distortion is one-to-one at normalized (x, y).
+    """Return whether the distortion is one-to-one at normalized (x, y).
 
     Beyond the radius where the distorted radius stops growing a point far outside the field of view
     would seem to lie in the image.
@@ -36,7 +36,7 @@ def is_one_to_one(lens: FloatArray, x: float, y: float) -> bool:
 
 @njit(cache=True)
 def in_image(lens: FloatArray, u: float, v: float, margin: float) -> bool:
-    """Tell whether a pixel lies in the image, at least a margin from its border, px."""
+    """Return whether a pixel lies in the image, at least a margin from its border, px."""
     inside: bool = (
         margin - 0.5 <= u < lens[WIDTH] - 0.5 - margin
         and margin - 0.5 <= v < lens[HEIGHT] - 0.5 - margin

@@ -104,7 +104,7 @@ def _lens(path: Path, image: ImageArray, camera: Camera) -> Camera:
 
 
 def _same(lens: Camera, camera: Camera) -> bool:
-    """Tell whether two cameras see alike, to a thousandth of a pixel; files are rounded."""
+    """Return whether two cameras see alike, to a thousandth of a pixel; files are rounded."""
     size = (lens.width, lens.height) == (camera.width, camera.height)
     matrix = np.allclose(lens.matrix, camera.matrix, rtol=0.0, atol=1e-3)
     return size and matrix and np.allclose(lens.distortion, camera.distortion, rtol=0.0, atol=1e-6)

@@ -60,7 +60,7 @@ class Camera:
             cx: principal point, px; the middle column, (width - 1) / 2, if None.
             cy: principal point, px; the middle row if None.
             distortion: k1, k2, p1, p2, k3.
-            focal_px: stands for both fx and fy.
+            focal_px: sets both fx and fy.
 
         Raises:
             InputError: if a size or a focal length is not above zero, or there is no focal length.
@@ -185,7 +185,7 @@ class Camera:
         return Camera(int(width), int(height), self.fx, self.fy, center[0], center[1])
 
     def in_view(self, points_camera: ArrayLike) -> BoolArray:
-        """Tell which points (N, 3) of the camera's frame project into the image."""
+        """Return which points (N, 3) of the camera's frame project into the image."""
         points = as_floats(points_camera, (None, 3), "points_camera")
         seen: BoolArray = points[:, 2] > 0.0
         normalized = points[seen, :2] / points[seen, 2:]
@@ -194,7 +194,7 @@ class Camera:
         return seen
 
     def contains(self, points_px: ArrayLike, margin_px: float = 0.0) -> BoolArray:
-        """Tell which pixels (N, 2) lie in the image, at least the margin from its border."""
+        """Return which pixels (N, 2) lie in the image, at least the margin from its border."""
         points_px = as_floats(points_px, (None, 2), "points_px")
         low = -0.5 + margin_px
         high = np.array([self.width - 0.5, self.height - 0.5]) - margin_px

@@ -64,7 +64,7 @@ class Cell(Table):
 
     @property
     def path(self) -> Path:
-        """The file it was read from; models are looked for beside it."""
+        """The file it was read from; models are searched for beside it."""
         return self._path
 
     @property
@@ -164,7 +164,7 @@ def load_cell(
 def _with(values: Any, keys: list[str], value: Any, place: str) -> Any:
     """Return tables with the value at a place replaced, or removed where it is None.
 
-    What stands beside it stays, so a table that becomes one of another kind keeps its keys.
+    Its neighbours are kept, so a table that becomes one of another kind keeps its keys.
     """
     key, *deeper = keys
     if isinstance(values, list) and key.isdigit():
@@ -175,7 +175,7 @@ def _with(values: Any, keys: list[str], value: Any, place: str) -> Any:
         changed[int(key)] = _with(values[int(key)], deeper, value, place) if deeper else value
         return changed
     table = dict(values) if isinstance(values, Mapping) else {}
-    if isinstance(values, str):  # the name of a part stands for its table
+    if isinstance(values, str):  # the name of a part means its table
         table = {"kind": values}
     if deeper:
         table[key] = _with(table.get(key), deeper, value, place)
@@ -219,7 +219,7 @@ def _with_parts(cell: Cell) -> Cell:
     servo = find("servo", "servo")
 
     def law(key: str, table: Any) -> Any:
-        if isinstance(table, str):  # a name stands for a table of that kind
+        if isinstance(table, str):  # a name means a table of that kind
             table = {"kind": table}
         if not isinstance(table, Mapping):
             raise InputError(str(cell.path), key, table, "a table")
@@ -228,7 +228,7 @@ def _with_parts(cell: Cell) -> Cell:
         return servo.from_table(table, place.at(key))
 
     def filled(table: Table, at: str, **roles: str) -> Table:
-        """Return a table with the parts that stand at some of its keys, each of its role."""
+        """Return a table with the parts at some of its keys, each of its role."""
         update = {}
         for key, role in roles.items():
             given, usual = getattr(table, key), type(table).model_fields[key].default

@@ -22,7 +22,7 @@ def joint_positions(cell: Cell, key: str, given: Sequence[float], arm: Arm) -> F
 
     Args:
         cell: the cell.
-        key: where in its file they stand.
+        key: where they are in its file.
         given: degrees, metres for sliding joints.
         arm: whose joints they are.
 

@@ -19,7 +19,7 @@ def locate_model(model: Path, folder: Path, source: str, key: str) -> Path:
     Args:
         model: as the cell's file has it.
         folder: of the cell's file.
-        source: the cell's file, for what is said of a mistake.
+        source: the cell's file, for error messages.
         key: where in it the model is named.
 
     Raises:

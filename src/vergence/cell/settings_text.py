@@ -8,7 +8,7 @@ import numpy as np
 
 
 def is_whole(table: Mapping[str, Any]) -> bool:
-    """Tell whether a table replaces another whole: it names its kind, or a law's objectives."""
+    """Return whether a table replaces another whole: it names its kind, or a law's objectives."""
     return "kind" in table or "objectives" in table
 
 
@@ -20,7 +20,7 @@ def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> s
     Args:
         changes: the nested values that were replaced.
         values: what the cell says now, at the same place.
-        above: the keys they stand under, with a dot behind each.
+        above: the keys above them, with a dot behind each.
     """
     text = ""
     for key, change in changes.items():

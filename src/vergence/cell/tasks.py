@@ -10,7 +10,7 @@ from vergence.errors import InputError, KeyConflict, nearest
 if TYPE_CHECKING:
     from vergence.cell.cell import Cell
 
-_ENDLESS = ("track", "follow")  # kinds of task that go on until something ends them
+_ENDLESS = ("track", "follow")  # kinds of task that continue until something ends them
 
 
 def with_first_task(values: Mapping[str, Any], source: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ _GAIN = 5.0  # 1/s, at which set-points come back to the motion
 
 
 class AlongLine:
-    """Follows a motion in time, which stands still while the arm is held.
+    """Follows a motion in time, which pauses while the arm is held.
 
     q̇ = Δq_line/Δt + k (q_line - q), with q the last set-point: a start beside the line, by as much
     as a servo lags, is gently made up for.

@@ -59,7 +59,7 @@ class ClearBraking:
         return self._known_clear(q, most)
 
     def _known_clear(self, q: FloatArray, most: FloatArray) -> bool:
-        """Tell whether the distances known are large enough for all that the joints may move."""
+        """Return whether the distances known are large enough for all that the joints may move."""
         if self._q is None or (self._clearance.others() != self._others).any():
             return False
         changed = self._clearance.reach @ (np.abs(q - self._q) + most)

@@ -1,4 +1,4 @@
-"""A whole law of one's own, as a cell file declares it."""
+"""A whole law of a user's own, as a cell file declares it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

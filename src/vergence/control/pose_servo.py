@@ -28,7 +28,7 @@ class PoseServo:
     """Serves one position-based objective: a goal an image, joint rates at the inner rate.
 
     Between images a trajectory leads the arm's tip to the goal, see `PoseTrajectory`; where limits
-    hold the tip back, the trajectory goes on from where the tip is.
+    hold the tip back, the trajectory continues from where the tip is.
 
     Args:
         arm: up to its tip: the camera, the link that carries it, or the link that holds the target.

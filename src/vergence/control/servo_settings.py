@@ -29,8 +29,8 @@ class WeightedObjective:
 class ServoSettings:
     """Objectives, limits and solver, and assumptions about the features between images.
 
-    In a cell file, a table with a `kind` is a servo with that one objective, whose keys stand in
-    the same table; several stand in `objectives`.
+    In a cell file, a table with a `kind` is a servo with that one objective, whose keys are in
+    the same table; several are listed in `objectives`.
     """
 
     # Objectives, each with its weight.

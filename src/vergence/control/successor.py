@@ -1,4 +1,4 @@
-"""A law that goes on with what another has found out."""
+"""A law that continues with what another has found out."""
 
 from typing import Protocol, runtime_checkable
 

@@ -25,7 +25,7 @@ class ArmDriver:
         equipment: of the cell.
         arm: name of the arm that the link moves.
         link: to its controller.
-        timeout_s: how long the controller's clock may stand.
+        timeout_s: how long the controller's clock may not advance.
 
     Raises:
         DriverSilent: from `read` and `step`, if the controller does not answer.

@@ -32,7 +32,7 @@ class HeldTarget:
     """Follows a target that an arm holds, with cameras that do not move with it.
 
     The filter works in the frame of the tip, in which the target hardly moves and the cameras do,
-    as the joints tell: what the arm does is known and need not be estimated. What is handed on is
+    as the joints tell: what the arm does is known and need not be estimated. What is passed on is
     the target in the world again, with the pose of the tip.
 
     Args:

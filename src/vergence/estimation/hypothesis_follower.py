@@ -1,4 +1,4 @@
-"""Follows a known object, compares it with turned poses of itself, and looks for it when lost."""
+"""Follows a known object, compares it with turned poses of itself, and searches for it when lost."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.look_alikes import Turn, between, symmetries
 
 _LEAST_FOUND = 0.75  # share of a lost object, for it to be found again
-_MISSED = 2  # images in a row without the object, from which on it is looked for elsewhere
+_MISSED = 2  # images in a row without the object, from which on it is searched for elsewhere
 
 
 class HypothesisFollower:
@@ -28,7 +28,7 @@ class HypothesisFollower:
     Where nothing is remembered of an object with edges, which is at the start and after a loss,
     it is tried at turned poses, too. A pose that fits clearly better is taken instead; one that
     fits as well is followed beside it until the images decide, and until then the object is
-    ambiguous. A lost object is looked for around where it was seen last, in every image.
+    ambiguous. A lost object is searched for around where it was seen last, in every image.
 
     Args:
         tracker: finds the object's edges, or its outline.
@@ -73,12 +73,12 @@ class HypothesisFollower:
 
     @property
     def symmetries(self) -> list[Turn]:
-        """Turns after which the edges of the object are the same: no image tells them apart."""
+        """Turns after which the edges of the object are the same: no image distinguishes them."""
         return self._turns
 
     @property
     def was_seen(self) -> bool:
-        """Whether it was seen at all; else it is not looked for."""
+        """Whether it was seen at all; else it is not searched for."""
         return self._last is not None
 
     def follow(self, image: ImageArray, time: float) -> Step:
@@ -105,7 +105,7 @@ class HypothesisFollower:
         )
 
     def _compare(self, image: ImageArray, time: float) -> None:
-        """Choose among turned poses, and keep those that cannot be told apart."""
+        """Choose among turned poses, and keep those that cannot be distinguished."""
         chosen, rivals, note = compare_poses(
             self._tracker, image, self._camera, self._main.T_camera_target,
             self._main.start_covariance, self._turns, self._others, self._rule.least_of_all,

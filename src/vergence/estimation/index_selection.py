@@ -36,7 +36,7 @@ def spatial_index(places: FloatArray) -> float:
 def angular_index(places: FloatArray) -> float:
     """Return Q_a = 1 - Σ |α_k/2π - 1/q| over the q gaps α_k around the centroid.
 
-    1 if the features stand at equal angles; may be negative.
+    1 if the features are at equal angles; may be negative.
 
     Args:
         places: of the chosen features of one image, (q, 2); 1 for one alone.

@@ -80,7 +80,7 @@ def spread_out(
 ) -> ImagePoints:
     """Return image points of all M features from those K that were measured.
 
-    A feature that was not found stands at its expected place, with a covariance as wide as the
+    A feature that was not found gets its expected place, with a covariance as wide as the
     widest window and the reason.
 
     Args:

@@ -28,7 +28,7 @@ class MirrorWatch:
 
     The second pose is the first mirrored in depth. Once images have excluded it, it stays excluded
     for as long as the two poses are apart: nothing turns from one into the other. Where they meet,
-    the target seen straight on, the target may leave on either side. The filter goes on with one
+    the target seen straight on, the target may leave on either side. The filter continues with one
     of them, and this class adds up what each image says for it: the difference in χ² of the two.
     Until that is odds of a thousand to one, the stated covariance reaches from one pose to the
     other; if it is odds against, the filter begins again at the other.

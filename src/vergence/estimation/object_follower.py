@@ -37,7 +37,7 @@ class Measurement(Protocol):
     covariance_px: FloatArray  # (M, 2, 2) px²
     T_camera_target: FloatArray  # (4, 4) the pose that fits this image
     expected: int  # places that should be seen
-    usual: float  # share found, each place weighing as often as it was found of late
+    usual: float  # share found, each place weighing as often as it was found recently
     samples_px: FloatArray  # (N, 2) the places looked at
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
 
@@ -81,7 +81,7 @@ class ObjectTracker(Protocol):
 
     @property
     def sought(self) -> str:
-        """What it looks for, for messages."""
+        """What it searches for, for messages."""
         ...
 
     def blank(self) -> Any:
@@ -100,7 +100,7 @@ class ObjectTracker(Protocol):
         ...
 
     def remember(self, memory: Any, seen: Any) -> Any:
-        """Return the memory after an image that was believed."""
+        """Return the memory after an image that was accepted."""
         ...
 
 
@@ -137,10 +137,10 @@ class FollowRule:
     """When an image counts, and when the object is lost."""
 
     jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the image, per frame
-    least_share: float = 0.57  # of what is usually found, to believe an image
+    least_share: float = 0.57  # of what is usually found, to accept an image
     least_of_all: float = 0.5  # of all that should be seen
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
-    least_points: int = 6  # measured, to believe an image; an edge has two
+    least_points: int = 6  # measured, to accept an image; an edge has two
     patience: int = 12  # images in a row without the object, after which it is lost
     # Standard deviation of the rotation beyond which the pose is unknown.
     turn_max_rad: float = 0.25
@@ -346,7 +346,7 @@ class ObjectFollower:
         return float(deviation[:3].max()), float(deviation[3:].max())
 
     def _vague(self) -> str:
-        """Say why the pose is too uncertain to be told; empty if it is not."""
+        """Return why the pose is too uncertain to be told; empty if it is not."""
         place, turn = self._deviation()
         distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
         if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:

@@ -1,6 +1,6 @@
 """Turned poses of an object that an image supports as well as the one believed.
 
-They are looked for where nothing is remembered yet: at the start, and after a loss. Places along
+They are searched for where nothing is remembered yet: at the start, and after a loss. Places along
 the edges are found or not for each pose, and places beside each other mostly agree, so the shares
 found are compared with the number of those that are independent.
 """

@@ -24,7 +24,7 @@ class OutlinePerception:
     """Follows one target with one camera by its outline; a stage of the loop.
 
     The filter works in the camera's frame, into which the camera's own motion carries what is
-    believed, as the joints tell it. A target that is lost is looked for where it was seen last.
+    believed, as the joints tell it. A target that is lost is searched for where it was seen last.
 
     Args:
         name: of the camera; images of others do not concern it.
@@ -35,7 +35,7 @@ class OutlinePerception:
         known: standard deviation of that, m and rad.
         begin: time of the first image, s.
         period: between images, s.
-        points: that stand for the target, in its frame, (M, 3), m.
+        points: that represent the target, in its frame, (M, 3), m.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class OutlinePerception:
         )
 
     def _view(self, frame: Frame, step: Step) -> ImagePoints:
-        """Return the points that stand for the target, with the covariance that its pose has."""
+        """Return the points that represent the target, with the covariance that its pose has."""
         seen = step.sighting is Sighting.SEEN
         place = transform_points(step.T_camera_target, self._points.copy())
         front = place[:, 2] > 0.0

@@ -50,7 +50,7 @@ class PosePerception(Generic[B]):
     one exposure together.
     [Lippiello2005] section IV, Fig. 3.
 
-    A target that is lost is looked for around the place where it was seen last, with the widest
+    A target that is lost is searched for around the place where it was seen last, with the widest
     windows, and over whole images if `find` is given; while it is lost no pose is reported, and
     no point counts as found.
     """
@@ -82,7 +82,7 @@ class PosePerception(Generic[B]):
             selection: how features are chosen; by information unless told.
             windows: how large windows are.
             settings: budget and patience.
-            blocked_at: gives, for the joints at an exposure, the function that tells what stands
+            blocked_at: gives, for the joints at an exposure, the function that returns what is
                 between a camera and points of the target; the target itself must not count.
             find: finds the target in a whole image, when it is lost.
         """
@@ -112,7 +112,7 @@ class PosePerception(Generic[B]):
 
     @property
     def state(self) -> TargetState:
-        """What is believed after the newest image, as it is handed on."""
+        """What is believed after the newest image, as it is passed on."""
         return state_of(self.belief)
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
@@ -233,7 +233,7 @@ class PosePerception(Generic[B]):
         looks: list[Look],
         agreeing: list[IntArray],
     ) -> tuple[ImagePoints, ...]:
-        """Say what became of every feature; of a target that is lost, none is found."""
+        """Return what became of every feature; of a target that is lost, none is found."""
         expected, status, widest = visibility.points_px, visibility.status, self._windows.most_px
         points = {
             look.number: spread_out(look, kept, expected[look.number], status[look.number], widest)

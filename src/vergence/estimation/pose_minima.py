@@ -59,7 +59,7 @@ def pose_minima(seen: Seen, known: FloatArray) -> list[PoseMinimum]:
 
 
 def is_apart(T_a: FloatArray, T_b: FloatArray, T_camera_world: FloatArray) -> bool:
-    """Tell whether two poses T_world_target are more than rounding and step size apart."""
+    """Return whether two poses T_world_target are more than rounding and step size apart."""
     between = se3_compose(se3_inverse(T_a), T_b)
     depth = abs(float(T_camera_world[2, :3] @ T_a[:3, 3] + T_camera_world[2, 3]))
     turned = float(np.linalg.norm(so3_log(np.ascontiguousarray(between[:3, :3]))))

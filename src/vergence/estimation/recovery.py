@@ -164,7 +164,7 @@ class _Fit:
 
 
 def _rivals(best: _Fit, other: _Fit, seen: Seen) -> bool:
-    """Tell whether a fit to other points is as good as the best and yet a different pose."""
+    """Return whether a fit to other points is as good as the best and yet a different pose."""
     if other.inliers < best.inliers or other.square > best.square + RIVAL:
         return False
     return not np.array_equal(best.kept, other.kept) and is_apart(

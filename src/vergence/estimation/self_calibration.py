@@ -28,7 +28,7 @@ class SelfCalibration(NamedTuple):
     """What the data tell; each value with its standard deviation."""
 
     latency_s: float  # by which stamps are later than the exposure
-    T_believed_camera: FloatArray  # (4, 4) of the true camera in the one that was believed
+    T_believed_camera: FloatArray  # (4, 4) of the true camera in the assumed one
     focal: float  # true focal length over the believed one
     deviations: FloatArray  # (8,) of `NAMES`: s, rad, m, a share
     told: BoolArray  # (8,) whether the motion was enough to tell it

@@ -81,7 +81,7 @@ class Update(NamedTuple):
 
 
 class TargetFilter(Protocol[B]):
-    """A filter: a value whose methods take what is believed and return what is to be believed."""
+    """A filter: a value whose methods take a prior belief and return the posterior one."""
 
     def start(
         self,

@@ -93,7 +93,7 @@ def _normals_at(point: FloatArray, triangles: FloatArray, tolerance: float) -> l
 
 
 def _touches(point: FloatArray, triangle: FloatArray, normal: FloatArray, tolerance: float) -> bool:
-    """Tell whether a point lies on a triangle, or no farther than the tolerance beside it."""
+    """Return whether a point lies on a triangle, or no farther than the tolerance beside it."""
     if abs(normal @ (point - triangle[0])) > tolerance:
         return False
     for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):

@@ -155,7 +155,7 @@ def pinhole_coordinates(
 
 @njit(cache=True)
 def usable_points(points_px: FloatArray, covariance_px: FloatArray, found: BoolArray) -> BoolArray:
-    """Tell which points (M,) were found, are finite, and have a positive definite covariance."""
+    """Return which points (M,) were found, are finite, and have a positive definite covariance."""
     usable = np.empty(len(points_px), dtype=np.bool_)
     for n in range(len(points_px)):
         C = covariance_px[n]

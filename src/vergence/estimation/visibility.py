@@ -19,7 +19,7 @@ from vergence.estimation.target_shape import TargetShape
 from vergence.geometry import se3_inverse, transform_points
 
 StatusArray: TypeAlias = NDArray[np.uint8]  # a `ViewStatus` each
-# blocked(origin (3,), points (N, 3)) -> (N,): whether something stands between, world frame, m.
+# blocked(origin (3,), points (N, 3)) -> (N,): whether something is between them, world frame, m.
 Blocked: TypeAlias = Callable[[FloatArray, FloatArray], BoolArray]
 
 
@@ -55,7 +55,7 @@ class Visibility(NamedTuple):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_of: float) -> bool:
-    """Tell whether a triangle (3, 3) cuts the segment from origin to point before its end.
+    """Return whether a triangle (3, 3) cuts the segment from origin to point before its end.
 
     Solves origin + t (point - origin) = a + β (b - a) + γ (c - a) for t < 1 - short_of
     (Möller and Trumbore).
@@ -86,7 +86,7 @@ def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_
 def faces_camera(
     origin: FloatArray, point: FloatArray, normals: FloatArray, count: int, least_cosine: float
 ) -> bool:
-    """Tell whether one of the faces around a feature faces the camera, or it has none."""
+    """Return whether one of the faces around a feature faces the camera, or it has none."""
     if count == 0:
         return True
     x, y, z = origin[0] - point[0], origin[1] - point[1], origin[2] - point[2]
@@ -176,7 +176,7 @@ def _hidden(
     heights: FloatArray,
     touching: float,
 ) -> bool:
-    """Tell whether a triangle stands between; most have both ends on one side of their plane."""
+    """Return whether a triangle is between; most have both ends on one side of their plane."""
     x, y, z = eye[0] - point[0], eye[1] - point[1], eye[2] - point[2]
     short_of = touching / np.sqrt(x * x + y * y + z * z)
     for n in range(len(triangles)):
@@ -227,7 +227,7 @@ def add_obstacles(
 
     Args:
         status: of that camera, (M,); changed.
-        blocked: tells what stands between the eye and points.
+        blocked: returns what is between the eye and points.
         eye: position of the camera, (3,), m.
         points_world: the features, (M, 3), m.
     """

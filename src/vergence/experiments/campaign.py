@@ -27,10 +27,10 @@ def run_campaign(
     Args:
         source: of the cell.
         trials: what to run.
-        folder: where results are written down as they come; a rerun goes on from there.
+        folder: where results are written down as they come; a rerun continues from there.
         executor: runs them; every core of this machine if None.
         tolerance_px: up to which error of the farthest feature a run has converged.
-        physics: whether to simulate physics also where the arm can move exactly as it is told.
+        physics: whether to simulate physics also where the arm can follow commands exactly.
         progress: told how many of how many trials are done.
 
     Raises:

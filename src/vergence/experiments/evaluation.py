@@ -59,7 +59,7 @@ class TrueTracks(NamedTuple):
         return middles
 
     def outside(self, camera: Camera) -> BoolArray:
-        """Tell which features lie outside of the image, or behind the camera, (F, M)."""
+        """Return which features lie outside of the image, or behind the camera, (F, M)."""
         inside = camera.contains(self.points_px.reshape(-1, 2))
         outside: BoolArray = ~inside.reshape(self.visible.shape)
         return outside

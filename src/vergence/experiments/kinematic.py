@@ -23,7 +23,7 @@ from vergence.vision import CurveTracking
 
 
 def is_ideal(cell: Cell) -> bool:
-    """Tell whether a cell is one arm that tracks known features with the one camera it carries.
+    """Return whether a cell is one arm that tracks known features with the one camera it carries.
 
     A planned way to them is not ideal: its runs are made in physics, where they may plan again.
     """
@@ -44,12 +44,12 @@ def is_ideal(cell: Cell) -> bool:
 
 
 def renders(cell: Cell) -> bool:
-    """Tell whether a cell's runs look through rendered images: a camera says how bad they are."""
+    """Return whether a cell's runs look through rendered images: a camera says how bad they are."""
     return any(cell.cameras[name].imaging is not None for name in cell.watched)
 
 
 def is_quick(cell: Cell) -> bool:
-    """Tell whether the batch kernel is likely to know its law."""
+    """Return whether the batch kernel is likely to know its law."""
     law = cell.law
     if not isinstance(law, ServoSettings):
         return False

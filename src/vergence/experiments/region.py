@@ -18,7 +18,7 @@ def place_trials(
 ) -> list[Trial]:
     """Return trials in which the target goes from its place to each point of a level square.
 
-    Where the task is to reach, the target stands at each point instead, from the start on.
+    Where the task is to reach, the target is at each point instead, from the start on.
 
     Args:
         cell: the cell.
@@ -58,7 +58,7 @@ def heading_trials(
         law: see `law_table`.
 
     Raises:
-        InputError: if the task is to reach a target that stands.
+        InputError: if the task is to reach a stationary target.
     """
     if cell.task.kind == "reach":
         raise InputError("over", "", "headings, but the task is to reach", "places")

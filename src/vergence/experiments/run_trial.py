@@ -32,7 +32,7 @@ def run_trials(
     Features are exact projections, unless a camera's `imaging` says how bad its images are: then
     these are rendered, and the features are tracked in them.
 
-    Where the cell is one arm with one camera it moves exactly as it is told: in the batch kernel
+    Where the cell is one arm with one camera it follows commands exactly: in the batch kernel
     if that knows the law, else in the loop. The kernel knows neither bodies nor surfaces: a run on
     which the arm may touch something, or a feature is hidden, is made in the loop as well. Any
     other cell runs in simulated physics.
@@ -111,7 +111,7 @@ def _of_batch(
 
 
 def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
-    """Tell whether on the way something hid a feature for as long as the loop is patient.
+    """Return whether on the way something hid a feature for as long as the loop is patient.
 
     The kernel knows of no surfaces; such a run is made again, in the loop.
     """
@@ -126,7 +126,7 @@ def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
 
 
 def _touches(run: KinematicRun, trace: BatchTrace) -> bool:
-    """Tell whether the guard may have stopped the arm before it touched something."""
+    """Return whether the guard may have stopped the arm before it touched something."""
     cell = run.cell
     assert run.clearance is not None
     return not stays_clear(run.clearance, cell.arm, trace.position, 1.0 / cell.rate_hz)

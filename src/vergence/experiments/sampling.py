@@ -130,7 +130,7 @@ def _moved(T: FloatArray, spread: float, away: float, rng: np.random.Generator) 
 
 
 def _in_image(truth: FrameTruth, camera: Camera, cell: Cell) -> bool:
-    """Tell whether all features are in the image; of an object some may be on its far side."""
+    """Return whether all features are in the image; of an object some may be on its far side."""
     if cell.task.kind != "follow":
         return bool(truth.visible.all())
     inside = np.isfinite(truth.points_px).all() and camera.contains(truth.points_px).all()

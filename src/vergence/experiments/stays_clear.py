@@ -8,7 +8,7 @@ from vergence.robot import Arm, Clearance
 
 
 def stays_clear(clearance: Clearance, arm: Arm, position: FloatArray, period_s: float) -> bool:
-    """Tell whether the guard would have let every set-point pass, for sure.
+    """Return whether the guard would have let every set-point pass, for sure.
 
     Between two images a joint that moved by Δq has no rate above |Δq|/T + q̈_max T. By what it may
     move at that, and then on braking, no distance changes by more than `Clearance.reach` says.

@@ -1,4 +1,4 @@
-"""Rotations and rigid motions for people: lists are taken, and a wrong shape is named.
+"""Rotations and rigid motions for users: they accept lists and name a wrong shape.
 
 Each function is the kernel of that name in `vergence.geometry`, which validates nothing, behind a
 check.

@@ -7,7 +7,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 
 class Obstacle(StrEnum):
-    """The constraints that can stand in the way."""
+    """The constraints that can prevent a path."""
 
     START = "start"
     REACH = "reach"

@@ -326,7 +326,7 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
 
 
 def _unreachable(problem: PlanningProblem) -> PlanFailure:
-    """Say whether collisions, limits or the arm's reach keep it from the goal."""
+    """Return whether collisions, limits or the arm's reach keep it from the goal."""
     if problem.bodies is not None:
         touching = goal_configurations(problem.arm, problem.T_world_goal, problem.q_start, 1)
         if len(touching):

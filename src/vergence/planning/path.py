@@ -55,13 +55,13 @@ class Path:
         )
 
     def in_view(self, margin_px: float = 0.0) -> BoolArray:
-        """Tell at which waypoints every point is in the image, (K,)."""
+        """Return at which waypoints every point is in the image, (K,)."""
         camera, count = self.problem.camera, self.points_px.shape[1]
         inside = camera.contains(self.points_px.reshape(-1, 2), margin_px).reshape(-1, count)
         return np.asarray((inside & (self.depth_m > 0)).all(axis=1))
 
     def in_front(self) -> BoolArray:
-        """Tell at which waypoints the camera is in front of every face of the object, (K,)."""
+        """Return at which waypoints the camera is in front of every face of the object, (K,)."""
         faces, eyes = self.problem.faces, self.T_world_camera[:, :3, 3]
         outward = [(eyes - face[:3]) @ face[3:6] > 0.0 for face in faces]
         return np.asarray(np.all([np.ones(len(eyes), dtype=np.bool_), *outward], axis=0))

@@ -1,4 +1,4 @@
-"""What a planner of one's own must offer."""
+"""What a planner of a user's own must offer."""
 
 from typing import Protocol, runtime_checkable
 

@@ -95,7 +95,7 @@ def proves_no_path(problem: PlanningProblem, cells_max: int = 128, margin_px: fl
 
 
 def slides_then_turns(arm: Arm) -> bool:
-    """Tell whether three sliding joints at right angles come first, then one to three turning."""
+    """Return whether three sliding joints at right angles come first, then one to three turning."""
     sliding = arm.sliding
     limited = np.isfinite(arm.q_max - arm.q_min).all()
     if len(sliding) < len(arm.chain.sliding):

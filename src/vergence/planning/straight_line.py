@@ -55,7 +55,7 @@ def straight_line(
         speed_m_s: at most.
 
     Returns:
-        The motion, or where on the line what stands in the way; obstacles are not looked for.
+        The motion, or what prevents it and where on the line; obstacles are not considered.
     """
     from scipy.interpolate import CubicSpline
 

@@ -158,7 +158,7 @@ class Arm:
         return moved
 
     def outside(self, q: ArrayLike) -> BoolArray:
-        """Tell which joints of q (n,) are at or beyond a limit, (n,)."""
+        """Return which joints of q (n,) are at or beyond a limit, (n,)."""
         q = as_floats(q, (self.joint_count,), "q")
         result: BoolArray = (q <= self.q_min) | (q >= self.q_max)
         return result

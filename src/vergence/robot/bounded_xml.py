@@ -1,4 +1,4 @@
-"""XML that somebody else wrote, read within bounds."""
+"""XML files from untrusted sources, read within bounds."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ def read_xml(path: Path) -> Element:
     """Return the root of an XML file.
 
     Raises:
-        InputError: if it cannot be read, is no XML, declares entities, or is beyond all measure.
+        InputError: if it cannot be read, is no XML, declares entities, or exceeds the bounds.
     """
     source = str(path)
     try:
@@ -69,10 +69,10 @@ def numbers(
     """Return the numbers of an attribute, as many as the default has.
 
     Args:
-        element: that may have the attribute; the default stands for an absent one.
+        element: that may have the attribute; the default replaces an absent one.
         key: the attribute.
         default: what holds without it.
-        source: the file, for what is said of a mistake.
+        source: the file, for error messages.
         where: the element, likewise.
 
     Raises:

@@ -23,7 +23,7 @@ class Triangles(NamedTuple):
 
 
 class MeshFile(NamedTuple):
-    """What a mesh file came to."""
+    """The result of reading a mesh file."""
 
     fault: str | None = None  # why it cannot be drawn, as the end of a sentence
     size_m: float = 0.0  # diameter of a ball around it

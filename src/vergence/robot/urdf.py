@@ -29,7 +29,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     - links that no joint moves stay bodies, so that cameras can be mounted on them;
     - joints are locked where they cannot move, see `settle_joints`;
     - velocity limits are kept, as custom numbers that `Arm.from_mujoco` reads;
-    - `package://NAME/…` is looked for in the folders above the file, as a ROS workspace lays them
+    - `package://NAME/…` is searched for in the folders above the file, as a ROS workspace lays them
       out, and a link whose visual meshes cannot be drawn is drawn by its collision shapes, or by
       rods from joint to joint, if it is a link of an arm;
     - an inertia that no body can have loses its products of inertia;

@@ -14,7 +14,7 @@ from vergence.robot.urdf_tree import MOVING, Tree
 _LOG = logging.getLogger(__name__)
 _RADIANS_MAX = 20.0  # limits beyond are degrees, not turns
 _METRES_MAX = 20.0  # no arm is longer
-_NO_LIMIT = 1e6  # rad or m: what stands there for a joint without limits
+_NO_LIMIT = 1e6  # rad or m: the limit of a joint without limits
 
 
 def settle_joints(tree: Tree, last_body: str) -> dict[str, float]:

@@ -26,7 +26,7 @@ _SIZES: dict[str, dict[str, int]] = {  # how many numbers the keys of a shape ha
 
 
 class Shapes(NamedTuple):
-    """A URDF's file, and what its shapes came to."""
+    """A URDF's file, and the result of reading its shapes."""
 
     path: Path
     mesh_folder: Path  # as the file's extension for MuJoCo names it, else the file's own
@@ -124,7 +124,7 @@ def _fault(shape: Element, shapes: Shapes) -> str | None:
 def find_mesh(name: str, urdf: Path, mesh_folder: Path) -> Path:
     """Return the file that a mesh's name means, the likeliest place if there is none.
 
-    `package://NAME/…` is looked for in the folders above the URDF, as a ROS workspace lays them
+    `package://NAME/…` is searched for in the folders above the URDF, as a ROS workspace lays them
     out; other names beside the URDF.
     """
     scheme, _, rest = name.rpartition("://")

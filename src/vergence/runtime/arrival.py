@@ -25,7 +25,7 @@ class Goal(NamedTuple):
 
     Attributes:
         tolerance_px: distance of the farthest feature from its goal, averaged over a second.
-        ends: whether the task ends at its goal; else it goes on until its time is over.
+        ends: whether the task ends at its goal; else it continues until its time is over.
     """
 
     tolerance_px: float = 1.0
@@ -115,7 +115,7 @@ class Arrival:
         return tuple(name for name, count in counts.items() if 2 * count > len(self._rows))
 
     def holder(self) -> str:
-        """Say what holds a run that is stalled."""
+        """Return what holds a run that is stalled."""
         held = list(self.active)
         if _mirrored(self._rows[-1]):
             held.append("a goal that shows the mirror image of the features seen")
@@ -155,7 +155,7 @@ def _mean_error(rows: list[_Row]) -> float:
 
 
 def _mirrored(row: _Row) -> bool:
-    """Tell whether the best affine map from the features seen to those desired mirrors them."""
+    """Return whether the best affine map from the features seen to those desired mirrors them."""
     seen = np.isfinite(row.error_px).all(axis=1)
     if seen.sum() < 3:
         return False

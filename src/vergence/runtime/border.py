@@ -80,13 +80,13 @@ class Border:
         return replace(sample, time=sample.time - start, joints=joints, frames=frames)
 
     def check_command(self, arm: str, command: JointCommand) -> Fault | None:
-        """Say what is wrong with a law's command for an arm."""
+        """Return what is wrong with a law's command for an arm."""
         if not isinstance(command, JointCommand):
             return bad_command(f"the law returned {type(command).__name__}, not a JointCommand")
         return self.check_rates(arm, command.velocity)
 
     def check_rates(self, arm: str, rates: FloatArray) -> Fault | None:
-        """Say what is wrong with joint rates (n,) for an arm."""
+        """Return what is wrong with joint rates (n,) for an arm."""
         names = self._arms[arm].names
         if not isinstance(rates, np.ndarray) or rates.dtype.kind not in "fiu":
             kind = getattr(rates, "dtype", type(rates).__name__)
@@ -100,7 +100,7 @@ class Border:
         return bad_command(f"the law's rate of {first} is not finite")
 
     def _check_clock(self, time: float, elapsed: float) -> Fault | None:
-        """Say what is wrong with a clock that went backwards, far ahead, or hardly at all."""
+        """Return what is wrong with a clock that went backwards, far ahead, or hardly at all."""
         if 0.0 <= elapsed < np.inf and self._behind > _FROZEN_S:
             return clock_error(f"the driver's clock stays at {time:.3f} s while set-points go out")
         if 0.0 <= elapsed < np.inf and self._at_rest():
@@ -120,7 +120,7 @@ class Border:
         return sample if len(new) == len(sample.frames) else replace(sample, frames=tuple(new))
 
     def _check_exposure(self, frame: Frame) -> Fault | None:
-        """Say what is wrong with the joints at an exposure."""
+        """Return what is wrong with the joints at an exposure."""
         for arm, position in frame.joints.items():
             known = self._arms.get(arm)
             if known is None:

@@ -99,7 +99,7 @@ class HasSimTime(Protocol):
 
 
 def has_sim_time(driver: object) -> bool:
-    """Tell whether a driver's time stands while the loop does something else."""
+    """Return whether a driver's time stops while the loop does something else."""
     return driver.sim_time if isinstance(driver, HasSimTime) else False
 
 

@@ -1,4 +1,4 @@
-"""How a run ends, in words: for the loop and for the batch that stands for it."""
+"""How a run ends, in words: for the loop and for the batch kernel that replaces it."""
 
 import re
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from vergence.signals import Outcome, OutcomeKind
 
 
 class Fault(NamedTuple):
-    """Why a run cannot go on."""
+    """Why a run cannot continue."""
 
     kind: OutcomeKind
     reason: str  # one sentence for a person

@@ -42,7 +42,7 @@ class ImageCheck:
         self._seen: dict[str, _Seen] = {}
 
     def check(self, frame: Frame, sample: Sample) -> Fault | bool:
-        """Say what is wrong with a frame; if nothing is, whether it is new."""
+        """Return what is wrong with a frame; if nothing is, whether it is new."""
         if frame.camera not in self._cameras:
             return bad_sample(f"an image of {frame.camera!r}, which is not a camera of the driver")
         age = sample.time - frame.time
@@ -100,12 +100,12 @@ class ImageCheck:
 
 
 def _delivered_twice(frame: Frame, seen: _Seen) -> bool:
-    """Tell whether a frame is the last one again; a coarse clock may give two images one stamp."""
+    """Return whether a frame is the last one again; a coarse clock may give two images one stamp."""
     return frame.time == seen.time and (frame.image is None or _same(frame, seen))
 
 
 def _same(frame: Frame, seen: _Seen) -> bool:
-    """Tell whether a frame repeats the last one; an image of one grey level shows nothing."""
+    """Return whether a frame repeats the last one; an image of one grey level shows nothing."""
     if frame.image is None or seen.image is None:
         return bool(frame.joints) and all(
             np.array_equal(position, seen.joints[name]) for name, position in frame.joints.items()

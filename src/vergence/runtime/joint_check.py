@@ -54,7 +54,7 @@ class JointCheck:
         self._memory = np.vstack((np.full(arm.joint_count, np.nan), _RATE_MARGIN * arm.rate_max))
 
     def check(self, sample: Sample, elapsed: float) -> Fault | None:
-        """Say what is wrong with the arm's joints in a sample.
+        """Return what is wrong with the arm's joints in a sample.
 
         Args:
             sample: with the driver's time.

@@ -14,7 +14,7 @@ _LOG = logging.getLogger(__name__)
 class Listeners:
     """Tells every listener what happens; one that raises is dropped, and the others are told so.
 
-    The loop goes on when a disk is full or a page is gone. A listener that was dropped is still
+    The loop continues when a disk is full or a page is gone. A listener that was dropped is still
     closed, so that it can finish what it has.
 
     Args:

@@ -53,7 +53,7 @@ class Loop:
         following: how far the arm may be from its set-points.
         goal: when the task counts as reached, and whether it ends there; not judged if None.
         next_stages: is told how a task ended; returns what the next one is done by, or None to end
-            the run as that task did. From one to the next the arm is braked, and goes on from the
+            the run as that task did. From one to the next the arm is braked, and continues from the
             set-points where it is.
         clearance: distances between what the arm must not bring together; None for nothing.
     """
@@ -196,7 +196,7 @@ class Loop:
         return None
 
     def _turn(self, sample: Sample, duration_s: float) -> Outcome | None:
-        """Look at what arrived and decide how to go on; return how the run ends, if it does."""
+        """Look at what arrived and decide how to continue; return how the run ends, if it does."""
         turns = self._schedule.turns(self._tick, bool(sample.frames))
         if self._schedule.period_over:
             stuck, self._stuck[:] = self._stuck.copy(), True

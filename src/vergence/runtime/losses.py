@@ -8,12 +8,12 @@ from vergence.signals import ImagePoints, Observation
 
 
 def shows_target(observation: Observation) -> bool:
-    """Tell whether an observation has a target state, or any feature."""
+    """Return whether an observation has a target state, or any feature."""
     return bool(observation.target) or any(view.found.any() for view in observation.views)
 
 
 def may_move(observation: Observation) -> bool:
-    """Tell whether an observation shows all that the law needs."""
+    """Return whether an observation shows all that the law needs."""
     return shows_target(observation) or not observation.needs_target
 
 
@@ -26,7 +26,7 @@ class LossReports:
     """Tells listeners when the target or a feature is lost or found again.
 
     Args:
-        listeners: who is told.
+        listeners: to notify.
     """
 
     def __init__(self, listeners: Listeners) -> None:

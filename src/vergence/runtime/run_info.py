@@ -68,7 +68,7 @@ class ArmInfo:
         return cls(tuple(arm.names), arm.q_min, arm.q_max, arm.rate_max)
 
     def as_json(self) -> dict[str, Any]:
-        """Return JSON values; null stands for a limit that is not there."""
+        """Return JSON values; null means no limit."""
         limits = {name: numbers(getattr(self, name)) for name in ("q_min", "q_max", "rate_max")}
         return {"names": list(self.names), **limits}
 

@@ -40,7 +40,7 @@ class Schedule:
         return self._due - tick
 
     def turns(self, tick: int, images: bool) -> bool:
-        """Tell whether the loop turns at a tick, which may bring images."""
+        """Return whether the loop turns at a tick, which may bring images."""
         overdue = self._last_image <= self._last_due
         self.period_over = tick >= self._due
         if self.period_over:

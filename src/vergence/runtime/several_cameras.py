@@ -7,10 +7,10 @@ from vergence.signals import Frame, Observation
 
 
 class SeveralCameras:
-    """Observes with each of several perceptions, and hands on what all have seen.
+    """Observes with each of several perceptions, and passes on what all have seen.
 
     Args:
-        perceptions: one a camera.
+        perceptions: one per camera.
     """
 
     def __init__(self, perceptions: Sequence[Perception]) -> None:

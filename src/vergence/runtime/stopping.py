@@ -39,7 +39,7 @@ def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
 
 
 def raised(part: str, error: BaseException) -> str:
-    """Say in one sentence what a part raised."""
+    """Return in one sentence what a part raised."""
     first = next(iter(str(error).splitlines()), "")
     text = f"{type(error).__name__}: {first}" if first else type(error).__name__
     return f"the {part} raised {text[:200]}"

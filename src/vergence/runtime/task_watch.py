@@ -17,7 +17,7 @@ class TaskWatch:
         stages: what the task is done by.
         begun: when it began, s since the start of the run.
         rate_max: of the joints, (n,).
-        listeners: who is told.
+        listeners: to notify.
     """
 
     def __init__(

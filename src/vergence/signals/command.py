@@ -18,7 +18,7 @@ class JointCommand:
     manipulability: float = float("nan")  # w'(q) of [Nelson1995] eq. (26), SI units
     penalty: float = float("nan")  # P(q) of [Nelson1995] eq. (27)
     active: tuple[str, ...] = field(default=())  # constraints that shaped the command
-    fault: tuple[OutcomeKind, str] | None = None  # why the law cannot go on
-    slack: Mapping[str, float] = field(default_factory=dict)  # what bent, and by how much
+    fault: tuple[OutcomeKind, str] | None = None  # why the law cannot continue
+    slack: Mapping[str, float] = field(default_factory=dict)  # relaxed limits, and by how much
     # m, the arm's least distance to what is near: "self", "arms", "fixtures", "target".
     clearance: Mapping[str, float] = field(default_factory=dict)

@@ -21,7 +21,7 @@ class FrameTruth:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One image: when it was exposed, and where the arms stood at that instant."""
+    """One image: when it was exposed, and where the arms were at that instant."""
 
     camera: str
     time: float  # s, of exposure

@@ -31,7 +31,7 @@ class Setpoint:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What a cell has to say at one instant."""
+    """Everything that a driver reports at one instant."""
 
     time: float  # s, of one monotonic clock; behind the border, since the start of the run
     joints: Mapping[str, JointState]  # of every arm, by name

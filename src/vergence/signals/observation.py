@@ -1,4 +1,4 @@
-"""What perception hands on: image points with covariance, and a target state from a filter."""
+"""What perception passes on: image points with covariance, and a target state from a filter."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,9 +9,9 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 
 
 class SearchWindows(NamedTuple):
-    """Where points were looked for in one image: rectangles around their predicted places."""
+    """Where points were searched for in one image: rectangles around their predicted places."""
 
-    center_px: FloatArray  # (M, 2) predicted; a row of NaN where nobody looked
+    center_px: FloatArray  # (M, 2) predicted; a row of NaN where no search took place
     half_px: FloatArray  # (M, 2) half the width and height
 
 
@@ -33,7 +33,7 @@ def curves_of(joined: BoolArray) -> tuple[Curve, ...]:
 class ImagePoints:
     """The points measured in one image of one camera.
 
-    A curve that was measured, such as an ellipse, is the points that stand for it: which ones they
+    A curve that was measured, such as an ellipse, is the points that represent it: which ones they
     are follows from the curve alone, and `joined` says that they make one.
     """
 
@@ -43,17 +43,15 @@ class ImagePoints:
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
-    windows: SearchWindows | None = None  # None from what has no windows and looks for all points
-    # (M,) whether the curve goes on to the next point; after a last one that is joined it closes.
-    # None if every point is a mark alone.
-    joined: BoolArray | None = None
-    # (M,) m, measured by a depth camera, and its standard deviation; NaN where it does not tell.
-    depth_m: FloatArray | None = None
-    depth_deviation_m: FloatArray | None = None
+    windows: SearchWindows | None = None  # None from what has no windows and searches for all
+    points # (M,) whether the curve continues to the next point; after a last one that is joined it
+    closes. # None if every point is a mark alone. joined: BoolArray | None = None # (M,) m,
+    measured by a depth camera, and its standard deviation; NaN where unknown. depth_m: FloatArray |
+    None = None depth_deviation_m: FloatArray | None = None
 
     @property
     def asked(self) -> BoolArray:
-        """Which points were looked for, (M,)."""
+        """Which points were searched for, (M,)."""
         if self.windows is None:
             return np.ones(len(self.found), dtype=np.bool_)
         return np.isfinite(self.windows.half_px[:, 0])
@@ -74,7 +72,7 @@ class TargetState:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """All that one outer tick has seen."""
+    """The measurements of one outer tick."""
 
     time: float  # s, of the newest image in it
     views: tuple[ImagePoints, ...]  # one per image that arrived

@@ -1,11 +1,11 @@
-"""Whether a robot does what it is told."""
+"""Whether a robot executes its set-points."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class RobotMode(StrEnum):
-    """What the robot's controller says that it does with set-points."""
+    """What the robot's controller does with set-points, as it reports."""
 
     RUNNING = "running"  # it follows them
     PROTECTIVE_STOP = "protective stop"

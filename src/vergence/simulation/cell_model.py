@@ -158,7 +158,7 @@ class CellModel:
         return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
 
     def sees(self, camera: str, points: FloatArray, inside_target: bool = False) -> BoolArray:
-        """Tell which points (N, 3) in the world no surface hides from a camera, (N,).
+        """Return which points (N, 3) in the world no surface hides from a camera, (N,).
 
         Points inside the target are not hidden by it.
         """
@@ -250,7 +250,7 @@ class CellModel:
 def hidden(
     model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None
 ) -> BoolArray:
-    """Tell which points (N, 3) a surface hides from an eye, (N,)."""
+    """Return which points (N, 3) a surface hides from an eye, (N,)."""
     result: BoolArray = hiding(model, data, eye, points, groups) >= 0
     return result
 

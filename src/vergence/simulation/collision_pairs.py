@@ -34,7 +34,7 @@ def collision_pairs(
     """Return the pairs of shapes that an arm can bring together, with the arms as they are now.
 
     Links that one joint connects are neighbours and no pair. Neither are shapes that overlap
-    already: the arm stands there, so the models are wider than the things. A pair that is nearer
+    already: the arm is there, so the models are wider than the things. A pair that is nearer
     than twice the margin keeps half its distance.
 
     Args:
@@ -63,7 +63,7 @@ def name_of(model: Any, geom: int) -> str:
 
 
 def moved_by(model: Any, joints: list[int]) -> BoolArray:
-    """Tell which bodies each joint moves, (m, B)."""
+    """Return which bodies each joint moves, (m, B)."""
     moves = np.zeros((len(joints), model.nbody), dtype=np.bool_)
     for body in range(model.nbody):
         above = set(joints_above(model, body))
@@ -119,7 +119,7 @@ def _shapes(model: "CellModel") -> list[int]:
 
 
 def _neighbours(m: Any, a: int, b: int) -> bool:
-    """Tell whether one joint, or none, lies between two bodies."""
+    """Return whether one joint, or none, lies between two bodies."""
     a, b = int(m.body_weldid[a]), int(m.body_weldid[b])
     above_a, above_b = (int(m.body_weldid[m.body_parentid[body]]) for body in (a, b))
     return a == b or above_a == b or above_b == a

@@ -1,4 +1,4 @@
-"""A first cell for an arm that nobody has set up yet: how to stand, where to look, what at."""
+"""A first cell for an arm that has none yet: its posture, its camera and its target."""
 
 import math
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ def draft_cell(
 
     Well means: far from singular postures and joint limits, downwards rather than up, not twisted
     about for nothing, with none of the arm in the way and the board above the floor. An arm that
-    reaches none such from where it stands is put on a stand.
+    reaches none such from its place gets a pedestal.
 
     Args:
         model_path: MJCF or URDF.
@@ -150,7 +150,7 @@ def _reach(arm: Arm, postures: FloatArray) -> float:
 
 
 def _height(model: Any, data: Any) -> float:
-    """Return how high the base has to stand for the arm to be above the floor at zero, m."""
+    """Return how high the base has to be for the arm to be above the floor at zero, m."""
     mujoco.mj_kinematics(model, data)
     centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
     up = data.geom_xmat.reshape(-1, 3, 3)[:, 2]  # of each geometry's axes
@@ -223,7 +223,7 @@ def _grid(board: FloatArray, half_side: float) -> FloatArray:
 def _sees(
     model: Any, data: Any, arm: Arm, q: FloatArray, T_world_camera: FloatArray, points: FloatArray
 ) -> bool:
-    """Tell whether nothing of the arm at q is before points (N, 3)."""
+    """Return whether nothing of the arm at q is before points (N, 3)."""
     for name, position in zip(arm.axis_names, arm.axis_positions(q), strict=True):
         data.joint(name).qpos[0] = position
     mujoco.mj_kinematics(model, data)

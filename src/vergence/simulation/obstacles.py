@@ -1,4 +1,4 @@
-"""What of a cell stands between a camera and the target, for the joints the arms report."""
+"""What in a cell is between a camera and the target, for the joints the arms report."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -44,7 +44,7 @@ class Obstacles:
         mujoco.mj_kinematics(self._model, self._data)
 
     def blocked(self, eye: FloatArray, points: FloatArray) -> BoolArray:
-        """Tell which points (N, 3) are hidden from an eye (3,), (N,); world frame, m."""
+        """Return which points (N, 3) are hidden from an eye (3,), (N,); world frame, m."""
         from vergence.simulation.cell_model import hidden
 
         eye = np.ascontiguousarray(eye, dtype=np.float64)

@@ -84,7 +84,7 @@ class CameraRenderer:
         self._sensor = Sensor(self._shape, table, rng)
 
     def take(self, data: Any, blind: bool = False, settled: bool = True) -> ImageArray:
-        """Return the image (height, width) of the world as it stands, black if blind.
+        """Return the image (height, width) of the world in its present state, black if blind.
 
         Args:
             data: MuJoCo's, of the world.
@@ -110,7 +110,7 @@ class CameraRenderer:
         return self._sensor.read(light, settled=False)
 
     def draw(self, data: Any) -> ImageArray:
-        """Return the light (height, width) of the world as it stands, in grey levels."""
+        """Return the light (height, width) of the world in its present state, in grey levels."""
         import cv2
 
         self._renderer.update_scene(data, self._name)
@@ -120,7 +120,7 @@ class CameraRenderer:
         return np.asarray(grey, dtype=np.uint8)
 
     def depth(self, data: Any, sensor: DepthTable) -> DepthArray:
-        """Return the depth (height, width), m, of the world as it stands; NaN where unknown."""
+        """Return the depth (height, width), m, of the world in its present state; NaN where unknown."""
         import cv2
 
         self._renderer.update_scene(data, self._name)

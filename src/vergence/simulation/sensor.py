@@ -49,7 +49,7 @@ class Sensor:
 
         Args:
             light: on the sensor, (height, width), 0 … 255.
-            settled: whether the automatic exposure has had time for this scene; else it goes on
+            settled: whether the automatic exposure has had time for this scene; else it continues
                 from the last image, one period ago.
         """
         import cv2

@@ -89,7 +89,8 @@ class Shutter:
     def _displacement(self, camera: str, ticks: FloatArray) -> float:
         """Return how far the image moves over some ticks, px: the most over the image.
 
-        Both what stands and what moves with the target is looked at, at the target's distance.
+        Both what is stationary and what moves with the target is looked at, at the target's
+        distance.
         """
         poses = [self._poses(camera, tick) for tick in ticks]
         T_camera, T_target = poses[len(poses) // 2]

@@ -112,7 +112,7 @@ class SimulatedDriver:
     def frame_at(self, camera: str, arm: str, position: FloatArray) -> Frame:
         """Return what a camera would see if an arm's joints stood at a position, (n,).
 
-        It stands for an image taken beforehand, by driving there.
+        It represents an image taken beforehand, by driving there.
         """
         now = self.world.joint_position(arm)
         self.world.place_arm(arm, position)

@@ -1,4 +1,4 @@
-"""What stands about in a cell, as a constrained law keeps it out of its camera's lines of sight."""
+"""Obstacles in a cell, as a constrained law keeps it out of its camera's lines of sight."""
 
 from collections.abc import Callable, Mapping
 from copy import copy
@@ -17,7 +17,7 @@ class Solids:
     """Fixtures and other arms as rounded boxes, where they are now.
 
     The target is left out, since how it hides itself follows from its own pose, and so is the arm
-    that carries the camera. Floors hide nothing that stands on them. A mesh is taken for the box
+    that carries the camera. Floors hide nothing above them. A mesh is taken for the box
     around it, a cylinder for one with rounded ends.
 
     Args:

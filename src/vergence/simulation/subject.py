@@ -84,7 +84,7 @@ class Subject:
 
 
 def _truth_of_curve(truth: FrameTruth, curve: CurveTracking, camera: Camera) -> FrameTruth:
-    """Return the truth of the points that stand for a curve, from points on it."""
+    """Return the truth of the points that represent a curve, from points on it."""
     before: BoolArray = np.isfinite(truth.points_px[:, 0])
     nothing = replace(truth, visible=np.zeros(len(before), dtype=np.bool_))
     if not len(before) or not before.all():

@@ -42,7 +42,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     Args:
         out: folder for the figures.
         quick: fewer starts.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of starts and noise.
     """
     count = STARTS_QUICK if quick else STARTS

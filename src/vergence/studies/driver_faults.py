@@ -108,7 +108,7 @@ def _signalled(name: str) -> Callable[[FaultyDriver], None]:
 
 
 def _stuck(for_s: float) -> Motion:
-    """Return what an arm follows that stands, and then catches up as fast as it may."""
+    """Return what an arm follows that is blocked, and then catches up as fast as it may."""
 
     def hold(setpoints: Setpoints, driver: FaultyDriver) -> Setpoints:
         free_s = max(driver.time - driver.at - for_s, 0.0)

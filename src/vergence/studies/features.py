@@ -37,7 +37,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     Args:
         out: folder for the figure.
         quick: a few starts and poses.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of starts and poses.
     """
     count = QUICK_STARTS if quick else STARTS

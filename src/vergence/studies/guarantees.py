@@ -51,7 +51,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     Args:
         out: folder for the figures.
         quick: fewer attempts.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of the random runs and pairs.
     """
     known = arms()

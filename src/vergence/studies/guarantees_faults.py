@@ -68,7 +68,7 @@ def try_fault(arms: tuple[Arm, ...], seed: int, index: int) -> FaultRun:
 
 
 def keeps_limits(driver: FaultyDriver, to_rest: bool = True) -> bool:
-    """Tell whether every set-point that a driver was handed is inside all limits of its arm.
+    """Return whether every set-point that a driver was handed is inside all limits of its arm.
 
     Args:
         driver: with what it was handed.
@@ -115,7 +115,7 @@ def faults_check(
 
 
 def blind_check(arms: tuple[Arm, ...], seed: int) -> Check:
-    """Return the check: how long an arm at full speed goes on after its last image."""
+    """Return the check: how long an arm at full speed continues after its last image."""
     timeouts = Timeouts()
     travels, bounds = [], []
     for number, arm in enumerate(arms):

@@ -34,7 +34,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     Args:
         out: folder for the figure.
         quick: a fortieth of the scenes.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of the scenes.
     """
     batches = [

@@ -48,7 +48,7 @@ class Motion:
         return PERIOD * (len(self.q) - 1)
 
     def then(self, other: Self) -> Self:
-        """Return this motion and another that goes on where it ended."""
+        """Return this motion and another that continues where it ended."""
         return type(self)(
             other.ending,
             other.reason,

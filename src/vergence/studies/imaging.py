@@ -35,7 +35,7 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     Args:
         out: folder for the figure and the table, `imaging.csv`.
         quick: two trackers with one seed.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of the first run of each case.
     """
     cases = [case for case in CASES if not quick or case.name in _QUICK]

@@ -198,7 +198,7 @@ def past_singular_pitch(cell: Cell, images: bool) -> FloatArray:
     """Return the orientation error (K,), degrees, as the object turns past pitch 90° at 10°.
 
     The object turns by itself, about an axis tilted by 10°, through half a turn but 20°; both arms
-    stand still, the master's out of the way, so that only perception is at work.
+    is stationary, the master's out of the way, so that only perception is at work.
     """
     rest = [0.0, 0.0, 0.0]
     motion = {

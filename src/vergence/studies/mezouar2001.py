@@ -56,7 +56,7 @@ def reproduce(
     Args:
         out: folder for the figures.
         quick: exact projections instead of rendered images, fewer random starts.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of the cell, the random starts and the wrong beliefs.
         imaging: of the camera, see `ImagingTable`.
         counts: random starts and wrong beliefs to try, instead of the usual numbers.
@@ -311,7 +311,7 @@ def success_rate(trials: Sequence[Trial], method: str) -> float:
 
 
 def _again(ends: Sequence[End]) -> str:
-    """Say how many needed a second plan: made at rest, where a joint came close to its limit."""
+    """Return how many needed a second plan: made at rest, where a joint came close to its limit."""
     again = sum(end.parts > 1 for end in ends)
     return f"{again} planned again where a joint came within {100 * ROOM:g} % of its limit"
 

@@ -25,7 +25,7 @@ def reproduce(
     Args:
         out: folder for the figures.
         quick: exact projections with noise instead of rendered images.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of the cell.
         imaging: of the camera, see `ImagingTable`.
     """

@@ -41,6 +41,6 @@ def run(cell: Cell, quick: bool) -> Trial:
 
 
 def kept(trial: Trial, error_px: float | None = WINDOW_PX) -> bool:
-    """Tell whether a run ended well, and its feature never farther off than so many pixels."""
+    """Return whether a run ended well, and its feature never farther off than so many pixels."""
     close = error_px is None or trial.summary["max_error_px"] <= error_px
     return trial.outcome.succeeded and close

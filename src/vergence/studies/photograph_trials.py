@@ -137,7 +137,7 @@ def _covered(image: ImageArray, trial: Trial) -> ImageArray:
 def _feasible(
     driver: SimulatedDriver, trial: Trial, T_goal: FloatArray, T_start: FloatArray
 ) -> bool:
-    """Tell whether the start sees enough of what the goal sees, from not too far aside."""
+    """Return whether the start sees enough of what the goal sees, from not too far aside."""
     cosine = float(T_goal[:3, 2] @ T_start[:3, 2])
     if cosine < np.cos(np.deg2rad(TILT_DEG)):
         return False

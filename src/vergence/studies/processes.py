@@ -39,7 +39,7 @@ def try_all(
         case: a function of the case's number that can be sent to a process.
         count: how many.
         pool: see `processes`.
-        progress: told the share done.
+        progress: called with the share done.
         at_once: cases that a process is given at a time.
     """
     results = []

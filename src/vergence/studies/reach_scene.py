@@ -123,7 +123,7 @@ class Scene:
 
 
 def _in_view(camera: Camera, marks: FloatArray, T_camera_target: FloatArray) -> bool:
-    """Tell whether a camera sees the marks, from the front of their plane."""
+    """Return whether a camera sees the marks, from the front of their plane."""
     points = transform_points(T_camera_target, marks.copy())
     if points[:, 2].min() < 0.2 or T_camera_target[:3, 2] @ points.mean(axis=0) >= 0.0:
         return False

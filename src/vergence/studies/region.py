@@ -52,7 +52,7 @@ def reproduce(
     Args:
         out: folder for the figure.
         quick: two objects in short films.
-        progress: told what is being done.
+        progress: called with the current step.
         seed: of colours, clutter, motion and first pose.
         imaging: of the camera, see `ImagingTable`.
     """

@@ -123,7 +123,7 @@ class _BadCamera:
         self._sensor = Sensor(_SHAPE, table, self._random)
 
     def drops(self) -> bool:
-        """Tell whether an image is lost; never the first."""
+        """Return whether an image is lost; never the first."""
         lost = bool(self._random.random() < self._imaging.dropped)
         return lost and not self._fresh
 

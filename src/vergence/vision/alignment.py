@@ -1,7 +1,7 @@
 """Affine alignment of a patch to a template, with gain and bias, inverse compositional.
 
 The model is I(p + A u) = g T(u) + b, where u runs over the template's pixels relative to the
-feature point. Its derivatives stand on the template's side and are made once; a step is then one
+feature point. Its derivatives are taken of the template and are made once; a step is then one
 resampling of the image and one product ([Baker2004], the inverse compositional algorithm).
 """
 
@@ -15,7 +15,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.pyramid import Patch, load_window
 
 PATCH_PX = 24  # side of the patch that is aligned
-AREA_PX = 48  # side of the part of the image that it is looked for in
+AREA_PX = 48  # side of the part of the image that it is searched for in
 FREE, RIGID = 0, 1  # whether the affine matrix may change
 WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias

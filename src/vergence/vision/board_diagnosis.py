@@ -15,7 +15,7 @@ _LARGEST = tuple(name for name in DICTIONARIES if not name.endswith(_SMALLER))
 def other_board(board: Board, image: ImageArray) -> str:
     """Return in words which board an image shows instead of one; empty if none is seen.
 
-    Wrong dictionary, wrong counts and a board of another kind are told apart.
+    Wrong dictionary, wrong counts and a board of another kind are distinguished.
     """
     if board.marker_m is not None:
         return _other_markers(board, image) or _chessboard(board, image)

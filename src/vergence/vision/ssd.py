@@ -34,7 +34,7 @@ SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None
 
 
 class SsdTemplate(NamedTuple):
-    """What the search looks for: one window at four resolutions, all with the same centre."""
+    """What the search searches for: one window at four resolutions, all with the same centre."""
 
     wide: Patch  # (8, 8) 64 × 64 px averaged
     coarse: Patch  # (8, 8) 32 × 32 px averaged
@@ -187,7 +187,7 @@ def coarse_scores(
     """Fill work.surface: SSD of the coarse level, of the surroundings, and the cost of distance."""
     load_quarter(image, anchor_x, anchor_y, work.coarse)
     halve(work.coarse, work.wide)
-    # The area is 64 px wider than the window that is looked for; the coarse one is 32 px smaller.
+    # The area is 64 px wider than the window that is searched for; the coarse one is 32 px smaller.
     ssd_surface_8(work.coarse, 4, template.coarse, POSITIONS, work.strip, work.surface)
     ssd_surface_8(work.wide, 0, template.wide, WIDE_POSITIONS, work.strip, work.wide_surface)
     cost = SIDE * SIDE * COARSE * COARSE * distance_cost(template)

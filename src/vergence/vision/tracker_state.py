@@ -1,6 +1,6 @@
 """The memory of the SSD tracker and the kernel that brings it from one image to the next.
 
-Two templates serve two ends. The search, which must not miss, looks for the window of the last
+Two templates serve two ends. The search, which must not miss, searches for the window of the last
 image in which the point was found, as [Nelson1995] eq. (19) compares successive images. The
 place, which must not drift, comes from an affine alignment to a key template that stays as long
 as the measured change of form since it was taken is small; the sub-pixel offset of the point goes
@@ -50,7 +50,7 @@ SAME_PX = 2.0  # nearer than this places are one: the alignment leads to the sam
 PROMISING = 0.3  # least correlation before an alignment that is worth one
 MOST_PLACES = 10  # where a point may be: by the search, as expected, as neighbours move, by twins
 TWINS = 2  # nearest look-alikes of a point that are remembered
-TWIN_RANGE_PX = 16.0  # within which they are looked for in the first image
+TWIN_RANGE_PX = 16.0  # within which they are searched for in the first image
 TWIN_STEP_PX = 3.0  # and how densely: an alignment that starts so near finds its place
 ALIKE = 0.05  # places whose correlation is within this of the search's look like the point, too
 NEIGHBOURS = 5  # points whose motion tells between places that look alike
@@ -264,7 +264,7 @@ def choose_key(image: ImageArray, state: TrackerState, k: int, covariance: Float
 
 @njit(cache=True)
 def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
-    """Say whether an alignment is the point: the verdict and its number."""
+    """Return whether an alignment is the point: the verdict and its number."""
     if found.correlation < LOST_CORRELATION:
         return NO_MATCH, found.correlation
     if not GAIN_RANGE[0] <= found.gain <= GAIN_RANGE[1]:

@@ -18,7 +18,7 @@ class Tracks(NamedTuple):
     # (M,) root mean square, grey levels; NaN where nothing was compared, None if nothing ever is
     residuals: FloatArray | None = None
     correlations: FloatArray | None = None  # (M,) with the template, -1 … 1; likewise
-    windows: SearchWindows | None = None  # where the points were looked for
+    windows: SearchWindows | None = None  # where the points were searched for
     joined: BoolArray | None = None  # (M,) see `ImagePoints`; None if every point is a mark alone
 
     def __bool__(self) -> bool:
@@ -81,10 +81,10 @@ class PointTracking(Protocol):
 
 @runtime_checkable
 class CurveTracking(PointTracking, Protocol):
-    """A part that follows a curve by points that stand for it, and are no marks on the object."""
+    """A part that follows a curve by points that represent it, and are no marks on the object."""
 
     def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """Return the points that stand for the curve through others, (M, 2).
+        """Return the points that represent the curve through others, (M, 2).
 
         They follow from the curve alone and change smoothly with it.
 

@@ -38,7 +38,7 @@ def board_view(
 
 
 def is_shown(camera: Camera, board: Board, T_camera_board: FloatArray) -> bool:
-    """Tell whether enough of the board's corners are in the image, from its front."""
+    """Return whether enough of the board's corners are in the image, from its front."""
     points = transform_points(T_camera_board, board.points)
     middle = transform_points(T_camera_board, board.center[None])[0]
     steepest = np.cos(np.deg2rad(_STEEPEST_DEG)) * np.linalg.norm(middle)

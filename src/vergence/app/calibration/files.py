@@ -21,7 +21,7 @@ def write_results(
         folder: where to.
         camera: the lens.
         mounting: how it is mounted, if that was asked.
-        T_world_base: where the arm's base stands, (4, 4); a fixed camera's pose is told from it.
+        T_world_base: pose of the arm's base, (4, 4); a fixed camera's pose is told from it.
         name: of the camera.
     """
     write_camera(camera, folder / CAMERA, name)

@@ -88,7 +88,7 @@ class Stops:
             self._lately.popleft()
 
     def is_new(self, frame: Frame, arm: str) -> bool:
-        """Tell whether an image was exposed at rest, at a stop without one."""
+        """Return whether an image was exposed at rest, at a stop without one."""
         q, positions = frame.joints[arm], np.array([each.position for each in self._lately])
         known_s = self._lately[-1].time - self._lately[0].time
         moved = float(np.abs(positions - q).max())

@@ -78,7 +78,7 @@ def suggested_poses(
 
 
 def _free(start: FloatArray, end: FloatArray, clearance: Clearance | None) -> bool:
-    """Tell whether the arm keeps its margins on a straight line of its joints."""
+    """Return whether the arm keeps its margins on a straight line of its joints."""
     if clearance is None:
         return True
     count = int(np.ceil(np.abs(end - start).max() / _FINE)) + 1

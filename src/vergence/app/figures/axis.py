@@ -1,4 +1,4 @@
-"""Where the ticks of an axis stand, what they are called, and how many points a curve needs."""
+"""Where the ticks of an axis are, what they are called, and how many points a curve needs."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def thinned(x: FloatArray, y: FloatArray, columns: int) -> tuple[FloatArray, Flo
     Args:
         x: (N,) rising.
         y: (N,) NaN where not known, which is kept.
-        columns: how many can be told apart across the chart.
+        columns: how many can be distinguished across the chart.
     """
     if len(x) <= 4 * columns:
         return x, y

@@ -23,7 +23,7 @@ class Curve:
 
     @classmethod
     def numbered(cls, index: int, label: str, x: FloatArray, y: FloatArray) -> Self:
-        """Return the n-th curve of a panel, told apart from all others."""
+        """Return the n-th curve of a panel, distinguished from all others."""
         return cls(label, x, y, index % COLORS, _DASHES[index // COLORS % len(_DASHES)])
 
 

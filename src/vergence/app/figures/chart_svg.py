@@ -1,6 +1,6 @@
-"""Draws charts as SVG that stands in a page: the page's style sheet gives ink and colours.
+"""Draws charts as SVG inside a page: the page's style sheet gives ink and colours.
 
-Text is text and takes its place from what it can be at most; the legend stands above the chart as
+Text is text and takes its place from what it can be at most; the legend is above the chart, as
 a line of HTML. So no label is cut off, and nothing lies over the data.
 """
 
@@ -15,7 +15,7 @@ from vergence.arrays import FloatArray
 
 WIDTH, LEFT, RIGHT = 940.0, 62.0, 14.0  # of the whole, and free beside the axes
 _IMAGE_WIDTH = 420.0  # of an image's frame with its margin
-_TITLE, _EVENTS, _TICKS, _GAP = 24.0, 14.0, 18.0, 10.0  # heights of what stands about a panel
+_TITLE, _EVENTS, _TICKS, _GAP = 24.0, 14.0, 18.0, 10.0  # heights around a panel
 _HEIGHT, _ROW, _BAR = 140.0, 36.0, 12.0  # heights of a panel, of a row of stretches, of its bar
 _MOST_TICKS, _FEW_TICKS = 9, 5
 

@@ -88,7 +88,7 @@ def places_figure(
 
     Args:
         results: of a map over places.
-        bases: where the arms stand, by name, relative to the target's start.
+        bases: where the arms are, by name, relative to the target's start.
     """
     laws = _laws(results)
     xs = sorted({float(result.labels["x_m"]) for result in results})
@@ -109,7 +109,7 @@ def places_figure(
 
 
 def _mark_bases(plane: "Axes", bases: Mapping[str, tuple[float, float]], reach: float) -> None:
-    """Frame the square, and mark the target's start and the arms that stand in it."""
+    """Frame the square, and mark the target's start and the arms inside it."""
     plane.plot(0.0, 0.0, "+", color=INK, markersize=12, zorder=5)
     for name, (x, y) in bases.items():
         if max(abs(x), abs(y)) < reach:

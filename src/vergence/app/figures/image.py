@@ -7,7 +7,7 @@ from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.runtime.results import CameraTrace
 
-_MANY = 8  # features that are still told apart one by one
+_MANY = 8  # features that are still distinguished one by one
 
 
 def error_chart(trace: CameraTrace) -> Chart | None:

@@ -68,7 +68,7 @@ class TagFollower:
     """
 
     in_color = False
-    was_seen = True  # it is looked for to the end
+    was_seen = True  # it is searched for to the end
     symmetries = ()
     note = ""
 

@@ -89,7 +89,7 @@ def _watch_cell(options: "WatchOptions") -> Mapping[str, object]:
     from vergence.cell import load_cell
 
     settings = overrides(options.settings)
-    load_cell(options.source, settings, options.seed)  # a mistake is told before all is loaded
+    load_cell(options.source, settings, options.seed)  # report mistakes before loading everything
     if options.driver is not None:
         return _watch_robot(options, settings)
     from vergence.app.progress import working
@@ -161,7 +161,7 @@ def _end(
 
 
 def _invite(server: "Server", options: "WatchOptions") -> None:
-    """Say where the page is and who can reach it; open it where there is a screen."""
+    """Return where the page is and who can reach it; open it where there is a screen."""
     _say(f"watch at  {server.address}   (Ctrl-C stops)", options)
     if server.only_here:
         _say("Only this machine can reach it; --host opens it to others.", options)

@@ -87,7 +87,7 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
 
 
 def _label(key: str, unit: str) -> str:
-    """Return a key in words; its unit stands beside it."""
+    """Return a key in words; without its unit."""
     ending = next((each for each in _UNITS if key.endswith(each)), "") if unit else ""
     return key.removesuffix(ending).replace("_", " ").replace(".", ": ")
 

@@ -134,7 +134,7 @@ class LawEditor:
 
     @property
     def _at(self) -> str:
-        """Where the law of the task stands in the cell file."""
+        """Where the law of the task is in the cell file."""
         tasks = self._base.tasks
         name = tasks[self._number].law if tasks else None
         return "law" if name is None else f"laws.{name}"
@@ -154,7 +154,7 @@ class LawEditor:
     def _start_from(self, cell: Cell) -> None:
         self.cell = self._base = cell
         self._changed = dict[str, str]()
-        self._edited = dict[str, _Edited]()  # by where they stand
+        self._edited = dict[str, _Edited]()  # by their place in the file
         self.begin_task(0)
 
     def _change(self, changed: dict[str, str], context: LawContext) -> Law:

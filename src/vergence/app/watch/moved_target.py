@@ -14,13 +14,13 @@ _FASTEST_RAD_S = 1.0
 class MovedTarget:
     """A target that moves by itself until the mouse takes it, and stays where it is let go.
 
-    Its own motion stands still while the mouse has it, and may be let go on from there.
+    Its own motion pauses while it is dragged, and may continue from there.
 
     Args:
         own: the motion that the cell describes.
 
     Attributes:
-        held: whether its own motion stands still.
+        held: whether its own motion is paused.
         shift_m: how far the mouse wants it beside its own place, (3,), in the world.
         turn_rad: by how much the mouse wants it turned, (3,), a rotation vector in the world.
     """

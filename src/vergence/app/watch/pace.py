@@ -10,7 +10,7 @@ class Pace:
     """Keeps simulated time beside the wall clock; pauses, steps and changes speed.
 
     Attributes:
-        paused: whether time stands still.
+        paused: whether the run is paused.
         speed: desired simulated seconds a second; the machine may be slower.
         measured: simulated seconds a second, lately.
     """

@@ -110,7 +110,7 @@ class Publisher:
     ) -> FloatArray | None:
         """Return where the points of an image should be, if the reference speaks of them.
 
-        Of a desired pose, where it would show the points that were looked for.
+        Of a desired pose, where it would show the points that were searched for.
         """
         if reference is None or frame.camera != self._cell.task.camera:
             return reference.elsewhere_px.get(frame.camera) if reference else None

@@ -17,7 +17,7 @@ NAMES = ("poses.csv", "poses.toml", "poses.json", "poses.yaml")
 COLUMNS = ("image", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _KEYS = ("image", "position_m", "quaternion_wxyz")
 _MOST_BYTES = 10_000_000
-_FARTHEST_M = 20.0  # no arm reaches farther: the numbers are no metres
+_FARTHEST_M = 20.0  # no arm reaches farther: the numbers are not in metres
 
 
 def find_poses(folder: Path) -> Path | None:

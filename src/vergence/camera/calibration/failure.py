@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFailure:
-    """The images or poses cannot tell what is asked; never true."""
+    """The images or poses do not determine the calibration; evaluates to false."""
 
     reason: str
 

@@ -91,7 +91,7 @@ def calibrate_lens(
         camera: if it is known already.
 
     Returns:
-        the fit, with all images that were left out; or why these images cannot tell.
+        the fit, with all images that were left out; or why these images do not determine it.
 
     Raises:
         InputError: if the folder or an image cannot be read.

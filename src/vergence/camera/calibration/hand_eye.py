@@ -91,7 +91,7 @@ def agree(
     width: int,
     rng: np.random.Generator,
 ) -> Agreement:
-    """Find the mounting on which most images agree, whatever some others say.
+    """Find the mounting on which most images agree, even if others contradict it.
 
     Mountings are made of three images each; the one with the least residuals over all, each cut
     off where it counts as contradicting, is made again of all images that agree.
@@ -102,7 +102,7 @@ def agree(
         T: board poses in the camera for these, (N, S, 4, 4).
         lens: parameters, (9,).
         width: of the images, px.
-        rng: chooses the threes.
+        rng: chooses the triples.
     """
     count, orientations = T.shape[:2]
     cut = TOLERATED * width
@@ -127,7 +127,7 @@ def agree(
 
 
 def _threes(count: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
-    """Return all threes of images, or as many as are tried."""
+    """Return all triples of images, or as many as are tried."""
     if count <= 11:
         return list(combinations(range(count), 3))
     return [tuple(rng.choice(count, 3, replace=False)) for _ in range(_SUBSETS)]

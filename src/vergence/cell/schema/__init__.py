@@ -63,7 +63,7 @@ __all__ = [
     "Vector3",
 ]
 
-# What stands at a place in the file, or is the kind of what stands there.
+# What is at a place in the file, or its kind.
 TABLES: dict[str, type[Table]] = {
     "depth": DepthTable,
     "imaging": ImagingTable,

@@ -24,7 +24,7 @@ REAL_CAMERA: Mapping[str, Any] = {
 class ImagingTable(Table):
     """How simulated images differ from ideal ones; an effect whose value is 0 is off.
 
-    `imaging = "real_camera"` stands for a table of that kind. Read noise is `noise_grey` of the
+    `imaging = "real_camera"` means a table of that kind. Read noise is `noise_grey` of the
     camera.
     """
 
@@ -61,4 +61,4 @@ def _table(given: Any) -> Any:
     return {"kind": given} if isinstance(given, str) else given
 
 
-Imaging = Annotated[ImagingTable, BeforeValidator(_table)]  # a name stands for a table of that kind
+Imaging = Annotated[ImagingTable, BeforeValidator(_table)]  # a name means a table of that kind

@@ -18,7 +18,7 @@ class MeasuredPoints(NamedTuple):
     T_camera_scene: FloatArray  # (4, 4) at the exposure, of the frame in which the target rests
     believed_m: FloatArray  # (M,) depth at the start
     target: TargetState | None = None  # from a filter, where one runs
-    measured_m: FloatArray | None = None  # (M,) by a depth camera; NaN where it does not tell
+    measured_m: FloatArray | None = None  # (M,) by a depth camera; NaN where unknown
     deviation_m: FloatArray | None = None  # (M,) of that, standard deviations
 
 

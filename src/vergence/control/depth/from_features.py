@@ -121,7 +121,7 @@ def _from_depths(exposure: MeasuredPoints, features: FloatArray, found: BoolArra
 
 
 def fixes_pose(features: FloatArray) -> bool:
-    """Tell whether features (M, 3) in an image fix the pose: four or more, not on a line."""
+    """Return whether features (M, 3) in an image fix the pose: four or more, not on a line."""
     if len(features) < _FEWEST:
         return False
     extent = np.linalg.svd(features - features.mean(axis=0), compute_uv=False)

@@ -1,4 +1,4 @@
-"""Lines of sight: how far what stands about is from coming between a camera and its features.
+"""Lines of sight: how far obstacles are from coming between a camera and its features.
 
 Every solid is a rounded box, the points within a radius of a box: a ball, a rod and a box are such,
 and anything else lies in one.

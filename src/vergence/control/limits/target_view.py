@@ -63,7 +63,7 @@ class TargetView:
         self._target = MovingPose(moved(self._target, period_s), self._target.twist)
 
     def _shown(self, T_camera_target: FloatArray) -> BoolArray:
-        """Tell which corners the desired pose shows within the margin, (M,)."""
+        """Return which corners the desired pose shows within the margin, (M,)."""
         points = transform_points(T_camera_target, self._corners)
         with np.errstate(divide="ignore", invalid="ignore"):
             image = points[:, :2] / points[:, 2:]

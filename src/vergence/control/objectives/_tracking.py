@@ -149,7 +149,7 @@ def image_square(
     """Return Bᵀ B (6, 6), its lower half, Bᵀ (x - x_D) and Bᵀ drift (6,) of `image_model`.
 
     They are summed point by point, in a third of the time that B takes to be written down first.
-    The drift is how far the target's own motion moves the features in a period, if they tell.
+    The drift is how far the target's own motion moves the features in a period, if known.
     """
     BtB, Bt_error, Bt_drift = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
     across_px, down_px = focal_px[0] * focal_px[0], focal_px[1] * focal_px[1]

@@ -150,7 +150,7 @@ class PoseTrajectory:
         Args:
             q: joint set-points, (n,).
             rates: that were commanded, (n,).
-            held_back: whether they do something else than the twist; then the trajectory goes on
+            held_back: whether they do something else than the twist; then the trajectory continues
                 from where the tip will be.
         """
         assert self._goal is not None

@@ -113,7 +113,7 @@ def solve_qp(
     working = np.empty(n + 1, dtype=np.int64)  # indices of the active rows
     multiplier = np.zeros(n + 1)
     count = 0
-    HN = np.empty((n + 1, n))  # H⁻¹ times the active normals, one a row
+    HN = np.empty((n + 1, n))  # H⁻¹ times the active normals, one per row
     for _ in range(_MAX_STEPS):
         p, worst = -1, _TOLERANCE
         for i in range(m):

@@ -122,7 +122,7 @@ class BoundProgram:
         return Solution(*answer, clearance=self._clearance.least(near))
 
     def _is_singular(self, q: FloatArray, answer: ConstrainedRates) -> bool:
-        """Tell whether there is a direction in which no joint rates move the tip any more."""
+        """Return whether there is a direction in which no joint rates move the tip any more."""
         if not answer.manipulability < _NEARLY:  # far from it, without a decomposition
             return False
         smallest = np.linalg.svd(self._setting.arm.jacobian(q), compute_uv=False)[-1]

@@ -43,7 +43,7 @@ class Solution(NamedTuple):
     active: FloatArray  # (K,) by kind of limit: how many rows push
     slack: FloatArray  # (K,) by kind: the largest slack, in the row's own unit
     solved: bool
-    fault: tuple[OutcomeKind, str] | None = None  # why the servo cannot go on
+    fault: tuple[OutcomeKind, str] | None = None  # why the servo cannot continue
     clearance: Mapping[str, float] = MappingProxyType({})  # m, least distance to each kind of thing
 
 

@@ -15,7 +15,7 @@ from vergence.errors import DriverSilent, VergenceError
 from vergence.runtime.driver import Driver
 
 _FARTHEST = 10.0  # nudges that the arm may be driven, if nobody kills the program
-_STOPS_S = 1.0  # at the speed of the test: how far the arm may go on
+_STOPS_S = 1.0  # at the speed of the test: how far the arm may continue
 _REST_S = 0.5  # in which it has to be at rest
 _OPENS_S, _RECONNECTS_S, _AGAIN_S = 60.0, 15.0, 0.5
 

@@ -74,7 +74,7 @@ def _rest(
 def _joint_finding(
     joint_name: str, names: tuple[str, ...], joint: int, moved: FloatArray, step: float
 ) -> Finding:
-    """Say whether the joint that was told to move did, and no other."""
+    """Return whether the joint that was told to move did, and no other."""
     share, farthest = moved[joint] / step, int(np.argmax(np.abs(moved)))
     note = ""
     if farthest != joint:
@@ -94,7 +94,7 @@ def _joint_finding(
 
 
 def _rate_finding(joint_name: str, travelled: float, moved: float) -> Finding:
-    """Say whether the rate that a joint reports is that of its position."""
+    """Return whether the rate that a joint reports is that of its position."""
     share = travelled / moved if moved else 0.0
     name, holds = f"{joint_name} reports its rate", 0.5 <= share <= 1.5
     note = "" if holds else "its rate is of another unit or sign, or is not reported"

@@ -25,7 +25,7 @@ class TimedImage(NamedTuple):
 class RealSenseDepth:
     """Pairs depth images with images by their stamps, and aligns them.
 
-    The left infrared camera is where depth is measured from; the colour camera stands beside it,
+    The left infrared camera is where depth is measured from; the colour camera is beside it,
     and what the maker calibrated says where.
 
     Args:

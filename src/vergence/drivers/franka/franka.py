@@ -31,7 +31,7 @@ class Franka:
     gripper_speed_m_s: float = knob(0.1, "m/s", least=0.01, upto=0.2)  # opening and closing speed
     gripper_force_n: float = knob(20.0, "N", least=1.0, upto=70.0)  # gripping force
     realtime: bool = True  # require a real-time kernel
-    # Longest time that the robot's clock may stand still.
+    # Longest time that the robot's clock may not advance.
     timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
     connect_s: float = knob(10.0, "s", above=0.0, upto=60.0)  # time to wait for the robot to answer
 

@@ -27,7 +27,7 @@ _INSTALL = (
     "ros-kilted-sensor-msgs ros-kilted-std-srvs ros-kilted-trajectory-msgs, "
     "and --driver ros2:ros2/bin/python"
 )
-_AHEAD_S = 0.02  # that a trajectory goes on before it brakes, at least
+_AHEAD_S = 0.02  # that a trajectory continues before it brakes, at least
 
 
 @part("driver", "ros2")

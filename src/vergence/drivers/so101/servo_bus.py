@@ -118,7 +118,7 @@ class ServoBus:
             self._servos.write1ByteTxRx(number, _TORQUE, 1)
 
     def close(self) -> None:
-        """Let go of the port; the servos go on holding their place."""
+        """Let go of the port; the servos continue holding their place."""
         self._port.closePort()
 
     def _drop_late_answers(self) -> None:

@@ -43,7 +43,7 @@ class Ur:
     servo_gain: int = knob(300, least=100, upto=2000)  # for `servoj`: gain
     # The robot stops if set-points arrive at a lower rate.
     watchdog_hz: float = knob(10.0, "Hz", least=2.0, upto=100.0)
-    # Longest time that the robot's clock may stand still.
+    # Longest time that the robot's clock may not advance.
     timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
     # By name: standard 0 to 7, configurable 0 to 7, tool 0 or 1.
     outputs: dict[str, _DigitalOutput] = field(default_factory=dict)

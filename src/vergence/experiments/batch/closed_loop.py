@@ -107,7 +107,7 @@ def faded_step(
 
 @njit(cache=True, error_model="numpy")
 def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, float]:
-    """Run [Nelson1995] in the loop, on an arm that moves exactly as it is told.
+    """Run [Nelson1995] in the loop, on an arm that follows commands exactly.
 
     It is `vergence.runtime.Loop` on a `KinematicDriver`, decision by decision, by the same kernels.
 

@@ -1,4 +1,4 @@
-"""A run on an arm that moves exactly as it is told, before exact projections."""
+"""A run on an arm that follows commands exactly, before exact projections."""
 
 from dataclasses import dataclass, field
 

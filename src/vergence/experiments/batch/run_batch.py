@@ -36,7 +36,7 @@ class BatchTrace:
 
 
 def covers(run: KinematicRun) -> bool:
-    """Tell whether the kernel knows the law of a run and its camera."""
+    """Return whether the kernel knows the law of a run and its camera."""
     law, camera = run.law, run.cell.camera
     if not isinstance(law, Servo) or law.feeds_forward or camera.distorted:
         return False

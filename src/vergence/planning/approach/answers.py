@@ -32,7 +32,7 @@ class Arrived(NamedTuple):
     """What a last comparison says of a camera that seems to be at its goal."""
 
     confirmation: Confirmation
-    reason: str  # where it stands, in words
+    reason: str  # the state reached, in words
 
     def outcome(self, time: float) -> Outcome:
         """Return the end of the run."""

@@ -21,11 +21,11 @@ from vergence.signals import Frame, ImagePoints, Observation, Outcome, OutcomeKi
 from vergence.vision import SsdTracker, TwoViewFailure
 from vergence.vision.tracks import Tracks
 
-_FEWEST = 6  # points found, below which the photograph is looked for again
-_AGAIN_S = 0.7  # between two looks for the photograph
+_FEWEST = 6  # points found, below which the photograph is searched for again
+_AGAIN_S = 0.7  # between two searches for the photograph
 _LOOKS = 4  # in a row without success
-_SETTLE_S = 1.5  # after the path, before the photograph is looked for again
-_HALFWAY = 0.6  # share of the path at which the photograph is looked for again
+_SETTLE_S = 1.5  # after the path, before the photograph is searched for again
+_HALFWAY = 0.6  # share of the path at which the photograph is searched for again
 
 
 class Approach:
@@ -33,7 +33,7 @@ class Approach:
 
     While the camera moves, tracked points and the arm's joints tell the scale and which of several
     motions is right (`fit_goal`); the path is planned anew where it contradicts them. On the way,
-    and where too few points are left, the photograph is looked for again. At the end its own
+    and where too few points are left, the photograph is searched for again. At the end its own
     windows are tracked, so that nothing has drifted.
 
     Args:
@@ -64,7 +64,7 @@ class Approach:
         self._tracker: SsdTracker | None = None
         self._trajectory: Trajectory | None = None
         self._began = 0.0  # s, when the trajectory began
-        self._looked = 0.0  # s, when the photograph was looked for last
+        self._looked = 0.0  # s, when the photograph was searched for last
         self._failures = 0  # looks in a row that found nothing
         self._stays = 0  # looks because the camera is at rest, but not surely at the goal
         self._halfway_done = False

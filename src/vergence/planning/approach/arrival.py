@@ -23,7 +23,7 @@ _REST_S, _REST = 0.4, 0.03  # in which the camera must not move more than this s
 
 
 class GoalPoints:
-    """Well-textured points of the photograph, looked for in the images.
+    """Well-textured points of the photograph, searched for in the images.
 
     Args:
         goal: the photograph.
@@ -125,7 +125,7 @@ class GoalPoints:
         return self._seen[-1][1] if self._seen else None
 
     def at_rest(self, tolerance_m: float, tolerance_rad: float) -> bool:
-        """Tell whether the camera has hardly moved lately, in shares of the tolerances."""
+        """Return whether the camera has hardly moved lately, in shares of the tolerances."""
         if len(self._seen) < 4 or self._seen[-1][0] - self._seen[0][0] < 0.8 * _REST_S:
             return False
         first, last = self._seen[0][1], self._seen[-1][1]

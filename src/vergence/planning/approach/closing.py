@@ -37,7 +37,7 @@ class Closing:
         self.points: GoalPoints | None = None
         self.begun = False
         self.scale_deviation = 1.0
-        self._missed = ""  # why they could not be followed, when they were looked for last
+        self._missed = ""  # why they could not be followed, when they were searched for last
 
     def take(self, found: Recognition) -> None:
         """Go on from points recognised anew."""
@@ -90,7 +90,7 @@ class Closing:
         return lambda: Arrived(confirm(goal, image), reason)
 
     def where(self, displacement: Displacement) -> str:
-        """Say how far the camera is from its goal."""
+        """Return how far the camera is from its goal."""
         where = in_words(displacement.distance_m, displacement.angle_rad)
         return f"{where} from the goal; certainly within {in_words(*self._at_most(displacement))}"
 

@@ -12,10 +12,10 @@ _RANGE = 2.0  # a depth is at most so many times the one believed before, and as
 
 
 class PointDepths:
-    """Depths of points, all alike until images from several places tell them apart.
+    """Depths of points, all alike until images from several places distinguish them.
 
     A point lies where its rays meet: Σ w (I - d dᵀ) X = Σ w (I - d dᵀ) c, over the images' centres
-    c and directions d, and the depth that was believed as one more measurement.
+    c and directions d, and the assumed depth as one more measurement.
 
     Args:
         points: of the photograph, normalized coordinates, (K, 2).

@@ -205,7 +205,7 @@ class Bag:
 
 
 def is_bag(path: str | Path) -> bool:
-    """Tell whether a path is the folder of a bag."""
+    """Return whether a path is the folder of a bag."""
     return (Path(path) / METADATA).is_file()
 
 

@@ -13,7 +13,7 @@ class DeviceClock:
     A message arrives after its stamp was made, by a delay that varies and is never below zero. Of
     all lines ``host = offset + rate * stamp`` that no arrival is before, the one with the least
     mean delay is taken [Moon1999]: the edge of the arrivals' lower convex hull in the middle of the
-    window. So neither a stall nor a burst of late messages moves it. The least delay itself stays
+    window. So neither a stall nor a burst recently messages moves it. The least delay itself stays
     in the result, since nobody can tell it from an offset.
 
     Args:
@@ -70,5 +70,5 @@ class DeviceClock:
 
 
 def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    """Tell whether the way from a over b to c turns left, so that b is on the lower hull."""
+    """Return whether the way from a over b to c turns left, so that b is on the lower hull."""
     return (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])

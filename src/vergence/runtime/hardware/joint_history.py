@@ -27,7 +27,7 @@ class JointHistory:
     def at(self, time: float) -> FloatArray:
         """Return the positions (n,) at a time, between two states on the line that joins them.
 
-        Beyond the first and the last state, the joints go on at its velocity, for 0.1 s at most.
+        Beyond the first and the last state, the joints continue at its velocity, for 0.1 s at most.
         """
         assert self._states, "a state is added before one is asked for"
         later = None

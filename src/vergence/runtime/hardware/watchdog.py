@@ -11,7 +11,7 @@ from vergence.signals import Setpoint
 class Watchdog:
     """Stands between a link that may fail and an arm's servo, and is stepped by the servo's clock.
 
-    Between two set-points the arm goes on at the speed of the last one, so that a late message is
+    Between two set-points the arm continues at the speed of the last one, so that a late message is
     not felt. After `patience_s` without any it is braked to rest, and stays there: only a new
     watchdog moves it again. Whatever arrives, no limit of the arm is passed. It waits patiently for
     the first set-point.
@@ -20,7 +20,7 @@ class Watchdog:
         arm: the arm with its limits.
         start: joint positions now, (n,), rad or m.
         dt: period of the servo, s.
-        patience_s: how long the arm may go on without a word.
+        patience_s: how long the arm may continue without a word.
     """
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float, patience_s: float = 0.1) -> None:

@@ -72,7 +72,7 @@ def _list(values: Any, kind: str) -> list[Any] | None:
 
 
 def _value(value: Any, kind: str) -> Any:
-    """Return a value if it is of a kind, else what stands for one that is not known."""
+    """Return a value if it is of a kind, else what represents an unknown one."""
     match kind:
         case "number":
             known = isinstance(value, int | float) and not isinstance(value, bool)

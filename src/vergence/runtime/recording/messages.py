@@ -29,7 +29,7 @@ from vergence.signals import ImagePoints, SearchWindows
 
 NANOSECONDS = 1_000_000_000
 
-# Okabe and Ito's palette: told apart by colour-blind readers too.
+# Okabe and Ito's palette: distinguished by colour-blind readers too.
 FOUND = Color(r=0.0, g=0.62, b=0.45, a=1.0)
 LOST = Color(r=0.84, g=0.37, b=0.0, a=1.0)
 DESIRED = Color(r=0.94, g=0.89, b=0.26, a=1.0)

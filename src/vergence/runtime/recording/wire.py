@@ -1,7 +1,7 @@
 """Just enough of protobuf's wire format to read our own images and events back.
 
 The viewers' message types are protobuf; three fields of two of them are all we need again, so
-this stands in for a protobuf library.
+this replaces a protobuf library.
 """
 
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""Arrays that grow by rows while a run goes on."""
+"""Arrays that grow by rows while a run continues."""
 
 from collections.abc import Mapping
 from dataclasses import field, fields
@@ -28,7 +28,7 @@ class Columns(Generic[Table]):
 
     Args:
         table: the class of the table, its fields declared by `column`.
-        joints: what "n" stands for.
+        joints: what "n" means.
         most: how many rows to keep; the older half is dropped where there would be more.
     """
 

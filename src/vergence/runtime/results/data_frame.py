@@ -67,7 +67,7 @@ def named_arrays(run: "Run") -> dict[str, Any]:
 
 
 def _traces(run: "Run") -> dict[str, AnyTrace]:
-    """Return everything with rows by its name; a camera called as an arm is told apart."""
+    """Return everything with rows by its name; a camera called as an arm is distinguished."""
     cameras = {f"camera {n}" if n in run.arms else n: one for n, one in run.cameras.items()}
     target: Mapping[str, AnyTrace] = {} if run.target is None else {"target": run.target}
     return {**run.arms, **cameras, **target}

@@ -105,7 +105,7 @@ def _camera_errors(trace: CameraTrace | None, time: FloatArray) -> tuple[FloatAr
 
 
 def _exposed_at(trace: CameraTrace, time: FloatArray) -> tuple[BoolArray, IntArray]:
-    """Tell at which times an image was exposed whose truth is known, and in which row, (K,)."""
+    """Return at which times an image was exposed whose truth is known, and in which row, (K,)."""
     known = np.flatnonzero(np.isfinite(trace.T_world_target[:, 0, 0]))
     if not len(known):
         return np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.int64)

@@ -55,7 +55,7 @@ class CameraTrace(Trace):
     covariance_px: FloatArray = column("M", 2, 2)  # (K, M, 2, 2) px²
     found: BoolArray = column("M", kind=bool)  # (K, M)
     reasons: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) of M: why not found
-    asked: BoolArray = column("M", kind=bool)  # (K, M) whether it was looked for
+    asked: BoolArray = column("M", kind=bool)  # (K, M) whether it was searched for
     window_center_px: FloatArray = column("M", 2)  # (K, M, 2) predicted places; NaN without window
     window_half_px: FloatArray = column("M", 2)  # (K, M, 2) half the sizes of the windows
     joined: BoolArray = column("M", kind=bool)  # (K, M) see `ImagePoints`: points of curves

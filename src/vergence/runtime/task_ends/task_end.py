@@ -27,7 +27,7 @@ class Moment(NamedTuple):
 
 
 def looks_for_target(end: object) -> bool:
-    """Tell whether an end needs the target to be looked for, even by a task that needs none."""
+    """Return whether an end needs the target to be searched for, even by a task that needs none."""
     return bool(getattr(end, "looks_for_target", False))
 
 

@@ -12,7 +12,7 @@ from vergence.vision.curves.patch import patch_at
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 
-POINTS = 16  # that stand for the ellipse
+POINTS = 16  # that represent the ellipse
 _APART_PX = 4.0  # along the ellipse, between places where edges are searched
 _FEWEST, _MOST = 24, 96  # such places
 _LEAST_SEMI_AXIS_PX = 4.0
@@ -39,7 +39,7 @@ class EllipseTracker:
 
     Edges are searched along the normals of the ellipse of the last image; the ellipse is fitted to
     them, which is linear in its centre and in the symmetric matrix S of its points c + S u. What is
-    measured flows on as `POINTS` points c + S u at equal angles of u: they stand for the ellipse,
+    measured flows on as `POINTS` points c + S u at equal angles of u: they represent the ellipse,
     and are no marks on the object.
 
     Args:
@@ -70,7 +70,7 @@ class EllipseTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that stand for the ellipse where it was last found, (POINTS, 2)."""
+        """The points that represent the ellipse where it was last found, (POINTS, 2)."""
         return self._last.shape.points(POINTS)
 
     @property
@@ -83,7 +83,7 @@ class EllipseTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: points of the ellipse as it is expected, (POINTS, 2); None to go on as
+            predicted_px: points of the ellipse as it is expected, (POINTS, 2); None to continue as
                 between the last two images.
         """
         expected = self._expected(predicted_px)
@@ -221,7 +221,7 @@ def _curvature(root: FloatArray, units: FloatArray) -> FloatArray:
 
 
 def _tracks(found: EllipseFit) -> Tracks:
-    """Return the points that stand for an ellipse, each with its covariance."""
+    """Return the points that represent an ellipse, each with its covariance."""
     units = unit_vectors(POINTS)
     zero = np.zeros(POINTS)
     ux, uy = units.T

@@ -26,7 +26,7 @@ class EllipseTracking:
         return EllipseTracker(image, points_px, self.reach_px, self.contrast, self.least_share)
 
     def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """Return the points that stand for the ellipse through five or more, (POINTS, 2).
+        """Return the points that represent the ellipse through five or more, (POINTS, 2).
 
         Raises:
             InputError: if no ellipse goes through them.

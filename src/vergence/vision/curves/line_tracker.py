@@ -37,7 +37,7 @@ class Line(NamedTuple):
         return cls(first + (along @ (middle - first)) * along, along)
 
     def points(self, size: tuple[int, int]) -> FloatArray:
-        """Return the two points that stand for it in an image of a width and height, (2, 2)."""
+        """Return the two points that represent it in an image of a width and height, (2, 2)."""
         half = half_length(size)
         return np.stack((self.foot - half * self.along, self.foot + half * self.along))
 
@@ -55,7 +55,7 @@ class LineTracker:
 
     Edges are searched along the normals of the lines of the last image, and lines fitted to them.
     What is measured flows on as two points a line, `half_length` to both sides of its foot, the
-    point nearest to the middle of the image: they stand for the line, wherever it ends.
+    point nearest to the middle of the image: they represent the line, wherever it ends.
 
     Args:
         image: the first image, grey.
@@ -91,7 +91,7 @@ class LineTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that stand for the lines where they were last found, (2 L, 2)."""
+        """The points that represent the lines where they were last found, (2 L, 2)."""
         return np.concatenate([fit.line.points(self._size) for fit in self._last])
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
@@ -99,7 +99,7 @@ class LineTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: two points on each line as it is expected, (2 L, 2); None to go on as
+            predicted_px: two points on each line as it is expected, (2 L, 2); None to continue as
                 between the last two images.
         """
         grey, reason = grey_image(image)
@@ -178,7 +178,7 @@ class LineTracker:
 
 
 def half_length(size: tuple[int, int]) -> float:
-    """Return how far the points that stand for a line are from its foot, px."""
+    """Return how far the points that represent a line are from its foot, px."""
     return 0.25 * min(size)
 
 
@@ -207,7 +207,7 @@ def _refused(reason: str) -> InputError:
 
 
 def _covariance(found: LineFit, half: float) -> FloatArray:
-    """Return the covariance of the points that stand for a line, (2, 2, 2), px²."""
+    """Return the covariance of the points that represent a line, (2, 2, 2), px²."""
     across = np.outer(found.line.normal, found.line.normal)
     along = np.outer(found.line.along, found.line.along)
     ends = np.array([[1.0, -half], [1.0, half]])

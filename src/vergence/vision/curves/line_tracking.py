@@ -25,7 +25,7 @@ class LineTracking:
         return LineTracker(image, points_px, self.reach_px, self.length_px, self.contrast)
 
     def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """Return the points that stand for the lines through pairs, (2 L, 2).
+        """Return the points that represent the lines through pairs, (2 L, 2).
 
         Raises:
             InputError: if they make no lines.

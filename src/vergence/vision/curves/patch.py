@@ -92,7 +92,7 @@ def _in_window(window: ImageArray, place: FloatArray, light: bool | None) -> Pat
 
 
 def _reaches(curves: list[FloatArray], place: FloatArray) -> bool:
-    """Tell whether a place lies in a patch, or within a few pixels of it."""
+    """Return whether a place lies in a patch, or within a few pixels of it."""
     import cv2
 
     first, *holes = [curve.astype(np.float32)[:, None] for curve in curves]

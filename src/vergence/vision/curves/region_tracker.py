@@ -11,7 +11,7 @@ from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rin
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 
-OUTLINE_POINTS, HOLE_POINTS = 48, 16  # that stand for the outline, and for each hole
+OUTLINE_POINTS, HOLE_POINTS = 48, 16  # that represent the outline, and for each hole
 _LEAST_AREA_PX = 60.0
 _LEAST_HOLE = 0.01  # share of the region's area from which a hole counts
 _CHANGE = 1.6  # of the area from one image to the next, at most
@@ -22,7 +22,7 @@ _WINDOW = 1.3  # of the region's half size, for the first window around it
 class Region(NamedTuple):
     """A region in one image."""
 
-    points_px: FloatArray  # (M, 2) that stand for it, see `joined_rings`
+    points_px: FloatArray  # (M, 2) that represent it, see `joined_rings`
     covariance_px: FloatArray  # (M, 2, 2)
     area_px: float  # without its holes
     holes: int
@@ -57,7 +57,7 @@ class RegionTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that stand for the region where it was last found, (M, 2)."""
+        """The points that represent the region where it was last found, (M, 2)."""
         return self._last.points_px.copy()
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
@@ -65,7 +65,7 @@ class RegionTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: points that stand for it where it is expected, (M, 2); None to go on as
+            predicted_px: points that represent it where it is expected, (M, 2); None to continue as
                 between the last two images.
         """
         last = self._last.points_px

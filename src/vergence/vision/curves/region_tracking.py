@@ -22,7 +22,7 @@ class RegionTracking:
         return RegionTracker(image, points_px, self.holes)
 
     def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """Return the points that stand for the region within an outline, (M, 2).
+        """Return the points that represent the region within an outline, (M, 2).
 
         Raises:
             InputError: if it encloses nothing.

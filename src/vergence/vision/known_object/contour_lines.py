@@ -14,7 +14,7 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision.known_object.color_model import add_color, bin_of, direction_of
 from vergence.vision.known_object.silhouette import Outline
 
-REACH = 6  # segments to either side, where the contour is looked for
+REACH = 6  # segments to either side, where the contour is searched for
 BEYOND = 4  # segments beyond the reach that are read
 LEAST_DEEP_PX = 3.0  # thinner parts of the object, or of what is beside it, tell nothing
 _AMPLITUDE = 0.43  # how much a pixel at full distance is believed, [Stoiber2022]
@@ -28,7 +28,7 @@ class ContourLines(NamedTuple):
 
     offsets_px: FloatArray  # (N,) along the normal, from the place on the outline
     information: FloatArray  # (N,) inverse variance, 1/px²; 0 where the line tells nothing
-    usable: BoolArray  # (N,) within the image, and both sides are deep enough to be told apart
+    usable: BoolArray  # (N,) within the image, and both sides are deep enough to be distinguished
     deep_odds: FloatArray  # (N,) mean log odds of the pixels that are inside in any case
 
 
@@ -80,7 +80,7 @@ def _first_pixel(outline: Outline, n: int) -> tuple[float, float]:
 
 @njit(cache=True)
 def _within(image: ImageArray, outline: Outline, n: int, slant: float) -> bool:
-    """Tell whether the least of a line that tells anything lies in the image."""
+    """Return whether the least of a line that tells anything lies in the image."""
     for far in (-(LEAST_DEEP_PX + 1.0) * slant, (LEAST_DEEP_PX + 1.0) * slant):
         u = outline.points_px[n, 0] + far * outline.normals[n, 0]
         v = outline.points_px[n, 1] + far * outline.normals[n, 1]

@@ -151,7 +151,7 @@ def _crowded(
     length: float,
     apart_px: float,
 ) -> bool:
-    """Tell whether another edge runs beside an arm, so that one may be taken for the other."""
+    """Return whether another edge runs beside an arm, so that one may be taken for the other."""
     at = 0.5 * min(length, LONGEST_PX)
     x, y = u + at * direction[0], v + at * direction[1]
     for e in range(len(lines)):
@@ -213,7 +213,7 @@ def _arm(
 class CornerExtractor:
     """Measures corners of a known object to a fraction of a pixel, in windows only.
 
-    From the predicted pose follow the edges that meet in a corner. Each is looked for along lines
+    From the predicted pose follow the edges that meet in a corner. Each is searched for along lines
     across its prediction; the steps that most profiles agree on make a line, and the lines are met
     with the covariance that their scatter tells.
     """

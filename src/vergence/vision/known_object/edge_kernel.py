@@ -25,7 +25,7 @@ from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.shift_vote import vote_shift
 
 _FINE_REACH_PX = 5
-_DOUBLE_PX = 5.0  # edges nearer to each other are not told apart
+_DOUBLE_PX = 5.0  # edges nearer to each other are not distinguished
 _LEARNED_PX = 1.0
 _RATE_GAIN = 0.1  # of one image: ten are remembered
 _REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
@@ -85,7 +85,7 @@ def measure_edges(
 
 @njit(cache=True)
 def learn_edges(memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
-    """Return the memory after an image that was believed; see `EdgeTracker.remember`."""
+    """Return the memory after an image that was accepted; see `EdgeTracker.remember`."""
     templates, known, rate = memory.templates.copy(), memory.known.copy(), memory.rate.copy()
     for n in range(len(seen.samples.edge)):
         e, k, j = seen.samples.edge[n], seen.samples.place[n], seen.fit.chosen[n]
@@ -149,7 +149,7 @@ def _width(fit: PoseFit, steps: Steps) -> float:
 def _usual(
     memory: EdgeMemory, samples: EdgeSamples, readable: BoolArray, found: BoolArray
 ) -> float:
-    """Return the share found of the places, each weighing as often as it was found of late.
+    """Return the share found of the places, each weighing as often as it was found recently.
 
     Some edges of an object are never seen, for want of contrast; they say nothing.
     """

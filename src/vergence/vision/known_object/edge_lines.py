@@ -1,6 +1,6 @@
 """What the samples of an edge say together: a line, told by two points.
 
-A line has two numbers. They are handed on as the distances across the edge at two places, one
+A line has two numbers. They are passed on as the distances across the edge at two places, one
 standard deviation of the samples to either side of their middle, where least squares makes their
 errors independent. Each place is a point of the object measured well across its edge and hardly at
 all along it, which is a point with a long covariance to any filter of points.
@@ -33,7 +33,7 @@ def edge_points(
     """Return points (M, 3), places (M, 2), covariances (M, 2, 2): two an edge, one a short one.
 
     Args:
-        fit: the pose fitted to the image; only what the image says is handed on, not the pose.
+        fit: the pose fitted to the image; only what the image says is passed on, not the pose.
         lens: packed camera, (11,).
         samples: on the edges, those of one edge beside each other.
         steps: across each of them.

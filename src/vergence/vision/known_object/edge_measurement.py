@@ -34,7 +34,7 @@ class EdgeMemory(NamedTuple):
 
     templates: FloatArray  # (E, P, 9) grey profiles, mean 0, norm 1
     known: BoolArray  # (E, P) whether there is one
-    rate: FloatArray  # (E, P) how often each was found of late, 0 … 1
+    rate: FloatArray  # (E, P) how often each was found recently, 0 … 1
 
 
 class EdgeMeasurement(NamedTuple):
@@ -46,7 +46,7 @@ class EdgeMeasurement(NamedTuple):
     T_camera_target: FloatArray  # (4, 4) the pose that fits this image
     expected: int  # places on edges that should be seen
     found: int  # of them, where an edge was found that looks as remembered
-    usual: float  # the same as a share, each place weighing as often as it was found of late
+    usual: float  # the same as a share, each place weighing as often as it was found recently
     samples_px: FloatArray  # (N, 2) the places, under the fitted pose
     samples_found: BoolArray  # (N,)
     fit: PoseFit

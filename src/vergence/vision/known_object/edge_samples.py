@@ -139,7 +139,7 @@ def _edge_runs(samples: EdgeSamples, margin_px: float) -> tuple[IntArray, FloatA
 
 @njit(cache=True)
 def _runs_beside(samples: EdgeSamples, n: int, first: int, last: int, apart_px: float) -> bool:
-    """Tell whether one of the samples first … last - 1 lies to the side of sample n, parallel."""
+    """Return whether one of the samples first … last - 1 lies to the side of sample n, parallel."""
     p, normal = samples.points_px[n], samples.normals[n]
     for m in range(first, last):
         du, dv = samples.points_px[m, 0] - p[0], samples.points_px[m, 1] - p[1]

@@ -116,7 +116,7 @@ class EdgeTracker:
         return seen
 
     def remember(self, memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
-        """Return the memory after an image that was believed.
+        """Return the memory after an image that was accepted.
 
         Places whose step is right where the fitted pose wants it are learned anew, little by
         little, whatever they look like: backgrounds change, and faces turn.

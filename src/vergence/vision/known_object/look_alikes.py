@@ -95,7 +95,7 @@ def _places_on_edges(model: ObjectModel) -> FloatArray:
 
 
 def _near_edges(model: ObjectModel, places: FloatArray) -> bool:
-    """Tell whether all places (N, 3) lie on edges of an object."""
+    """Return whether all places (N, 3) lie on edges of an object."""
     start, along = model.edges[:, 0], model.edges[:, 1] - model.edges[:, 0]
     ahead = places[:, None] - start
     share = np.clip(np.einsum("nej,ej->ne", ahead, along) / np.sum(along**2, axis=1), 0.0, 1.0)

@@ -114,7 +114,7 @@ def corner_table(vertices: FloatArray, ends: IntArray) -> tuple[IntArray, IntArr
 
 
 def _turns(vertices: FloatArray, ends: IntArray, vertex: int, edges: list[int]) -> bool:
-    """Tell whether two of the edges at a vertex differ in direction."""
+    """Return whether two of the edges at a vertex differ in direction."""
     far = vertices[ends[edges].sum(axis=1) - vertex] - vertices[vertex]
     directions = far / np.linalg.norm(far, axis=1, keepdims=True)
     return bool(
@@ -123,7 +123,7 @@ def _turns(vertices: FloatArray, ends: IntArray, vertex: int, edges: list[int]) 
 
 
 def is_closed(triangles: IntArray) -> bool:
-    """Tell whether every edge has two triangles that run along it in opposite directions."""
+    """Return whether every edge has two triangles that run along it in opposite directions."""
     start = triangles.reshape(-1)
     end = np.roll(triangles, -1, axis=1).reshape(-1)
     count = int(triangles.max()) + 1

@@ -16,7 +16,7 @@ _VIEWS_RAD = ((0.5, 0.3, 0.0), (1.3, 0.2, 0.4), (0.4, 1.2, -0.5), (2.2, 0.5, 0.6
 
 
 def shown_by_edges(model: ObjectModel) -> bool:
-    """Tell whether an object has corners, and its outline runs along sharp edges mostly.
+    """Return whether an object has corners, and its outline runs along sharp edges mostly.
 
     A box does; a can has two sharp rims, but round sides.
     """
@@ -27,12 +27,12 @@ def shown_by_edges(model: ObjectModel) -> bool:
 
 
 def has_corners(model: ObjectModel) -> bool:
-    """Tell whether sharp edges of an object meet: the points of a box that stand for it do not."""
+    """Return whether sharp edges of an object meet: the points of a box that represent it do not."""
     return bool((model.corner_edges >= 0).any())
 
 
 def as_followed(model: ObjectModel) -> ObjectModel:
-    """Return an object with the points that stand for it: its corners, or those of a box inside."""
+    """Return an object with the points that represent it: its corners, or those of a box inside."""
     return model if has_corners(model) or shown_by_edges(model) else model.boxed()
 
 

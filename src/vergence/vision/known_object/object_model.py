@@ -127,7 +127,7 @@ class ObjectModel:
     def boxed(self) -> Self:
         """Return the model with the corners of a box inside for its own, (8, 3).
 
-        They stand for an object that is followed as a whole: no image shows them. The box is half
+        They represent an object that is followed as a whole: no image shows them. The box is half
         as large as the one around the object, of which half may be hidden or out of the image.
         """
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)

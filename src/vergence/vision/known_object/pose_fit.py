@@ -168,7 +168,7 @@ def shifted(T: FloatArray, lens: FloatArray, dx: float, dy: float) -> FloatArray
 
 @njit(cache=True)
 def agreeing(fit: PoseFit, steps: Steps, likeness: float, tolerance_px: float) -> BoolArray:
-    """Tell which samples found their edge: a step near it that looks as remembered."""
+    """Return which samples found their edge: a step near it that looks as remembered."""
     found = np.zeros(len(fit.chosen), dtype=np.bool_)
     for n in range(len(found)):
         j = fit.chosen[n]

@@ -86,7 +86,7 @@ def face_table(T: FloatArray, surface: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def hidden(table: FloatArray, x: float, y: float, z: float) -> bool:
-    """Tell whether a face of the table is before a point at normalized (x, y) and depth z."""
+    """Return whether a face of the table is before a point at normalized (x, y) and depth z."""
     nearest = (1.0 + HIDDEN_SLACK) / z
     for n in range(len(table)):
         row = table[n]
@@ -106,7 +106,7 @@ def hidden(table: FloatArray, x: float, y: float, z: float) -> bool:
 def edge_faces_camera(
     T: FloatArray, point: FloatArray, normals: FloatArray, least_cosine: float
 ) -> bool:
-    """Tell whether one of the two faces (2, 3) at an edge is seen from its front.
+    """Return whether one of the two faces (2, 3) at an edge is seen from its front.
 
     Args:
         T: pose of the object in the camera, (4, 4).

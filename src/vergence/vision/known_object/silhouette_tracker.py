@@ -83,7 +83,7 @@ class SilhouetteMemory(NamedTuple):
     """What an object looked like."""
 
     colors: ColorModel
-    share: float  # of its outline that was found of late, 0 … 1
+    share: float  # of its outline that was found recently, 0 … 1
 
 
 class _Prior(NamedTuple):
@@ -174,7 +174,7 @@ class SilhouetteTracker:
         return seen
 
     def remember(self, memory: SilhouetteMemory, seen: SilhouetteMeasurement) -> SilhouetteMemory:
-        """Return the memory after an image that was believed."""
+        """Return the memory after an image that was accepted."""
         if not memory.colors.known:
             return SilhouetteMemory(seen.colors, seen.share)
         colors: ColorModel = memory.colors
@@ -185,7 +185,7 @@ class SilhouetteTracker:
     def _sought(
         self, pixels: ImageArray, lens: FloatArray, prior: _Prior, memory: SilhouetteMemory
     ) -> SilhouetteMeasurement:
-        """Look close to the prediction; farther away if less is found there than of late.
+        """Look close to the prediction; farther away if less is found there than recently.
 
         Something that comes before the object draws a wide search towards itself.
         """

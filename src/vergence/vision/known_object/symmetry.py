@@ -102,7 +102,7 @@ def _mask(model: ObjectModel, closed: bool, R: FloatArray, centre: FloatArray) -
 
 
 def _differ(one: BoolArray, other: BoolArray) -> bool:
-    """Tell whether two masks differ by three cells across somewhere."""
+    """Return whether two masks differ by three cells across somewhere."""
     import cv2
 
     different = (one != other).view(np.uint8)

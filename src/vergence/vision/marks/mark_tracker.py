@@ -13,7 +13,7 @@ SLACK_PX = 10.0  # by which a window exceeds its mark on every side
 
 
 class MarkTracker:
-    """A point tracker for marks: each is looked for where its last motion leads.
+    """A point tracker for marks: each is searched for where its last motion leads.
 
     Args:
         image: the first image, (height, width) grey.
@@ -32,7 +32,7 @@ class MarkTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: where to look, (M, 2); None to go on as between the last two images.
+            predicted_px: where to look, (M, 2); None to continue as between the last two images.
         """
         expected = 2 * self._points - self._before if predicted_px is None else predicted_px
         nothing = np.full(len(expected), np.nan)

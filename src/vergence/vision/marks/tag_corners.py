@@ -1,8 +1,8 @@
 """The corners of a square marker where the lines along its sides meet, with covariance.
 
-A corner itself is rounded by blur; the sides stay in the middle of their blur. Each side is looked
-for across its whole length, and how far its places scatter about a line says how well the line
-is known.
+A corner itself is rounded by blur; the sides stay in the middle of their blur. Each side is
+searched for across its whole length, and how far its places scatter about a line says how well the
+line is known.
 """
 
 import numpy as np

@@ -51,7 +51,7 @@ class _TagTracker:
         self._points = np.array(points_px, dtype=np.float64)
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
-        """Find the corners in a new image; markers are looked for in all of it."""
+        """Find the corners in a new image; markers are searched for in all of it."""
         grey, reason = grey_image(image)
         if grey is None:
             return nothing_found(self._points, reason)

@@ -38,7 +38,7 @@ def compare_images(
     matcher: Matcher,
     described_star: Any = None,
 ) -> Compared | TwoViewFailure:
-    """Match two images and find the motion between them, or say why none is to be believed.
+    """Match two images and find the motion between them, or say why none is acceptable.
 
     The motion has to explain more matches than chance would (`estimate_two_view`), at least
     `FEWEST`, and they have to span a part of both images. Where the matcher finds too little, its
@@ -84,13 +84,13 @@ def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
 
 
 def _ahead(depth: FloatArray) -> BoolArray:
-    """Tell which points (N,) are not at the camera or behind it, as wrong matches may be."""
+    """Return which points (N,) are not at the camera or behind it, as wrong matches may be."""
     ahead: BoolArray = depth > _LEAST_OF_MEDIAN * np.nanmedian(depth)  # never true of NaN
     return ahead
 
 
 def _turned(matches: Matches, camera: Camera, R: FloatArray) -> np.ndarray:
-    """Tell which matches a turn of the camera explains, (N,)."""
+    """Return which matches a turn of the camera explains, (N,)."""
     rays = np.column_stack((camera.normalize(matches.points_px), np.ones(len(matches.points_px))))
     turned = rays @ R.T
     ahead: np.ndarray = turned[:, 2] > 1e-3
@@ -128,7 +128,7 @@ def _too_little(matches: Matches, camera: Camera) -> str:
 
 
 def _turned_over(matches: Matches) -> bool:
-    """Tell whether the best affine map between the points turns them over."""
+    """Return whether the best affine map between the points turns them over."""
     now, desired = (points - points.mean(axis=0) for points in matches[:2])
     return bool(np.linalg.det(np.linalg.lstsq(now, desired, rcond=None)[0]) < 0.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import ImageArray
 
-_WHITE, _BLACK = 250, 5  # grey levels beyond which nothing is told apart
+_WHITE, _BLACK = 250, 5  # grey levels beyond which nothing is distinguished
 _MOST = 0.4  # share of the image that may be white, or black
 _CONTRAST = 4.0  # grey levels, standard deviation
 _SHARP = 0.4  # of the contrast of the fourth octave that the second has in a sharp image
@@ -29,7 +29,7 @@ def image_fault(image: ImageArray) -> str:
 
 
 def _is_blurred(image: ImageArray) -> bool:
-    """Tell whether the second octave of an image has much less contrast than the fourth.
+    """Return whether the second octave of an image has much less contrast than the fourth.
 
     The first is as much of noise as of sharpness.
     """

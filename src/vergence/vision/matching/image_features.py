@@ -1,4 +1,4 @@
-"""Features of an image as descriptors tell them apart, and how those of two images are matched."""
+"""Features of an image as descriptors distinguish them, and how those of two images are matched."""
 
 from typing import NamedTuple
 

@@ -18,7 +18,7 @@ class Matches(NamedTuple):
 
 
 class Matcher(Protocol):
-    """Finds the points of one image again in another: the place for a matcher of one's own.
+    """Finds the points of one image again in another: the place for a matcher of a user's own.
 
     An image is described once and may be matched often, as a goal is.
     """

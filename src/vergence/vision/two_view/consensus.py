@@ -48,7 +48,7 @@ def agreements(views: Views) -> list[Agreement]:
 
 
 def off_plane(views: Views, near: BoolArray, kept: BoolArray, error: float) -> bool:
-    """Tell whether more matches agree with a motion off a plane than chance explains.
+    """Return whether more matches agree with a motion off a plane than chance explains.
 
     Args:
         views: all matches.
@@ -109,7 +109,7 @@ def log_chance_of_flatness(plane: Fit, views: Views, near: BoolArray) -> float:
 
 @njit(cache=True)
 def distinct_matches(points: FloatArray, points_star: FloatArray, apart: float) -> BoolArray:
-    """Tell which matches (N,) lie farther than `apart` from all chosen before, in both views."""
+    """Return which matches (N,) lie farther than `apart` from all chosen before, in both views."""
     chosen = np.zeros(len(points), dtype=np.bool_)
     for j in range(len(points)):
         alone = True

@@ -69,7 +69,7 @@ def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoVie
 
 
 def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
-    """Return the first explanation that is to be believed, or why the likeliest is not."""
+    """Return the first acceptable explanation, or why the likeliest is not."""
     tried = views.take(usable)
     if len(tried) == 4 and flat:
         sets = [np.ones(4, dtype=np.bool_)]
@@ -124,7 +124,7 @@ def _agreeing(fit: Fit, scale: float, views: Views) -> BoolArray:
 
 
 def _doubted(comparison: Comparison, views: Views, flat: bool) -> TwoViewFailure | None:
-    """Return why an explanation is not to be believed, if it is not."""
+    """Return why an explanation is rejected, if it is not."""
     fit = comparison.fits[0]
     if flat and len(fit.views) == len(views):
         return None

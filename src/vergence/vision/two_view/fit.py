@@ -85,7 +85,7 @@ class Fit:
         return float(np.minimum(squares, _CAP).sum())
 
     def differs_from(self, other: "Fit") -> bool:
-        """Tell whether two motions of a general object are not one."""
+        """Return whether two motions of a general object are not one."""
         turn = so3_log(np.ascontiguousarray(self.state.R.T @ other.state.R))
         cosine = np.clip(self.state.t @ other.state.t, -1.0, 1.0)
         return bool(np.linalg.norm(turn) > TURNED or np.arccos(cosine) > AIMED)

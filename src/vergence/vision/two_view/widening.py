@@ -135,7 +135,7 @@ def widen_for_plane(
 
 @njit(cache=True)
 def seen_by_both(R: FloatArray, t: FloatArray, n: FloatArray, rays: FloatArray) -> bool:
-    """Tell whether the points of a plane lie before both cameras, on the side that both see."""
+    """Return whether the points of a plane lie before both cameras, on the side that both see."""
     for j in range(len(rays)):
         inverse_rho_star = dot(rays[j], n)
         if inverse_rho_star <= 0.0 or dot(R[2], rays[j]) + inverse_rho_star * t[2] <= 0.0:

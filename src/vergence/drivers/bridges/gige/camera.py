@@ -149,7 +149,7 @@ class GigeCamera:
 
 
 def answers(address: str) -> bool:
-    """Tell whether a camera answers; Aravis would ask for seconds.
+    """Return whether a camera answers; Aravis would ask for seconds.
 
     Any program may read GigE Vision's register 0, the version, beside the one that has control.
     """

@@ -54,7 +54,7 @@ def _camera() -> ModuleType:
 
 
 def _work(wire: Wire, settings: dict[str, Any], library: Any) -> None:
-    """Deliver images until that cannot go on, and say why."""
+    """Deliver images until that cannot continue, and say why."""
     Thread(target=_end_with, args=(wire,), daemon=True).start()
     try:
         camera = library.GigeCamera(settings)

@@ -67,7 +67,7 @@ def _name(frame: str) -> str:
 
 
 def _apart(a: Transform, b: Transform) -> bool:
-    """Tell whether two transforms differ; a quaternion and its negative are the same."""
+    """Return whether two transforms differ; a quaternion and its negative are the same."""
     sign = 1.0 if sum(x * y for x, y in zip(a[3:], b[3:], strict=True)) >= 0.0 else -1.0
     turned = any(abs(x - sign * y) > _STILL for x, y in zip(a[3:], b[3:], strict=True))
     return turned or any(abs(x - y) > _STILL for x, y in zip(a[:3], b[:3], strict=True))

@@ -69,7 +69,7 @@ class Bridge:
         self._gone.set()
 
     def _trouble(self) -> str:
-        """Return why this cannot go on."""
+        """Return why this cannot continue."""
         settings, now = self._settings, monotonic()
         if now - self._topics.heard > settings["timeout_s"]:
             topic, silent = settings["joint_states"], settings["timeout_s"]

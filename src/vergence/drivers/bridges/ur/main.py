@@ -20,7 +20,7 @@ _FAREWELL_S = 2.0  # for the driver to read why the bridge ends
 class Bridge:
     """Hands the driver's set-points to the robot, and the robot's joints to the driver.
 
-    A driver that is silent is the business of the robot's watchdog, since set-points are handed on
+    A driver that is silent is the business of the robot's watchdog, since set-points are passed on
     as they come. Once the driver has hung up, the arm is stopped.
 
     Args:

@@ -19,8 +19,8 @@ _PROTECTIVE = (3, 4, 5)  # protective stop, recovery, safeguard stop: they can b
 _TEACH_BUTTON = 1 << 2  # of the status bits: the button for free drive on the pendant
 _SLOWEST = 0.01  # of the speed slider; below it the robot is taken for stopped
 _ON = 0.5  # of an output's value, 0 to 1
-_HELD_UP_S = 0.1  # between two looks at the clock: a busy computer is no robot that stands
-_SENT_S = 1.0  # in which a set-point is handed on, or never
+_HELD_UP_S = 0.1  # between two looks at the clock: a delay of a busy computer is no stopped robot
+_SENT_S = 1.0  # in which a set-point is passed on, or never
 
 
 class Robot:
@@ -59,7 +59,7 @@ class Robot:
         """Return the joints if they are newer than those before.
 
         Raises:
-            GoneError: if the connection is broken, or the robot's clock stands.
+            GoneError: if the connection is broken, or the robot's clock does not advance.
         """
         receive = self._receive
         if not receive.isConnected():

@@ -7,7 +7,7 @@ import numpy as np
 from vergence.vision.matching.learned.onnx_file import OnnxGraph
 from vergence.vision.matching.learned.torch_file import NumberArray
 
-CELL_PX = 8  # side of the square of the image that a descriptor stands for
+CELL_PX = 8  # side of the square of the image that a descriptor represents
 SIDE_PX = 32  # an image's sides are multiples of it
 _NORM = 1e-5  # of a batch normalisation
 
