@@ -75,7 +75,7 @@ def part_class(role: str, kind: Any, place: Place) -> Any:
 
 
 def names_law(kind: Any, place: Place) -> bool:
-    """Return whether a kind is a whole law of a user's own, rather than an objective of the servo."""
+    """Return whether a kind is a user's whole law, rather than an objective of the servo."""
     if not isinstance(kind, str):
         return False
     if ":" not in kind:

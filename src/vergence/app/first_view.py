@@ -14,7 +14,7 @@ _CLEAR = 0.9  # of the way to the middle that nothing fixed may block
 
 
 def points_in_view(world: CellModel) -> FloatArray:
-    """Return what a view of a cell in its present state should show, (K, 3): from the arm to the target."""
+    """Return the points that a first view of a cell shows, (K, 3): from arm to target."""
     data, cell = world.data, world.cell
     foot = np.array(cell.arms[cell.task.arm].position_m)
     bodies = [data.xpos[body] for arm in cell.arms for body in sorted(world.bodies_of(arm))]

@@ -117,7 +117,7 @@ def equipment(cell: Cell) -> Equipment:
 
 
 def _settings(cell: Cell, kind: str) -> tuple[dict[str, Any], Place]:
-    """Return the fields of the cell's `[driver]`, if that is of this kind, and their place in the file."""
+    """Return the fields of the cell's `[driver]`, if it is of this kind, and their place in it."""
     table = _table(cell, kind)
     if table is None:
         return {}, Place("--driver", "", cell.path.parent)

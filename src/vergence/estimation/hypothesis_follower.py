@@ -1,4 +1,4 @@
-"""Follows a known object, compares it with turned poses of itself, and searches for it when lost."""
+"""Follows a known object, compares it with turned poses, and searches for it when lost."""
 
 from collections.abc import Sequence
 from dataclasses import replace

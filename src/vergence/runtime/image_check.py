@@ -100,7 +100,7 @@ class ImageCheck:
 
 
 def _delivered_twice(frame: Frame, seen: _Seen) -> bool:
-    """Return whether a frame is the last one again; a coarse clock may give two images one stamp."""
+    """Return whether a frame is the last one again; a coarse clock repeats time stamps."""
     return frame.time == seen.time and (frame.image is None or _same(frame, seen))
 
 

@@ -33,8 +33,8 @@ def curves_of(joined: BoolArray) -> tuple[Curve, ...]:
 class ImagePoints:
     """The points measured in one image of one camera.
 
-    A curve that was measured, such as an ellipse, is the points that represent it: which ones they
-    are follows from the curve alone, and `joined` says that they make one.
+    A measured curve, such as an ellipse, is represented by points that follow from the curve alone;
+    `joined` says which points belong together.
     """
 
     camera: str
@@ -43,11 +43,13 @@ class ImagePoints:
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
-    windows: SearchWindows | None = None  # None from what has no windows and searches for all
-    points # (M,) whether the curve continues to the next point; after a last one that is joined it
-    closes. # None if every point is a mark alone. joined: BoolArray | None = None # (M,) m,
-    measured by a depth camera, and its standard deviation; NaN where unknown. depth_m: FloatArray |
-    None = None depth_deviation_m: FloatArray | None = None
+    windows: SearchWindows | None = None  # None if all points are searched for everywhere
+    # (M,) whether the curve continues to the next point; after a last one that is joined it closes.
+    # None if no point belongs to a curve.
+    joined: BoolArray | None = None
+    # (M,) m, measured by a depth camera, and its standard deviation; NaN where unknown.
+    depth_m: FloatArray | None = None
+    depth_deviation_m: FloatArray | None = None
 
     @property
     def asked(self) -> BoolArray:

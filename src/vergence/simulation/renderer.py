@@ -120,7 +120,7 @@ class CameraRenderer:
         return np.asarray(grey, dtype=np.uint8)
 
     def depth(self, data: Any, sensor: DepthTable) -> DepthArray:
-        """Return the depth (height, width), m, of the world in its present state; NaN where unknown."""
+        """Return the depth (height, width), m, of the present world; NaN where unknown."""
         import cv2
 
         self._renderer.update_scene(data, self._name)

@@ -262,7 +262,7 @@ def drive(
 
 
 def _nears(scene: Scene, q: FloatArray, rates: FloatArray) -> bool:
-    """Return whether the error falls noticeably at joint rates (n,), by its derivative along them."""
+    """Return whether the error falls noticeably at joint rates (n,), by its derivative."""
     fastest = np.abs(rates).max()
     if fastest == 0.0:
         return False

@@ -273,7 +273,7 @@ class Live:
         self._editor.forget_points()
 
     def _refuse_points(self, error: InputError) -> None:
-        """Return why points cannot be tracked; the arm rests until a page asks for something else."""
+        """Return why points cannot be tracked; the arm rests until another request."""
         self._forget_points()
         self._say("points refused", str(error))
         self.view_state.status(

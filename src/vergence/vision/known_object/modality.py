@@ -27,7 +27,7 @@ def shown_by_edges(model: ObjectModel) -> bool:
 
 
 def has_corners(model: ObjectModel) -> bool:
-    """Return whether sharp edges of an object meet: the points of a box that represent it do not."""
+    """Return whether sharp edges of an object meet; those of a box around it do not count."""
     return bool((model.corner_edges >= 0).any())
 
 
