@@ -93,7 +93,7 @@ def test_the_law_of_the_task_that_runs_is_changed_and_tasks_that_share_it_share_
     assert editor.as_json()["settings"][0] == "laws.second.gain=2.0"
     editor.begin_task(1)
     assert not editor.as_json()["choices"]
-    with pytest.raises(InputError, match="goes by no law"):
+    with pytest.raises(InputError, match="uses no law"):
         editor.turn("gain", 1.0, contexts[1])
     driver.close()
 

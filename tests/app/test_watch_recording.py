@@ -100,7 +100,7 @@ class TestRecordedWorld:
         self, puma_run: Recording
     ) -> None:
         changed = replace(puma_run.info, text=puma_run.info.text + "\nseed = 9")
-        assert "not what it was" in str(RecordedWorld.of(changed))
+        assert "has changed since" in str(RecordedWorld.of(changed))
 
     def test_a_run_of_a_cell_as_it_is_in_its_file_is_shown(self) -> None:
         cell = load_cell("ur5")

@@ -139,7 +139,7 @@ def test_an_arm_with_fewer_motions_than_the_law_asks(tmp_path, law):
 
 def test_an_axis_that_the_arm_does_not_have(tmp_path):
     error = complaint(written(tmp_path, 'kind = "optimal_tracking"\naxes = ["x"]'))
-    assert "no motion of its arm" in str(error.given)
+    assert "has no motion that reduces the error" in str(error.given)
 
 
 def test_the_one_axis_that_it_has_is_served(tmp_path):

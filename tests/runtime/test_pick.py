@@ -121,7 +121,7 @@ def test_a_driver_without_the_output_is_refused_before_anything_moves(wrapper, n
     [
         ({"output": "suktion"}, "tasks.0.output", "did you mean suction"),
         ({"value": 2}, "tasks.0.value", "at most 1"),
-        ({"until": "seen"}, "tasks.0.until", "looks at nothing"),
+        ({"until": "seen"}, "tasks.0.until", "uses no images"),
     ],
 )
 def test_a_wrong_output_is_refused_by_key(change, key, words):

@@ -153,7 +153,7 @@ def test_what_cannot_be_a_tag_is_refused_by_key(
 
 def test_a_reach_refuses_keys_that_a_tag_makes_useless() -> None:
     cell = tagged(task={**REACH, "goal_deg": GOAL_DEG, "distance_m": 0.3})
-    with pytest.raises(InputError, match="the tag tells pose and scale"):
+    with pytest.raises(InputError, match="the tag determines pose and scale"):
         parts_believing(cell, cell)
 
 
