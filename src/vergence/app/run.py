@@ -155,7 +155,7 @@ def _tell_outcome(result: "Run") -> None:
     off_mm = 1e3 * summary.get("final_pose_error_m", 0.0)
     off_deg = summary.get("final_pose_error_deg", 0.0)
     words = [
-        (f"off the desired pose {off_mm:.2f} mm, {off_deg:.2f}°", "final_pose_error_m"),
+        (f"{off_mm:.2f} mm, {off_deg:.2f}° from the desired pose", "final_pose_error_m"),
         (f"final error {summary.get('final_error_px', 0.0):.2f} px", "final_error_px"),
         (f"largest {summary.get('max_error_px', 0.0):.2f} px", "max_error_px"),
         (f"drift {summary.get('max_drift_px', 0.0):.2f} px", "max_drift_px"),

@@ -23,10 +23,10 @@ class Row:
 
 
 def run_rows(run: Run) -> list[Row]:
-    """Return what concerns the whole run, with what the loop itself had to say."""
+    """Return the rows of the whole run, with the advice that the loop gave."""
     rows = [Row("run time", f"{run.duration:.2f}", "s", "from the first tick to the last")]
     if run.info.seed is not None:
-        rows.append(Row("seed", str(run.info.seed), "", "of everything drawn at random"))
+        rows.append(Row("seed", str(run.info.seed), "", "of all random numbers"))
     rows += [
         Row(ADVICE[event.name], "some", "", event.text)
         for event in run.events
@@ -93,7 +93,7 @@ def _lag(trace: CameraTrace) -> str:
 
 
 def arm_rows(info: ArmInfo, trace: ArmTrace) -> list[Row]:
-    """Return how close an arm came to what it must not do."""
+    """Return how close an arm came to its limits."""
     return [*_measure_rows(trace), *_clearance_rows(trace), *_limit_rows(info, trace)]
 
 
@@ -116,12 +116,12 @@ def _clearance_rows(trace: ArmTrace) -> Iterator[Row]:
         distance = clearance(trace, kind)
         if np.isfinite(distance).any():
             nearest = int(np.nanargmin(distance))
-            where = f"at {trace.time[nearest]:.2f}\u00a0s, as the law saw it"
-            yield Row(f"nearest to {name}", f"{1e3 * distance[nearest]:.1f}", "mm", where)
+            where = f"at {trace.time[nearest]:.2f}\u00a0s, as computed by the law"
+            yield Row(f"least distance to {name}", f"{1e3 * distance[nearest]:.1f}", "mm", where)
 
 
 def _limit_rows(info: ArmInfo, trace: ArmTrace) -> Iterator[Row]:
-    """Tell apart what is guaranteed, the set-points, and the joints that follow by their servos."""
+    """Yield rows of the set-points, which are guaranteed, and of the joints, which follow them."""
     for who, q, rates, note in (
         ("set-points", trace.setpoint, trace.setpoint_rate, "kept by the guard"),
         ("joints", trace.position, trace.velocity, "measured; a servo may overshoot"),
@@ -176,10 +176,10 @@ _DERIVED = {  # what the rows of cameras and arms say as well, from the recordin
 
 _NOTES = {
     "real_time": "simulated seconds per second of computation",
-    "final_target_error": "estimated target from the true one, last image",
-    "max_target_error": "estimated target from the true one, any image",
-    "final_pose_error": "task's camera from its desired pose, last image",
-    "max_pose_error": "task's camera from its desired pose, any image",
+    "final_target_error": "between estimated and true target, last image",
+    "max_target_error": "between estimated and true target, any image",
+    "final_pose_error": "between the camera's true and desired pose, last image",
+    "max_pose_error": "between the camera's true and desired pose, any image",
 }
 
 _UNITS = {
@@ -200,7 +200,8 @@ def _summary_row(name: str, value: float | str) -> Row:
     """Read the unit off a name's end, as our names have it."""
     ending = next((end for end in _UNITS if name.endswith(end)), "")
     stem = name.removesuffix(ending)
-    words, unit, note = stem.replace("_", " "), _UNITS.get(ending, ""), _NOTES.get(stem, "")
+    words = stem.replace("_", " ").replace("max ", "largest ").replace("min ", "least ")
+    unit, note = _UNITS.get(ending, ""), _NOTES.get(stem, "")
     if isinstance(value, str):
         return Row(words, value, unit, note)
     if unit == "m" and abs(value) < 0.1:

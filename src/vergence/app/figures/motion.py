@@ -37,7 +37,7 @@ def camera_chart(trace: CameraTrace) -> Chart | None:
 
 
 def estimate_chart(trace: CameraTrace, estimate: TargetTrace | None) -> Chart | None:
-    """Draw how far a filter's target is from the true one, and how far it thinks it might be."""
+    """Draw the error of a filter's target and its stated standard deviation."""
     known = np.isfinite(trace.T_world_target[:, 0, 0])
     if estimate is None or not known.any():
         return None
@@ -52,7 +52,7 @@ def estimate_chart(trace: CameraTrace, estimate: TargetTrace | None) -> Chart | 
     return _chart(
         *(
             Panel(
-                f"estimated target from the true one: {title}",
+                f"error of the estimated target: {title}",
                 (
                     Curve("error", estimate.time, error),
                     Curve("1 σ, as stated by the filter", estimate.time, spread, 1, "dashed"),
@@ -78,7 +78,7 @@ def pose_error_chart(trace: CameraTrace) -> Chart | None:
     return _chart(
         *(
             Panel(
-                f"off the desired pose: {title}", (Curve("", trace.time[known], values),), low=0.0
+                f"distance from the desired pose: {title}", (Curve("", trace.time[known], values),), low=0.0
             )
             for title, values in rows
         )
