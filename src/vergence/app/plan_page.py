@@ -67,8 +67,8 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
         ),
         "space": (
             plan_space_figure(path),
-            "The camera's path; strokes show its viewing direction. The scale follows from the "
-            "believed d*.",
+            "The camera's path; strokes show its viewing direction. The scale follows from "
+            "the assumed distance d*.",
         ),
     }
     figures = []

@@ -124,7 +124,9 @@ def _mark_bases(plane: "Axes", bases: Mapping[str, tuple[float, float]], reach: 
 
 
 def headings_figure(results: Sequence[TrialResult]) -> Panels:
-    """Draw how far the target came in each direction: a row for each law, a column a speed."""
+    """Draw how far the target came in each direction: a row per law, a column per speed."""
+    from matplotlib.ticker import MaxNLocator
+
     laws = _laws(results)
     speeds = sorted({float(result.labels["speed_m_s"]) for result in results})
     longest = max(float(result.labels["distance_m"]) for result in results)
@@ -144,6 +146,10 @@ def headings_figure(results: Sequence[TrialResult]) -> Panels:
             axes.set_rmax(1.05 * longest)
             axes.set_rlabel_position(180.0 / len(own))  # in the gap between two directions
             axes.tick_params(labelsize=7.5)
+            axes.yaxis.set_major_locator(MaxNLocator(3))
+            axes.set_axisbelow(False)  # the distances lie over the bars
+            for distance in axes.yaxis.get_ticklabels():
+                distance.set_bbox({"facecolor": "#ffffff", "edgecolor": "none", "pad": 1.0})
     _legend(drawn, grid[0, -1], dict.fromkeys(result.ending for result in results), "s")
     return Panels(drawn, tuple(grid.ravel()))
 
