@@ -74,7 +74,7 @@ def _speeds(text: str) -> tuple[float, ...]:
     except ValueError:
         speeds = ()
     if not speeds or not all(0 < speed < math.inf for speed in speeds):
-        raise InputError("--speeds", "", text, "positive numbers separated by commas, in m/s")
+        raise InputError("--speeds", "", text, "numbers above zero, separated by commas, in m/s")
     return speeds
 
 
