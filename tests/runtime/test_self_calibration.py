@@ -106,4 +106,4 @@ def test_a_run_tells_it_at_its_end() -> None:
 def test_too_little_motion_is_said() -> None:
     found, _ = servoed(0.0, 0.0, 1.0)
     assert not found
-    assert "tells nothing" in words(found) or "too little motion" in words(found)
+    assert "does not determine" in words(found) or "too little motion" in words(found)
