@@ -133,7 +133,7 @@ def test_a_servo_in_trouble_holds_the_arm_until_it_is_well(servos: Servos, words
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [("silent 4", "no answer from the servos for 2 s"), ("unplug", "is gone|no answer")],
+    [("silent 4", "no answer from the servos for 2 s"), ("unplug", "has disappeared|no answer")],
 )
 def test_servos_that_are_gone_end_by_name(servos: Servos, words: str, said: str) -> None:
     driver = servos.open()
