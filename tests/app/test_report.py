@@ -106,7 +106,9 @@ def test_set_points_and_the_joints_that_follow_them_are_told_apart(recording: Re
     assert measures["joints: fastest"].value == "104"
     assert "overshoot" in measures["joints: fastest"].note
     before = replace(arm, setpoint=np.full_like(arm.setpoint, np.nan))  # an older recording
-    assert "set-points: closest to a joint limit" not in {row.name for row in arm_rows(info, before)}
+    assert "set-points: closest to a joint limit" not in {
+        row.name for row in arm_rows(info, before)
+    }
 
 
 def test_what_gave_way_is_told_with_when_and_by_how_much(recording: Recording) -> None:

@@ -67,7 +67,9 @@ def test_a_page_stops_the_arm_and_nothing_else(
 
     run = page.run(steps, end)
     assert run.outcome.kind is OutcomeKind.STOPPED
-    assert all(text.endswith("allowed: stop; a real arm takes no other command") for text in page.refused)
+    assert all(
+        text.endswith("allowed: stop; a real arm takes no other command") for text in page.refused
+    )
     assert Robot.speed < 1e-9 < fastest[0]  # it was braked
     recorded = Recording.open(tmp_path / "run")
     assert recorded.outcome.kind is OutcomeKind.STOPPED

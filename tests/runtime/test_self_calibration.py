@@ -96,7 +96,9 @@ def test_a_run_tells_it_at_its_end() -> None:
     driver = SimulatedDriver(cell, images=False)
     run = run_driver(cell, driver, (), False, self_calibration=True)
     (told,) = [event for event in run.events if event.name == SELF_CALIBRATION]
-    assert told.text.startswith("the run does not determine the camera's parameters: the image moved in ")
+    assert told.text.startswith(
+        "the run does not determine the camera's parameters: the image moved in "
+    )
     moving = load_cell("ur5", {"duration_s": "0.2"})
     driver = SimulatedDriver(moving, images=False)
     run = run_driver(moving, driver, (), False, self_calibration=True)

@@ -78,7 +78,9 @@ def pose_error_chart(trace: CameraTrace) -> Chart | None:
     return _chart(
         *(
             Panel(
-                f"distance from the desired pose: {title}", (Curve("", trace.time[known], values),), low=0.0
+                f"distance from the desired pose: {title}",
+                (Curve("", trace.time[known], values),),
+                low=0.0,
             )
             for title, values in rows
         )

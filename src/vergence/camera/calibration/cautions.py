@@ -1,4 +1,4 @@
-"""What a person should know before trusting a calibration."""
+"""Warnings about a calibration."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera.calibration.sighting import Sighting
 
-_GRID = (8, 6)  # fields of the image in which corners are looked for
+_GRID = (8, 6)  # fields of the image in which corners are searched for
 _TOO_SMALL = 3.0  # times: leaving images out against the normal equations
 
 
@@ -28,7 +28,7 @@ def jackknife_warnings(deviations: FloatArray, jackknife: FloatArray) -> list[st
     if ratio < _TOO_SMALL:
         return []
     return [
-        f"leaving images out moves the result {ratio:.0f} times as much as the deviations say: "
-        "errors are not independent (a bent board, another lens model); believe the "
-        "larger"
+        f"leaving out images changes the result {ratio:.0f} times as much as the deviations state: "
+        "errors are not independent (a bent board, another lens model); trust the "
+        "larger deviations"
     ]

@@ -38,7 +38,7 @@ MODELS = {  # which distortion coefficients are estimated
 _FLATTEST_DEG = 8.0  # the board must be seen turned by more than this
 _SUSPICIOUS = 3.0  # times the median residual of all images
 _SAME_PX = 0.3  # rms: nearer, two images show the board in one pose
-_SMALLEST_PX = 0.3  # residuals below are never held against an image
+_SMALLEST_PX = 0.3  # residuals below never count as contradicting
 
 
 def fit_lens(
@@ -62,7 +62,7 @@ def fit_lens(
         known: the camera, if it is known already: then only images and poses are judged.
 
     Returns:
-        the fit, or in words why these images cannot tell.
+        the fit, or why these images do not determine it.
     """
     if model not in MODELS:
         raise InputError("fit_lens", "model", model, ", ".join(MODELS))
@@ -85,16 +85,18 @@ def fit_lens(
         if sizes[worst] <= max(_SUSPICIOUS * usual, _SMALLEST_PX):
             break
         reason = (
-            f"its corners lie {pixels(sizes[worst])} from where a flat board can show them; in the "
-            f"other images {pixels(usual)} is usual: blurred, bent, or not this board"
+            f"its corners are {pixels(sizes[worst])} from any image of a flat board; in "
+            "the other images "
+            f"{pixels(usual)} is usual: a blurred image, a bent board, or another board"
         )
         bad.append(BadImage(kept[worst].name, float(sizes[worst]), reason))
         del kept[worst]
     turned = _spread_deg(poses)
     if turned < _FLATTEST_DEG and known is None:
         return CalibrationFailure(
-            f"the board is parallel to itself in all images, within {turned:.1f}°, which leaves "
-            "the focal length open: add images with the board tilted by 20 to 45° about "
+            f"the board has the same orientation in all images, within {turned:.1f}°, "
+            "which does not "
+            "determine the focal length: add images with the board tilted by 20 to 45° about "
             "different axes"
         )
     free = np.zeros(9) if known is not None else free_parameters(model)
@@ -114,7 +116,7 @@ def _without_copies(sightings: Sequence[Sighting]) -> tuple[list[Sighting], list
         if same is None:
             kept.append(seen)
             continue
-        reason = f"the board is where {same.name} shows it: the same image, or nothing had moved"
+        reason = f"the board is at the same place as in {same.name}: a copy, or nothing had moved"
         copies.append(BadImage(seen.name, np.nan, reason))
     return kept, copies
 
@@ -135,8 +137,8 @@ def _too_few(kept: Sequence[Sighting], bad: Sequence[BadImage], copies: Sequence
         )
     if len(bad) > len(kept):
         return (
-            f"{len(bad)} of {len(bad) + len(kept)} images contradict the others: is the board "
-            "the one that was said, flat, and all images by one camera with fixed focus?"
+            f"{len(bad)} of {len(bad) + len(kept)} images contradict the others: is it "
+            "the board given, is it flat, and were all taken by one camera with fixed focus?"
         )
     return ""
 

@@ -34,7 +34,7 @@ FEWEST_POSES = 5
 SCALE_DEVIATION = 0.005  # of a board that was measured with a ruler: 1 mm in 200 mm
 _LEAST_TURN_DEG = 3.0
 _SUSPICIOUS = 5.0  # times the median residual
-_SMALLEST_PX = 0.5  # residuals below are never held against an image
+_SMALLEST_PX = 0.5  # residuals below never count as contradicting
 _DOUBTFUL_M, _DOUBTFUL_RAD = 1e-3, np.deg2rad(0.2)  # disagreement for which a reason is sought
 _ROUNDS = 6
 _NOISE_ROUNDS, _NOISE_SETTLED = 30, 0.01  # share by which the noise may still change
@@ -68,7 +68,7 @@ def fit_mounting(
         rng: chooses the images that a start is made of, and other starts.
 
     Returns:
-        the fit, or in words why these images and poses cannot tell.
+        the fit, or in words why these images and poses do not determine it.
     """
     A = np.ascontiguousarray(T_base_flange if fixed else [se3_inverse(T) for T in T_base_flange])
     reason = _poses_too_few_or_alike(A, "")
@@ -150,7 +150,7 @@ def _doubt(problem: JointProblem, solution: Solution, noise: Noise, starts: list
     others = [solve(problem, start, noise) for start in starts]
     if not solution.converged:
         return (
-            "the fit of images and arm poses did not converge: add images, or take those away "
+            "the fit of images and arm poses did not converge: add images, or remove those "
             "whose pose is doubtful"
         )
     for other in others:
@@ -160,7 +160,7 @@ def _doubt(problem: JointProblem, solution: Solution, noise: Noise, starts: list
         as_good = other.converged and other.cost < solution.cost + _ALIKE
         if as_good and (apart_m > _SAME_M or apart_rad > _SAME_RAD):
             return (
-                "images and arm poses suit two mountings about equally well, "
+                "images and arm poses fit two mountings about equally well, "
                 f"{1e3 * apart_m:.0f} mm and {np.rad2deg(apart_rad):.1f}° apart: add poses with "
                 "the wrist turned by 20 to 60° about other axes"
             )
@@ -168,7 +168,7 @@ def _doubt(problem: JointProblem, solution: Solution, noise: Noise, starts: list
 
 
 def _limit(sizes: FloatArray, width: int) -> float:
-    """Return the largest residual that is not held against an image, px."""
+    """Return the largest residual that does not count as contradicting, px."""
     return float(min(max(_SUSPICIOUS * np.median(sizes), _SMALLEST_PX), TOLERATED * width))
 
 
@@ -196,8 +196,9 @@ def _poses_too_few_or_alike(A: FloatArray, under: str) -> str:
         about = "hardly turned at all" if most < _LEAST_TURN_DEG else "turned about one axis only"
         return (
             f"the arm {about}{under} ({most:.1f}° about one axis, {second:.1f}° about all others), "
-            "which leaves the position along that axis open: add poses with the wrist turned by 20 "
-            "to 60° about at least two different axes"
+            "which does not determine the position along that axis: add poses with the "
+            "wrist turned "
+            "by 20 to 60° about at least two different axes"
         )
     return ""
 
@@ -213,9 +214,9 @@ def _contradiction(start: Agreement, agreeing: int, words: str) -> str:
 def _words(size: float, poses: FloatArray, seen: Sequence[Sighting], lens: FloatArray) -> str:
     alone = rms(residuals(lens, np.ascontiguousarray(poses[0]), seen[0]))
     return (
-        f"by the arm's pose its corners belong {pixels(size)} from where they are, although the "
-        f"image by itself fits within {pixels(alone)}: a pose of another image, taken while "
-        "moving, or the board was moved"
+        f"its corners are {pixels(size)} from where the arm's pose puts them, although the image "
+        f"alone fits within {pixels(alone)}: the pose of another image, an image taken in motion, "
+        "or a board that was moved"
     )
 
 

@@ -21,7 +21,7 @@ class LensFit:
     """A camera as images of a board have it; poses of the board are free.
 
     The deviations assume errors of the corners that are independent, alike in all images, and of
-    the size of the residuals; that the board is as flat and as large as said; and that the lens
+    the size of the residuals; that the board is as flat and as large as stated; and that the lens
     follows the model.
     """
 
@@ -43,7 +43,7 @@ class LensFit:
 
     @property
     def warnings(self) -> list[str]:
-        """What to know before trusting it."""
+        """Warnings about it."""
         if not self.deviations.any():
             return []
         said = []

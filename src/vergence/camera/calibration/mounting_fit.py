@@ -21,9 +21,9 @@ _SCALE = 3.0  # times what a board's size may differ from the size given, and st
 class MountingFit:
     """How a camera is mounted, and where the board was, as images and arm poses have it.
 
-    The deviations assume errors of the corners as in the fit of the lens, a board as large as said
-    within its deviation, and errors of the arm's poses that are independent from image to image;
-    the size of these is estimated.
+    The deviations assume errors of the corners as in the fit of the lens, a board as large as
+    stated within its deviation, and errors of the arm's poses that are independent from image to
+    image; the size of these is estimated.
     """
 
     fixed: bool  # the arm carried the board, not the camera
@@ -51,7 +51,7 @@ class MountingFit:
 
     @property
     def warnings(self) -> list[str]:
-        """What to know before trusting it."""
+        """Warnings about it."""
         said = []
         second = self.turning_deg[1]
         if second < _TURNED_DEG:
