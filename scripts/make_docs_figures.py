@@ -142,27 +142,15 @@ def imaging() -> None:
 
 
 def compare() -> None:
-    """Write the tables of the laws, and how each run of them ended."""
-    lines: list[str] = []
-    ended: dict[str, dict[str, dict[str, list[int]]]] = {}
+    """Write the tables of the laws."""
+    lines = []
     for cell, spread in COMPARED:
         options = ("--laws", LAWS, "--starts", str(STARTS), "--spread", str(spread))
         still = ("--set", 'target.motion={kind="stationary"}', "--set", "duration_s=8")
         found = answer(f"laws-{cell}-{spread}", "compare", cell, *options, *still)
         lines += [f"**{cell}**, starts over {spread:.0%} of the joints' ranges", ""]
         lines += [*_table(found["laws"]), ""]
-        ended[f"{cell} {spread}"] = _ended(BUILD / f"laws-{cell}-{spread}" / "compare.csv")
     (DOCS / "guide" / "_laws.md").write_text("\n".join(lines))
-    (DOCS / "guide" / "_laws.json").write_text(json.dumps(ended, indent=1) + "\n")
-
-
-def _ended(path: Path) -> dict[str, dict[str, list[int]]]:
-    """Return the starts of each law by how their runs ended."""
-    ended: dict[str, dict[str, list[int]]] = {}
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            ended.setdefault(row["law"], {}).setdefault(row["ending"], []).append(int(row["start"]))
-    return ended
 
 
 def _table(laws: list[dict[str, Any]]) -> list[str]:
