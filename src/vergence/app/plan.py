@@ -73,8 +73,8 @@ def _tell(path: "PlannedPath", numbers: Mapping[str, float], report: Path) -> No
     say(f"path found by the {path.planner} planner")
     say(
         f"  camera  {numbers['camera_length_m']:.2f} m in {numbers['duration_s']:.1f} s"
-        f" · image border {numbers['image_margin_px']:.1f} px away at least"
-        f" · joint limits {100 * numbers['joint_margin']:.1f} % of half the range"
+        f" · at least {numbers['image_margin_px']:.1f} px from the image border"
+        f" · at least {100 * numbers['joint_margin']:.1f} % of half a range from joint limits"
     )
     say(f"  report  {report}")
     say(f"  joints  {report.parent / 'joints.csv'}")

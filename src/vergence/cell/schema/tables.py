@@ -104,9 +104,9 @@ class CameraTable(Placement):
     # Of a ball around it that must touch nothing; if absent only its arm must not.
     radius_m: Length | None = None
     resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the image
-    focal_mm: _Lens | None = None  # of the lens, with pixel_um
+    focal_mm: _Lens | None = None  # focal length of the lens; needs pixel_um
     pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
-    focal_px: tuple[_Focal, _Focal] | None = None  # instead of focal_mm and pixel_um
+    focal_px: tuple[_Focal, _Focal] | None = None  # replaces focal_mm and pixel_um
     principal_px: Point2 | None = None  # the middle of the image if absent
     # K1, k2, p1, p2, k3 of OpenCV.
     distortion: tuple[Annotated[float, Field(ge=-1e4, le=1e4)], ...] = Field(
@@ -116,8 +116,10 @@ class CameraTable(Placement):
     rate_hz: Rate = 30.0  # images per second
     # From exposure until the image arrives.
     latency_frames: Annotated[int, Field(ge=0, le=1000)] = 0
-    depth: DepthTable | None = None  # of a depth camera; see `law.depth`
-    noise_grey: Annotated[float, Field(ge=0, le=255)] = 1.0  # standard deviation, of 255
+    depth: DepthTable | None = None  # settings of a depth camera; see `law.depth`
+    noise_grey: Annotated[float, Field(ge=0, le=255)] = (
+        1.0  # noise of a pixel, in grey levels of 255
+    )
     # How its images differ from ideal ones, in simulation: a table, or "real_camera".
     imaging: Imaging | None = None
     # From when to when its images are black.
@@ -264,7 +266,7 @@ class ReachTable(TaskTable):
     # Distance to keep from joint limits, as a fraction of half the range.
     margin_joint: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     camera_speed_m_s: Speed = 0.25  # speed of the camera along the path
-    # As fast as limits and camera_speed_m_s allow; or, as in [Mezouar2001], a waypoint an image.
+    # As fast as limits and camera_speed_m_s allow; or, as in [Mezouar2001], one waypoint per image.
     timing: Literal["limits", "waypoint_per_image"] = "limits"
     # Standard deviation of a simulated feature's measured position if no images are rendered.
     noise_px: _ExactNoise = 0.0
@@ -310,7 +312,7 @@ class SwitchTable(TaskTable):
 class OutputTable(Placement):
     """An output of the driver, such as a gripper; its placement is in the arm's last body."""
 
-    arm: Text  # that carries it
+    arm: Text  # arm that carries it
     model: Path | None = None  # MJCF of what it looks like; nothing is drawn if absent
     # In simulation, closed it holds a target whose origin is so near, rigidly.
     reach_m: Length = 0.02

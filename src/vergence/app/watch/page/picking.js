@@ -76,7 +76,7 @@ export class Picking {
     this.track.disabled = !count;
     this.track.textContent = count ? `Track ${count} point${count > 1 ? "s" : ""}` : "Track";
     this.words.textContent = this.on
-      ? `Click corners or spots in the image of ${this.camera}, or move the cursor with the arrow keys (with Shift by 10 px) and press Enter; a second time on one takes it back. The arm then keeps them where they are.`
+      ? `Click corners or spots in the image of ${this.camera}, or move the cursor with the arrow keys (with Shift by 10 px) and press Enter; click a point again to remove it. The arm then keeps the points where they are.`
       : "";
     this.changed();
   }
