@@ -80,7 +80,7 @@ def test_laws_are_compared_in_one_table(command: Command, capsys: object) -> Non
     assert "image_based" in page
 
 
-def test_a_second_run_in_the_same_folder_goes_on_and_says_the_same(
+def test_a_second_run_in_the_same_folder_continues_and_says_the_same(
     command: Command, capsys: object
 ) -> None:
     assert command(*COMPARE, "--out", "c") == 0

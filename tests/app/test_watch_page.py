@@ -157,7 +157,7 @@ def test_marks_are_drawn_where_the_points_are(browser: Browser) -> None:
     resume(browser)
 
 
-def test_a_click_pauses_and_a_step_goes_on_by_one_image(browser: Browser) -> None:
+def test_a_click_pauses_and_a_step_advances_by_one_image(browser: Browser) -> None:
     browser.click("#pause")
     browser.wait("document.getElementById('badge').textContent", lambda text: text == "paused")
     before = browser.value(TIME)

@@ -110,7 +110,7 @@ def test_the_viewer_takes_no_other_model_from_a_page(watched: Watched) -> None:
         connect(origin.replace("http", "ws") + "/drop?sid=x", origin=origin)
 
 
-def test_each_wrong_message_is_answered_to_its_sender_and_the_run_goes_on(
+def test_each_wrong_message_is_answered_to_its_sender_and_the_run_continues(
     two_pages: tuple[Page, Page],
 ) -> None:
     other, sender = two_pages

@@ -176,7 +176,7 @@ def test_a_start_with_something_in_the_way_names_it(folder: Path) -> None:
     assert "does not fill the middle of camera wrist's image: it is " in str(error.given)
 
 
-def test_wanted_points_outside_the_image_or_too_few(folder: Path) -> None:
+def test_desired_points_outside_the_image_or_too_few(folder: Path) -> None:
     error = complaint(folder, task__desired="[[900.0, 10.0]]")
     assert error.key == "task.desired"
     assert "640 x 480" in error.allowed

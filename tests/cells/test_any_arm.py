@@ -70,7 +70,7 @@ def twisted_start(cell, turn):
     return np.rad2deg(q).tolist()
 
 
-def test_a_spare_joint_is_drawn_to_better_postures():
+def test_a_redundant_joint_moves_to_better_postures():
     cell = load_cell("panda", {"target.motion": "{ kind = 'stationary' }", "duration_s": "8"})
     cell = cell.replace(arms={"panda": {"start_deg": twisted_start(cell, 0.8)}})
     measure = {}

@@ -60,7 +60,7 @@ def test_kkt_conditions_hold():
         np.testing.assert_allclose(active @ found.x, d[found.active], atol=1e-8)
 
 
-def test_contradiction_bends_the_last_in_order_only():
+def test_contradiction_relaxes_the_last_in_order_only():
     rng = np.random.default_rng(3)
     box = np.vstack((np.eye(4), -np.eye(4)))
     for _ in range(200):
@@ -79,7 +79,7 @@ def test_contradiction_bends_the_last_in_order_only():
         np.testing.assert_allclose(found.slack, np.maximum(-held, 0), atol=2e-7)
 
 
-def test_single_bending_row_gives_up_no_more_than_it_must():
+def test_single_soft_row_is_relaxed_no_more_than_it_must():
     C = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     found = solve(np.eye(2), np.zeros(2), C, np.array([-0.5, 2.0, 0.25]), [0, 1, 1])
     np.testing.assert_allclose(found.x, [0.5, 0.25], atol=1e-6)

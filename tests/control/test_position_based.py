@@ -113,7 +113,7 @@ def test_a_target_that_stands_is_reached_either_way(
     assert np.abs(errors).max() < 1e-9
 
 
-def test_a_spare_joint_leaves_its_limit_while_the_hand_stays(
+def test_a_redundant_joint_leaves_its_limit_while_the_tip_stays(
     arms: dict[str, tuple[Arm, np.ndarray]],
 ) -> None:
     arm, start = arms["seven"]

@@ -14,7 +14,7 @@ def jacobian(rng: np.random.Generator, joints: int) -> np.ndarray:
 
 @pytest.mark.parametrize("joints", [6, 7, 9])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_hand_moves_as_desired_whatever_the_spare_joints_do(joints: int, seed: int) -> None:
+def test_the_tip_moves_as_desired_whatever_the_null_space_rates(joints: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     J, twist = jacobian(rng, joints), 1e-3 * rng.normal(size=6)
     rate_max = rng.uniform(0.5, 5.0, joints)
@@ -33,17 +33,17 @@ def test_no_joint_exceeds_its_rate_and_the_hand_stays_on_its_course(joints: int)
     assert achieved / np.linalg.norm(achieved) == pytest.approx(twist / np.linalg.norm(twist))
 
 
-def test_spare_joints_move_as_they_are_desired_to_as_far_as_the_hand_allows() -> None:
+def test_null_space_rates_are_followed_as_far_as_the_tip_allows() -> None:
     rng = np.random.default_rng(5)
     J = jacobian(rng, 7)
-    spare = 1e-3 * rng.normal(size=7)
-    rates = resolve_redundant(J, np.zeros(6), spare, np.ones(7), 1e-9)
+    null_space_rates = 1e-3 * rng.normal(size=7)
+    rates = resolve_redundant(J, np.zeros(6), null_space_rates, np.ones(7), 1e-9)
     assert J @ rates == pytest.approx(np.zeros(6), abs=1e-12)
     null = np.linalg.svd(J)[2][-1]
-    assert rates == pytest.approx(null * (null @ spare), abs=1e-12)
+    assert rates == pytest.approx(null * (null @ null_space_rates), abs=1e-12)
 
 
-def test_with_six_joints_nothing_is_spare() -> None:
+def test_with_six_joints_the_null_space_is_empty() -> None:
     rng = np.random.default_rng(6)
     rates = resolve_redundant(jacobian(rng, 6), np.zeros(6), rng.normal(size=6), np.ones(6), SLACK)
     assert rates == pytest.approx(np.zeros(6), abs=1e-12)

@@ -154,7 +154,7 @@ def test_a_robot_that_would_not_move_is_refused_with_what_to_do(
         robot.open()
 
 
-def test_a_second_client_is_refused_and_the_first_goes_on(robot: Robot) -> None:
+def test_a_second_client_is_refused_and_the_first_continues(robot: Robot) -> None:
     driver = robot.open()
     with pytest.raises(DriverSilent, match=r"no Franka robot answers at .* no other client is"):
         robot.open(connect_s=1.0)

@@ -257,7 +257,7 @@ def test_a_mounting_comes_from_tf_and_one_that_differs_is_refused_or_written(
             Ros2(**nowhere).open(SEEING)
 
 
-def test_a_second_client_is_refused_and_the_first_goes_on() -> None:
+def test_a_second_client_is_refused_and_the_first_continues() -> None:
     with robot() as made:
         driver = made.open()
         with pytest.raises(DriverSilent, match=r"vergence_\d+ already commands the arm on"):

@@ -128,7 +128,7 @@ def test_a_cell_without_that_arm_or_camera_is_refused() -> None:
         open_driver(CELL, "ur")
 
 
-def test_a_second_client_is_refused_and_the_first_goes_on(robot: Robot, driver: Driver) -> None:
+def test_a_second_client_is_refused_and_the_first_continues(robot: Robot, driver: Driver) -> None:
     with pytest.raises(DriverSilent, match="another client controls the robot"):
         Ur(robot.address, **BUSY).open(BLIND)
     Motion(driver).go(0.1, 0.2)

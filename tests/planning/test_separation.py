@@ -128,7 +128,7 @@ def test_a_grid_refined_at_its_border_sees_what_each_cell_by_itself_sees(
     np.testing.assert_array_equal(grid.middles().ravel(), alone)
 
 
-def test_a_proof_goes_on_where_a_coarser_one_ended() -> None:
+def test_a_proof_continues_where_a_coarser_one_ended() -> None:
     for problem, proved in ((hopeless(), True), (section6(), False)):
         separation = Separation(problem)
         assert [separation.proves_no_path(cells) for cells in (16, 32, 64)] == [

@@ -143,7 +143,7 @@ def test_laws_set_out_from_the_same_starts_which_see_the_target(source, trials):
     assert fewer[1]["arms"] == trials[1].changes["arms"]
 
 
-def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_path):
+def test_a_campaign_continues_where_it_was_cut_off(source, trials, results, tmp_path):
     whole = tmp_path / "whole"
     run_campaign(source, trials, whole, executor=ALONE)
     lines = (whole / RESULTS).read_text().splitlines(keepends=True)
@@ -159,7 +159,7 @@ def test_a_campaign_goes_on_where_it_was_cut_off(source, trials, results, tmp_pa
     assert len((part / RESULTS).read_text().splitlines()) == len(trials) + 1
 
 
-def test_results_of_another_campaign_are_not_gone_on_with(source, trials, tmp_path):
+def test_results_of_another_campaign_are_not_resumed(source, trials, tmp_path):
     run_campaign(source, trials[:1], tmp_path, executor=ALONE)
     with pytest.raises(InputError, match="trials differ"):
         run_campaign(source, trials[:2], tmp_path, executor=ALONE)

@@ -132,7 +132,7 @@ def test_an_arm_that_is_stuck_until_the_time_is_over_does_not_complete() -> None
 
 @pytest.mark.parametrize("fault", ["arm stuck for a while", "stopped for a while"])
 @pytest.mark.parametrize("seed", range(4))
-def test_an_arm_that_is_released_goes_on_from_where_it_is(fault: str, seed: int) -> None:
+def test_an_arm_that_is_released_continues_from_where_it_is(fault: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     driver = FaultyDriver(ScriptedDriver(), DRIVER_FAULTS[fault], rng.uniform(0.2, 0.5), rng)
     notes = Notes()

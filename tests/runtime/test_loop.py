@@ -98,7 +98,7 @@ def test_the_law_sees_every_image_once_as_late_as_it_came(frames: int) -> None:
     assert len(notes.ticks) == 50
 
 
-def test_without_images_it_keeps_on_for_its_patience_and_then_ends() -> None:
+def test_without_images_it_continues_for_its_timeout_and_then_ends() -> None:
     driver = ScriptedDriver(lose=lambda exposed: exposed > 0.5)
     outcome = looped(driver, timeouts=Timeouts(image_s=0.3)).run(5.0)
     assert outcome.kind is OutcomeKind.IMAGE_LATE

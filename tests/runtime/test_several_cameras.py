@@ -81,7 +81,7 @@ def test_alone_each_is_content_while_the_other_image_is_wrong(driver, alone, oth
     assert off_goal(driver, q) > 0.02
 
 
-def test_through_rendered_images_both_images_come_out_as_wanted():
+def test_through_rendered_images_both_images_come_out_as_desired():
     ends = Ends()
     result = run_cell(load_cell("wrist_and_wall").replace(duration_s=5.0), [ends])
     assert result.outcome.succeeded

@@ -76,7 +76,7 @@ def test_a_driver_that_refuses_every_set_point_is_named_and_left_to_its_watchdog
     assert "not braked from here: the driver raised OSError: gone" in outcome.reason
 
 
-def test_an_exit_from_inside_the_loop_brakes_the_arm_and_goes_on() -> None:
+def test_an_exit_from_inside_the_loop_brakes_the_arm_and_continues() -> None:
     driver, law = ScriptedDriver(), ScriptedLaw(RATES)
     failing(law, "command", 10, SystemExit(3))
     with pytest.raises(SystemExit):
@@ -85,7 +85,7 @@ def test_an_exit_from_inside_the_loop_brakes_the_arm_and_goes_on() -> None:
 
 
 @pytest.mark.parametrize("method", ["tick", "event"])
-def test_a_listener_that_fails_is_dropped_and_the_servoing_goes_on(method, caplog) -> None:
+def test_a_listener_that_fails_is_dropped_and_the_servoing_continues(method, caplog) -> None:
     driver, notes, bad = ScriptedDriver(), Notes(), Notes()
     failing(bad, method, 1, RuntimeError("the page is gone"))
     eyes = ScriptedEyes(hide_one=lambda exposed: "covered" if 0.5 < exposed < 0.8 else "")

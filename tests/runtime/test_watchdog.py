@@ -18,8 +18,8 @@ def sent(ticks: int, rates: object = (0.8, -0.5)) -> list[Setpoint]:
     return [guard.step(np.array(rates)) for _ in range(ticks)]
 
 
-def dog(patience_s: float = 0.1) -> Watchdog:
-    return Watchdog(ARM, np.zeros(2), DT, patience_s)
+def dog(timeout_s: float = 0.1) -> Watchdog:
+    return Watchdog(ARM, np.zeros(2), DT, timeout_s)
 
 
 def assert_within_limits(setpoints: list[Setpoint]) -> None:
@@ -58,12 +58,12 @@ def test_a_late_set_point_counts_from_when_it_was_meant() -> None:
 
 
 def test_silence_brakes_the_arm_to_rest_within_its_limits() -> None:
-    watchdog, steps = dog(patience_s=0.05), []
+    watchdog, steps = dog(timeout_s=0.05), []
     for setpoint in sent(300, rates=(2.0, -2.0)):
         watchdog.hear(setpoint)
         steps.append(watchdog.step())
     speed = np.abs(steps[-1].velocity).max()
-    ticks = 26 + int(np.ceil(speed / (8.0 * DT)))  # its patience, then as hard as it may
+    ticks = 26 + int(np.ceil(speed / (8.0 * DT)))  # its timeout, then as hard as it may
     steps.extend(watchdog.step() for _ in range(ticks))
     assert watchdog.tripped
     assert watchdog.at_rest
@@ -71,7 +71,7 @@ def test_silence_brakes_the_arm_to_rest_within_its_limits() -> None:
 
 
 def test_an_arm_that_was_stopped_stays_there() -> None:
-    watchdog = dog(patience_s=0.01)
+    watchdog = dog(timeout_s=0.01)
     watchdog.hear(sent(1)[0])
     for _ in range(50):
         place = watchdog.step().position
@@ -80,14 +80,14 @@ def test_an_arm_that_was_stopped_stays_there() -> None:
 
 
 def test_it_waits_patiently_for_the_first_set_point() -> None:
-    watchdog = dog(patience_s=0.01)
+    watchdog = dog(timeout_s=0.01)
     for _ in range(100):
         np.testing.assert_array_equal(watchdog.step().position, np.zeros(2))
     assert not watchdog.tripped
 
 
 def test_words_from_long_ago_do_not_keep_it_going() -> None:
-    watchdog = dog(patience_s=0.05)
+    watchdog = dog(timeout_s=0.05)
     watchdog.hear(sent(1)[0])
     for _ in range(60):
         watchdog.hear(Setpoint(np.ones(2), np.ones(2)), age_s=0.06)

@@ -64,7 +64,7 @@ def test_faults_on_the_arms_of_the_cells_end_by_name_inside_the_limits(known):
         assert try_fault(known, 7, index).good, FAULTS[index // len(known)]
 
 
-def test_an_arm_goes_on_no_longer_than_stated_after_its_last_image(known, monkeypatch):
+def test_an_arm_continues_no_longer_than_stated_after_its_last_image(known, monkeypatch):
     assert blind_check(known[:1], 0).holds
     monkeypatch.setattr(loop, "command_share", lambda age_s, period_s, decay_s: 1.0)
     assert not blind_check(known[:1], 0).holds

@@ -141,7 +141,7 @@ class FollowRule:
     least_of_all: float = 0.5  # of all that should be seen
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
     least_points: int = 6  # measured, to accept an image; an edge has two
-    patience: int = 12  # images in a row without the object, after which it is lost
+    missed_max: int = 12  # images in a row without the object, after which it is lost
     # Standard deviation of the rotation beyond which the pose is unknown.
     turn_max_rad: float = 0.25
     distance_max: float = 0.2  # and of the position, as a share of the distance
@@ -287,7 +287,7 @@ class ObjectFollower:
             sighting = Sighting.LOST if reason else Sighting.SEEN
         else:
             self._missed += 1
-            sighting = Sighting.LOST if self._missed > self._rule.patience else Sighting.PREDICTED
+            sighting = Sighting.LOST if self._missed > self._rule.missed_max else Sighting.PREDICTED
         return Step(
             time,
             sighting,

@@ -81,7 +81,7 @@ class PosePerception(Generic[B]):
             start: what is believed at first, of that filter.
             selection: how features are chosen; by information unless told.
             windows: how large windows are.
-            settings: budget and patience.
+            settings: budget and limits on missed images.
             blocked_at: gives, for the joints at an exposure, the function that returns what is
                 between a camera and points of the target; the target itself must not count.
             find: finds the target in a whole image, when it is lost.
@@ -95,7 +95,7 @@ class PosePerception(Generic[B]):
         self._diagonal = np.hypot(rig.lenses[:, WIDTH], rig.lenses[:, HEIGHT])
         self._filter = target_filter
         self._history = FilterHistory(target_filter, start, self._settings.horizon)
-        self._patience_from = start.time
+        self._timeout_from = start.time
         self._last_seen = start
         self._held: dict[str, BoolArray] = {}
         self._lost = ""
@@ -267,7 +267,7 @@ class PosePerception(Generic[B]):
         if not self._lost:
             if belief.seen == belief.time:
                 self._last_seen = belief
-            unseen = time - max(belief.seen, self._patience_from)
+            unseen = time - max(belief.seen, self._timeout_from)
             if belief.doubts >= self._settings.lost_doubts:
                 self._lost = f"{belief.doubts} images in a row contradict the prediction"
             elif unseen > self._settings.lost_after:
@@ -295,7 +295,7 @@ class PosePerception(Generic[B]):
         of_all[:6, :6] = covariance
         start = self._filter.start(time, T_world_target, covariance=of_all)
         self._history = FilterHistory(self._filter, start, self._settings.horizon)
-        self._patience_from, self._lost = time, ""
+        self._timeout_from, self._lost = time, ""
 
     def _found(self, frame: Frame) -> View | None:
         assert self._find is not None

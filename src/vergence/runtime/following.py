@@ -66,7 +66,7 @@ class Follower:
 
     While the arm is stopped, guided by hand, or farther from its recent set-points than the bound,
     set-points go to the measured joints within all limits. From there the run resumes as soon as
-    the arm is free; a run that waited for longer than `patience_s` ends.
+    the arm is free; a run that waited for longer than `timeout_s` ends.
 
     Args:
         arm: with its limits.
@@ -74,7 +74,7 @@ class Follower:
         start: measured joints at the start, (n,).
         dt: inner period, s.
         bound: how far the arm may be from its set-points.
-        patience_s: how long to wait for it.
+        timeout_s: how long to wait for it.
         braking: finds what the arm would touch, see `Guard`.
     """
 
@@ -85,7 +85,7 @@ class Follower:
         start: FloatArray,
         dt: float,
         bound: FollowingBound,
-        patience_s: float,
+        timeout_s: float,
         braking: Braking | None = None,
     ) -> None:
         self.guard = Guard(arm, start, dt, braking)
@@ -93,7 +93,7 @@ class Follower:
         self.holding: Fault | None = None  # why the arm is held, if it is,
         self._held_for: Fault | None = None  # and why it was held last
         self._name, self._names = name, arm.names
-        self._bound, self._patience_s = bound.of(arm), patience_s
+        self._bound, self._timeout_s = bound.of(arm), timeout_s
         self._lag = ServoLag(round(bound.servo_lag_s / dt), dt)
         lag_s = max(bound.lag_s, _LAG_ROOM * bound.servo_lag_s)
         recent = np.tile(start, (max(round(lag_s / dt), 1), 1))
@@ -142,7 +142,7 @@ class Follower:
     def hindered(self, time: float, measured: FloatArray) -> Fault | None:
         """Return why the arm is held, or has hardly moved from where it last was."""
         stands = (np.abs(measured - self._held_at) <= self._bound).all()
-        lately = stands and time - self._freed < self._patience_s
+        lately = stands and time - self._freed < self._timeout_s
         return self.holding or (self._held_for if lately else None)
 
     def _reason(self, joint: int, measured: FloatArray, robot: RobotState | None) -> Fault | None:
@@ -162,7 +162,7 @@ class Follower:
         """Begin, continue or end a hold; return why the run ends, if it does."""
         if reason is not None:
             moved = (np.abs(measured - self._held_at) > self._bound).any()
-            if self.holding is None and (moved or time - self._freed > self._patience_s):
+            if self.holding is None and (moved or time - self._freed > self._timeout_s):
                 self._since, self._held_at = time, measured
             # An arm that does not follow is met where it was found, not chased: its sensors may
             # be biased. One that is stopped or guided by hand is kept up with.
@@ -173,7 +173,7 @@ class Follower:
             self.holding, self._freed = None, time
             return None
         emergency = reason is not None and RobotMode.EMERGENCY_STOP.value in reason.reason
-        return self.holding if emergency or time - self._since > self._patience_s else None
+        return self.holding if emergency or time - self._since > self._timeout_s else None
 
     def _anchored(self, measured: FloatArray) -> bool:
         near = (np.abs(self.guard.position - measured) < 0.5 * self._bound).all()

@@ -12,7 +12,7 @@ class Watchdog:
     """Stands between a link that may fail and an arm's servo, and is stepped by the servo's clock.
 
     Between two set-points the arm continues at the speed of the last one, so that a late message is
-    not felt. After `patience_s` without any it is braked to rest, and stays there: only a new
+    not felt. After `timeout_s` without any it is braked to rest, and stays there: only a new
     watchdog moves it again. Whatever arrives, no limit of the arm is passed. It waits patiently for
     the first set-point.
 
@@ -20,13 +20,13 @@ class Watchdog:
         arm: the arm with its limits.
         start: joint positions now, (n,), rad or m.
         dt: period of the servo, s.
-        patience_s: how long the arm may continue without a word.
+        timeout_s: how long the arm may continue without a word.
     """
 
-    def __init__(self, arm: Arm, start: FloatArray, dt: float, patience_s: float = 0.1) -> None:
+    def __init__(self, arm: Arm, start: FloatArray, dt: float, timeout_s: float = 0.1) -> None:
         self._guard = Guard(arm, start, dt)
         self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
-        self._dt, self._patience_s = dt, patience_s
+        self._dt, self._timeout_s = dt, timeout_s
         self._wanted: Setpoint | None = None
         self._silent_s = 0.0
         self.tripped = False  # whether it has given up waiting
@@ -41,14 +41,14 @@ class Watchdog:
 
         Args:
             setpoint: where the arm should be, and how fast it should move there.
-            age_s: how long ago it was meant for; beyond the patience it counts for nothing either.
+            age_s: how long ago it was meant for; beyond the timeout it counts for nothing either.
         """
         position, velocity = (
             np.asarray(part, dtype=np.float64) for part in (setpoint.position, setpoint.velocity)
         )
         if position.shape != self._limits[0].shape or velocity.shape != position.shape:
             return
-        if not age_s <= self._patience_s or not np.isfinite(position + velocity).all():
+        if not age_s <= self._timeout_s or not np.isfinite(position + velocity).all():
             return
         self._wanted = Setpoint(position + age_s * velocity, velocity)
         self._silent_s = 0.0
@@ -57,7 +57,7 @@ class Watchdog:
         """Return what to hand to the servo in this tick."""
         if self._wanted is None:
             return self._guard.step(np.zeros(self._guard.joint_count))
-        self.tripped |= self._silent_s > self._patience_s
+        self.tripped |= self._silent_s > self._timeout_s
         self._silent_s += self._dt
         if self.tripped:
             return self._guard.step(np.zeros(self._guard.joint_count))

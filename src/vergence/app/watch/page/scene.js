@@ -10,8 +10,8 @@ import { inside } from "./polygon.js";
 const VIEWER = "/index.html";
 const LINES = ["/state", "/ui"]; // its connections
 const AGAIN_MS = 1000;
-const PATIENCE_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
-const MOST_PATIENCE_MS = 160_000; // doubled up to this, where a slow computer needs longer
+const TIMEOUT_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
+const LONGEST_TIMEOUT_MS = 160_000; // doubled up to this, where a slow computer needs longer
 const BAR = 32; // px of the viewer's own bar, which is left outside
 const TURN_DEG = 5; // of a press of an arrow
 const ZOOM = 1.1;
@@ -43,7 +43,7 @@ export class Scene {
     /** @type {Set<string>} */
     this.lines = new Set(); // the viewer's connections over which something has come
     this.waiting = 0; // a timer
-    this.patience = PATIENCE_MS;
+    this.timeout = TIMEOUT_MS;
     this.over = document.createElement("canvas");
     stage.addEventListener("keydown", (event) => {
       const turn = KEYS[event.key];
@@ -122,18 +122,18 @@ export class Scene {
    * @param {Set<string>} open  its connections over which something has come
    * @param {number} wait_ms  until the viewer is loaded again, unless all are open by then
    */
-  heard(page, open, wait_ms = this.patience) {
+  heard(page, open, wait_ms = this.timeout) {
     if (this.frame?.contentWindow !== page) return; // one that is no longer shown
     const lost = !LINES.every((path) => open.has(path));
     this.stage.classList.toggle("lost", lost);
     clearTimeout(this.waiting);
-    if (!lost) this.patience = PATIENCE_MS;
+    if (!lost) this.timeout = TIMEOUT_MS;
     else this.waiting = setTimeout(() => this.again(wait_ms), wait_ms);
   }
 
   /** @param {number} waited_ms */
   again(waited_ms) {
-    if (waited_ms > AGAIN_MS) this.patience = Math.min(2 * waited_ms, MOST_PATIENCE_MS);
+    if (waited_ms > AGAIN_MS) this.timeout = Math.min(2 * waited_ms, LONGEST_TIMEOUT_MS);
     if (this.open) this.load();
   }
   /** @param {string} text */
