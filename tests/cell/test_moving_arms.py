@@ -1,4 +1,4 @@
-"""Arms that move by themselves, and a target in a hand."""
+"""Arms that move by themselves, and a target that an arm holds."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the hand holds stays in a fixed camera's view, whatever is asked of the hand."""
+"""A held object stays in a fixed camera's view, whatever motion is desired."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def scene():
 
 
 def push(scene, v_world, seconds):
-    """Ask the hand to move on and on; return the corners' pixels on the way, (K, 8, 2)."""
+    """Let the tip move on and on; return the corners' pixels on the way, (K, 8, 2)."""
     arm, camera, T_world_camera, joints = scene
     mounting = CameraMounting(camera, T_world_camera=T_world_camera)
     limits = Limits(view_margin_px=MARGIN_PX, manipulability_share=0.0)

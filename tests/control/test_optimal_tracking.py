@@ -160,8 +160,8 @@ def test_the_tick_is_its_parts_put_together(S: float, per_joint: bool) -> None:
     error, B = image_model(features, CAMERA.focal_px)
     u = tracking_displacement(B.T @ B, B.T @ error, law.tracking.gains, m.value, m.gradient_camera)
     np.testing.assert_allclose(tick.v_camera, u / PERIOD, rtol=1e-9, atol=1e-12)
-    wanted = m.J_inverse @ tick.v_camera
-    np.testing.assert_allclose(tick.rates, tick.scale * wanted, rtol=1e-9, atol=1e-12)
+    desired = m.J_inverse @ tick.v_camera
+    np.testing.assert_allclose(tick.rates, tick.scale * desired, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
         [tick.w, tick.penalty, tick.sigma], [m.value, m.penalty, m.smallest_singular_value]
     )

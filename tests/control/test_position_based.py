@@ -1,4 +1,4 @@
-"""The hand kept at a desired pose relative to a moving target."""
+"""The end effector keeps a desired pose relative to a moving target."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def target_state(target: MovingPose, time: float) -> TargetState:
 def follow(
     arm: Arm, start: np.ndarray, twist: np.ndarray, law: PoseServo, seconds: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return hand errors (K, 6) in the hand and joint positions (K, n), a row an outer tick.
+    """Return the tip's errors (K, 6) in its axes and joint positions (K, n), a row per outer tick.
 
     Joints follow their set-points at once; images are late by one frame.
     """
@@ -156,7 +156,7 @@ def test_it_works_at_the_inner_rate(arms: dict[str, tuple[Arm, np.ndarray]]) -> 
 
 
 def hold(arm: Arm, start: np.ndarray, slip: np.ndarray, law_settings: dict, seconds: float):
-    """Bring what the hand holds to a pose before a fixed camera while it slips (6,), hand axes.
+    """Bring a held object to a pose before a fixed camera while it slips (6,), in the tip's axes.
 
     Returns the distance of the target from the desired place, (K,) m, and its places, (K, 3).
     """

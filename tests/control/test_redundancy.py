@@ -1,4 +1,4 @@
-"""From a desired twist of the hand to joint rates."""
+"""From a desired twist of the tip to joint rates."""
 
 import numpy as np
 import pytest

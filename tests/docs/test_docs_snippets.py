@@ -134,9 +134,11 @@ def environment() -> dict[str, str]:
 
 def assert_prints(shown: str, said: str, where: str) -> None:
     lines = iter(re.sub(r"\s+", " ", line).strip() for line in said.splitlines())
-    for wanted in filter(None, (re.sub(r"\s+", " ", line).strip() for line in shown.splitlines())):
-        pattern = ".*".join(re.escape(part) for part in wanted.split("…"))
-        assert any(re.fullmatch(pattern, line) for line in lines), f"{where}: {wanted}\n{said}"
+    for expected in filter(
+        None, (re.sub(r"\s+", " ", line).strip() for line in shown.splitlines())
+    ):
+        pattern = ".*".join(re.escape(part) for part in expected.split("…"))
+        assert any(re.fullmatch(pattern, line) for line in lines), f"{where}: {expected}\n{said}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS.parent).as_posix())

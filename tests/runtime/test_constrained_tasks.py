@@ -48,7 +48,7 @@ def test_a_pose_is_followed_as_closely_as_without_constraints():
 
 
 def least_room_px(solver):
-    """Turn the hand far round the block; how near the border its corners come on the way.
+    """Turn the tip far round the block; how near the border its corners come on the way.
 
     Those count that the goal shows, once the filter knows the block.
     """

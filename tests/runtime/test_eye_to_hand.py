@@ -1,4 +1,4 @@
-"""A camera on a stand brings what the hand holds to where it is desired in its image."""
+"""With a fixed camera, a held object is brought to its desired place in the image."""
 
 import numpy as np
 import pytest

@@ -62,7 +62,7 @@ def settle(driver, cameras, ticks=400):
 
 
 def off_goal(driver, q):
-    """Distance of the hand from the goal, m, a radian being as bad as a metre."""
+    """Distance of the tip from the goal, m; a radian counts as a metre."""
     arm = driver.world.arm_to_body("puma")
     return se3_distance(arm.forward_kinematics(q), arm.forward_kinematics(GOAL), 1.0)
 

@@ -188,7 +188,7 @@ def _speed(cell: Cell, trials: Trials) -> list[Check]:
 
 
 def _slave(trials: Trials) -> list[Check]:
-    """Compare the hand with the estimated object frame, as Fig. 7 does, and with the true one."""
+    """Compare the end effector with the estimated object frame (Fig. 7) and with the true one."""
     ours, paper, fixed = trials["ours"], trials["hybrid"], trials["fixed"]
     delayed = "higher than the estimation errors, because of the delay (Fig. 7)"
     position, angle = ours.pose_m().max(), ours.pose_deg().max()
@@ -241,7 +241,7 @@ def _late(cell: Cell, trials: Trials) -> Check:
     ratio = rms(late.position(*slow)) / rms(usual.position(*slow))
     return Check(
         "late_joints.error_ratio",
-        "not in the paper: images taken to be exposed where the hand was an image before",
+        "not in the paper: images used with the joints of one image before",
         ratio,
         "",
         late.outcome.succeeded and within(ratio, 1.2),

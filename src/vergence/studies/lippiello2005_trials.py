@@ -42,10 +42,10 @@ STARTS, START_S = 14, 3.0  # how many starts are tried, and how long each is fol
 
 
 class HandErrors(NamedTuple):
-    """The hand's pose relative to the estimated object frame, at the exposures of K images."""
+    """The end effector's pose relative to the estimated object frame, at K exposures."""
 
     time: FloatArray  # (K,) s
-    metres: FloatArray  # (K, 3) off the desired position of the object in the hand's camera
+    metres: FloatArray  # (K, 3) off the object's desired position in the slave's camera
     radians: FloatArray  # (K,) angle off its desired orientation
 
     def between(self, start: float, end: float = np.inf) -> "HandErrors":
@@ -119,7 +119,7 @@ def run(cell: Cell, images: bool) -> Trial:
 
 
 def run_with_late_joints(cell: Cell, images: bool) -> Trial:
-    """Run a cell whose images are taken to have been exposed where the hand was an image before."""
+    """Run a cell that uses each image with the joints of the image before."""
     cell = cell.replace(duration_s=passes(cell)[0][1] + 0.1)  # the slow pass tells
     driver = SimulatedDriver(cell, images)
     try:
@@ -162,7 +162,7 @@ def _trial(cell: Cell, done: Run) -> Trial:
 
 
 def _hand_errors(cell: Cell, done: Run) -> HandErrors:
-    """Compare the estimated object with the hand, where its mounting is taken to put it."""
+    """Compare the estimated object with the end effector, at its assumed mounting."""
     name = done.info.task_camera
     trace, target = done.cameras[name], done.target
     assert target is not None
