@@ -1,4 +1,4 @@
-"""Warnings of the library on the command line: each is told once, however often it comes up."""
+"""Warnings of the library on the command line, each printed once."""
 
 import logging
 

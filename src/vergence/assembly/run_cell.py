@@ -1,4 +1,4 @@
-"""From a cell file to a finished run: assemble the parts, run the loop, tell the listeners."""
+"""From a cell file to a finished run: assemble the parts, run the loop, notify the listeners."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence

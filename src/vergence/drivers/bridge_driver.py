@@ -73,7 +73,7 @@ class BridgeDriver(SocketDriver):
         self._bridge.close()
 
     def _words(self, setpoint: Setpoint) -> dict[str, Any]:
-        """Return what the bridge is told: positions and rates."""
+        """Return what is sent to the bridge: positions and rates."""
         rates = setpoint.velocity
         if self._gain is not None:
             most, gap = self._arm.rate_max, setpoint.position - self._joints[self._name].position

@@ -1,4 +1,4 @@
-"""Laws by name: the cell's own, those its file names, and a few that everybody knows."""
+"""Laws by name: the cell's own, those its file names, and common presets."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -31,7 +31,7 @@ _SHARED = (
 
 
 def usual_laws(cell: Cell) -> tuple[str, ...]:
-    """Return the laws to hold against each other: those of the file, or some that suit its task."""
+    """Return the laws to compare: those of the file, or some that suit its task."""
     if cell.laws:
         return (OWN, *cell.laws)
     if cell.task.kind == "follow":

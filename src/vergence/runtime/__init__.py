@@ -1,4 +1,4 @@
-"""Runtime: the loop, what it asks of a driver, and what is kept of a run."""
+"""Runtime: the loop, the driver protocol, and the results of a run."""
 
 from vergence.runtime.driver import Driver, HasOutputs, outputs_of
 from vergence.runtime.driver_wrapper import DriverWrapper

@@ -1,4 +1,4 @@
-"""What the loop asks of a cell, simulated or real."""
+"""The driver protocol: what the loop needs of a cell, simulated or real."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
@@ -13,7 +13,7 @@ __all__ = ["Driver", "Sample", "Setpoint"]
 class Driver(Protocol):
     """A cell: arms that take set-points at the inner rate, cameras that deliver frames.
 
-    A simulated driver advances its world by one inner period in `step`; a real one hands the
+    A simulated driver advances its world by one inner period in `step`; a real one passes the
     set-points on and returns at the next inner tick. So the loop needs no other clock. Hardware
     that does not answer in time is reported by raising `DriverSilent` from `read` or `step`.
     """
@@ -67,7 +67,7 @@ class HasOutputs(Protocol):
 
 @runtime_checkable
 class ExactDriver(Protocol):
-    """A driver of one arm that is where it is told to be, exactly: an ideal one.
+    """A driver of one ideal arm, which follows set-points exactly.
 
     So the loop knows all that it could read until an image is taken or arrives, and may hand over
     the last of the set-points until then.

@@ -129,7 +129,7 @@ class Follower:
     def steps(self, rates: FloatArray, count: int) -> Setpoint | None:
         """Return the set-point after many steps at desired rates (n,), by `Guard.steps`.
 
-        It is for an arm that is where it is told to be: one that lags or is held is None.
+        It is for an arm that follows set-points exactly: one that lags or is held is None.
         """
         if self.holding is not None or self._scale != 1.0 or self._lag.ticks:
             return None

@@ -1,4 +1,4 @@
-"""Who may watch a run."""
+"""Listeners of a run."""
 
 from collections.abc import Mapping
 from typing import Protocol

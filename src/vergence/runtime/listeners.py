@@ -12,7 +12,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class Listeners:
-    """Tells every listener what happens; one that raises is dropped, and the others are told so.
+    """Notifies every listener; one that raises is dropped, and the others are informed.
 
     The loop continues when a disk is full or a page is gone. A listener that was dropped is still
     closed, so that it can finish what it has.
@@ -26,20 +26,20 @@ class Listeners:
         self._active = list(listeners)
 
     def begin(self, info: RunInfo) -> None:
-        """Tell what is about to run; nothing moves yet, so whatever is raised escapes."""
+        """Announce the run; nothing moves yet, so exceptions propagate."""
         for listener in self._all:
             listener.begin(info)
 
     def tick(self, record: TickRecord) -> None:
-        """Tell of one turn of the loop."""
+        """Report one turn of the loop."""
         self._tell(record.time, lambda listener: listener.tick(record))
 
     def event(self, time: float, name: str, text: str) -> None:
-        """Tell of something that happened once."""
+        """Report an event."""
         self._tell(time, lambda listener: listener.event(time, name, text))
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
-        """Tell of the end; every listener is told, whatever another one raises."""
+        """Announce the end to every listener, even if another one raises."""
         for listener in self._all:
             try:
                 listener.close(outcome, summary)

@@ -34,10 +34,10 @@ _IMAGE_AGE_S = 0.5  # the least age that every image may have when it arrives
 
 
 class Loop:
-    """Runs one arm's task; simulated or real is the driver's business.
+    """Runs one arm's task with a simulated or a real driver.
 
     Each inner tick reads a sample, checks it, and hands guarded set-points to the driver. An image
-    is looked at in the tick in which it arrives: perception, planner and law then give new joint
+    is processed in the tick in which it arrives: perception, planner and law then give new joint
     rates. An `InnerLaw` is asked for rates at each inner tick, any other's are kept until the next
     image is due. Without it the rates fade to zero.
 
@@ -91,7 +91,7 @@ class Loop:
         self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
         self._tick, self._now, self._end = 0, 0.0, np.inf
         self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
-        self._held = ""  # kind of what the arm is held for, as it was told last
+        self._held = ""  # kind of what the arm is held for, as it was reported last
         self.take_up(Stages(perception, planner, law, self._timeouts, goal))
 
     def take_up(self, stages: Stages) -> None:
@@ -131,7 +131,7 @@ class Loop:
 
     @property
     def law(self) -> Law:
-        """What it goes by now."""
+        """The parts of the present task."""
         return self._law
 
     def replace_law(self, law: Law) -> None:
@@ -196,7 +196,7 @@ class Loop:
         return None
 
     def _turn(self, sample: Sample, duration_s: float) -> Outcome | None:
-        """Look at what arrived and decide how to continue; return how the run ends, if it does."""
+        """Process what arrived and decide how to continue; return how the run ends, if it does."""
         turns = self._schedule.turns(self._tick, bool(sample.frames))
         if self._schedule.period_over:
             stuck, self._stuck[:] = self._stuck.copy(), True

@@ -1,4 +1,4 @@
-"""Which features and targets are lost and found again, told once each."""
+"""Events of features and targets that are lost and found again, once each."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def reasons(observation: Observation) -> list[str]:
 
 
 class LossReports:
-    """Tells listeners when the target or a feature is lost or found again.
+    """Notifies listeners when the target or a feature is lost or found again.
 
     Args:
         listeners: to notify.

@@ -7,7 +7,7 @@ from vergence.signals import JointState, Setpoint
 
 
 class ServoLag:
-    """Adds to measured joints the motion that their servos have been told and not yet done.
+    """Adds to measured joints the commanded motion that their servos have not yet executed.
 
     A servo with lag T follows as q(t + T) = s(t) + b, with an offset b that changes slowly. So
     q(t + T) = q(t) + s(t) - s(t - T), whatever b is.

@@ -33,7 +33,7 @@ class Planner(Protocol):
 
 @runtime_checkable
 class Tells(Protocol):
-    """A planner that has something to tell."""
+    """A planner that reports events."""
 
     def events(self) -> Iterable[tuple[float, str, str]]:
         """Return what happened since the last call: time in s, name, and a sentence."""

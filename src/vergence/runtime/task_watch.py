@@ -11,7 +11,7 @@ from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Re
 
 
 class TaskWatch:
-    """Watches one task, and tells listeners what changes.
+    """Watches one task, and notifies listeners of changes.
 
     Args:
         stages: what the task is done by.
@@ -32,7 +32,7 @@ class TaskWatch:
         self._begun, self._duration_s = begun, stages.duration_s
         self._listeners, self._losses = listeners, LossReports(listeners)
         self._arrival = None if stages.goal is None else Arrival(stages.goal, rate_max)
-        self._stalled = False  # as it was told last
+        self._stalled = False  # as it was reported last
 
     def end(self, duration_s: float) -> float:
         """Return when the time of the task is over, s, in a run of so many."""
@@ -51,7 +51,7 @@ class TaskWatch:
         command: JointCommand,
         q: FloatArray,
     ) -> None:
-        """See how near the goal is; tell where the arm comes to rest before it."""
+        """Check the distance from the goal; report where the arm comes to rest before it."""
         self._tell_of_plans()
         if self._arrival is None:
             return
@@ -70,7 +70,7 @@ class TaskWatch:
                 self._listeners.event(*event)
 
     def planned_end(self, time: float) -> Outcome | None:
-        """Tell what the planner has to tell; return how the task ends by it, once it does."""
+        """Report the planner's events; return how it ends the task, once it does."""
         self._tell_of_plans()
         return None if self._ends is None else self._ends.conclusion(time)
 

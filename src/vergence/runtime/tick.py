@@ -1,4 +1,4 @@
-"""What the loop tells its listeners each time round."""
+"""What the loop reports to its listeners at every tick."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,5 +15,5 @@ class TickRecord:
     observation: Observation | None  # what perception made of them; None if none arrived
     reference: Reference | None  # what the law aimed at
     commands: Mapping[str, JointCommand]  # by arm; empty while the cell holds
-    # Where each arm's joints were last told to be: what their measured positions should be now.
+    # The last set-point of each arm: what their measured positions should be now.
     setpoints: Mapping[str, Setpoint] = field(default_factory=dict)

@@ -24,8 +24,8 @@ _SKIN_M = 0.003  # how deep under a surface a feature may lie and still be seen
 class CellModel:
     """The compiled model of a cell, and where everything in it is.
 
-    It knows what the file and the models say: placements, joint positions that it is told, and
-    nothing of what is truly there.
+    It knows what the file and the models say: placements, joint positions that it is given, and
+    nothing of the truth.
 
     Args:
         cell: what it is of.

@@ -38,7 +38,7 @@ class KinematicCell:
 
 
 class KinematicDriver:
-    """Moves the joints exactly as told and projects the features exactly.
+    """Moves the joints exactly as commanded and projects the features exactly.
 
     It is a driver like any other, so the loop, the guard and the laws that run in it are those that
     move a real arm.

@@ -34,7 +34,7 @@ EVERY_NTH, MOVING_NTH = 20, 10  # pairs of starts with every combination, and wi
 def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
     """Serve every start by every choice; write the figures.
 
-    Joints move as they are told within their limits, features are exact projections with noise; the
+    Joints follow commands within their limits, features are exact projections with noise; the
     depth at the start is believed wrong by a factor. A run counts as reached if image and pose
     agree with the goal, as far as noise in the goal's image lets anyone know it; it ends where a
     point leaves the image, the camera passes behind the target, or a joint leaves its range.

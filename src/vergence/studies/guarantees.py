@@ -43,10 +43,10 @@ PUMA_START_DEG = (-125.6, 42.7, -172.7, 0.0, -50.0, 0.0)
 
 
 def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
-    """Try to break every promise; write the figures.
+    """Try to violate every guarantee; write the figures.
 
-    Everything runs on exact projections and joints that move as told, through the loop and the
-    guard that move a real arm.
+    Everything runs on exact projections and joints that follow commands exactly, through the loop
+    and the guard that move a real arm.
 
     Args:
         out: folder for the figures.

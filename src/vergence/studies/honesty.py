@@ -29,7 +29,7 @@ _LEAST_COVERED = 0.99
 
 
 def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> StudyResult:
-    """Try the scenes on every core; hold errors against what is stated of them.
+    """Try the scenes on every core; compare errors with their stated deviations.
 
     Args:
         out: folder for the figure.

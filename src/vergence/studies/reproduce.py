@@ -36,7 +36,7 @@ def reproduce(
     folder: str | Path | None = None,
     progress: Progress = lambda _what, _share: None,
 ) -> StudyResult:
-    """Repeat a paper's experiments and hold them against its numbers.
+    """Repeat a paper's experiments and compare them with its numbers.
 
     Args:
         paper: one of `PAPERS`.

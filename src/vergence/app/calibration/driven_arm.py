@@ -46,7 +46,7 @@ class DrivenArm:
 
     @property
     def position(self) -> FloatArray:
-        """Where the joints are told to be, (n,)."""
+        """The set-points of the joints, (n,)."""
         return self._follower.guard.position
 
     def drive(self, goal: FloatArray) -> None:

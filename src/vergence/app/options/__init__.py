@@ -1,4 +1,4 @@
-"""What commands can be told: an object of options each, declared once."""
+"""The options of the commands, one object each, declared once."""
 
 from vergence.app.options.calibrate import CalibrateOptions
 from vergence.app.options.campaign import CampaignOptions, CompareOptions, MapOptions

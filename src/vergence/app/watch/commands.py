@@ -175,7 +175,7 @@ def parse(message: str | bytes) -> Command:
     """Return the command that a message of a page is.
 
     Raises:
-        InputError: if it is none; the text tells the page why.
+        InputError: if it is none; the text states the reason.
     """
     try:
         return _COMMANDS.validate_json(message)

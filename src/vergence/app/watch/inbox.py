@@ -13,7 +13,7 @@ _MOST_WAITING = 256
 
 
 class Inbox:
-    """A queue of requests from one thread to another; what cannot be done is told to its sender."""
+    """A queue of requests from one thread to another; refusals are answered to the sender."""
 
     def __init__(self) -> None:
         self._queue: queue.Queue[Request] = queue.Queue(_MOST_WAITING)

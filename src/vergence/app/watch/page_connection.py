@@ -1,4 +1,4 @@
-"""One page's connection: it is told what is new, and asks for something."""
+"""One page's connection: it gets what is new, and sends requests."""
 
 import asyncio
 from collections import deque
@@ -23,8 +23,9 @@ _PERIOD_S = 1 / 40  # between two looks at the view state
 class PageConnection:
     """Serves one page until its connection is closed.
 
-    The page is told more when it says that it has shown the last: a slow one misses images, but
-    never lags behind. What it asks for is checked here, and slowed down if it is too much.
+    The page gets the next state when it reports that it has shown the last one: a slow one misses
+    images, but never lags behind. What it asks for is checked here, and slowed down if it is too
+    much.
 
     Args:
         connection: to the page.

@@ -14,7 +14,7 @@ from vergence.app.watch.view_state import News
 
 
 class Request(NamedTuple):
-    """A command, and how to tell its sender why it is not obeyed."""
+    """A command, and how to answer its sender if it is not executed."""
 
     command: Command
     refuse: Callable[[str], None]

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstr
 
 from vergence.parts import is_part, written
 
-# Ranges are those of machines: what lies outside is a slip of the pen or of the unit, and would
+# Ranges are those of machines: values outside are mistakes of the number or the unit, and would
 # take terabytes or years to simulate.
 Coordinate = Annotated[float, Field(ge=-1e3, le=1e3)]  # m
 Angle = Annotated[float, Field(ge=-3.6e4, le=3.6e4)]  # degrees; also metres of a sliding joint

@@ -1,4 +1,4 @@
-"""What a real camera does to its images, as a table of a cell file; simulated images have it."""
+"""Effects of a real camera on its images, as a table of a cell file; simulated images have it."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal

@@ -1,4 +1,4 @@
-"""The joints of an arm, as a bridge tells them."""
+"""The joints of an arm, as a bridge reports them."""
 
 from typing import NamedTuple
 

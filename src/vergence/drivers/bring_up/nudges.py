@@ -74,7 +74,7 @@ def _rest(
 def _joint_finding(
     joint_name: str, names: tuple[str, ...], joint: int, moved: FloatArray, step: float
 ) -> Finding:
-    """Return whether the joint that was told to move did, and no other."""
+    """Return whether the joint that was commanded to move did, and no other."""
     share, farthest = moved[joint] / step, int(np.argmax(np.abs(moved)))
     note = ""
     if farthest != joint:

@@ -65,7 +65,7 @@ class SlowMotion:
 
     @property
     def setpoint(self) -> FloatArray:
-        """Where the joints are told to be, (n,)."""
+        """The set-points of the joints, (n,)."""
         return self._guard.position
 
     @property

@@ -1,6 +1,6 @@
-"""What a driver for real hardware is made of: a watchdog, a clock, a camera, a memory of joints.
+"""Building blocks of drivers for real hardware: a watchdog, a clock, a camera, a history of joints.
 
-None of it knows a make of robot. `docs/drivers.md` shows how they go together.
+They do not depend on the make of the robot; see `docs/drivers.md`.
 """
 
 from vergence.runtime.hardware.device_clock import DeviceClock

@@ -10,7 +10,7 @@ from vergence.signals import Sample
 
 
 class LateStamps(DriverWrapper):
-    """Passes on to a driver, and sets its images back to when they were exposed.
+    """Passes on to a driver, and dates its images back to their exposure.
 
     Args:
         driver: of arms and cameras.

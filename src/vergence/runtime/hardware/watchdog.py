@@ -1,4 +1,4 @@
-"""On the robot's side: follow what is asked for, and stop when nobody asks any more."""
+"""On the robot's side: follow set-points, and stop when they no longer arrive."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from vergence.signals import Setpoint
 
 
 class Watchdog:
-    """Stands between a link that may fail and an arm's servo, and is stepped by the servo's clock.
+    """Sits between a link that may fail and an arm's servo, and is stepped by the servo's clock.
 
     Between two set-points the arm continues at the speed of the last one, so that a late message is
     not felt. After `timeout_s` without any it is braked to rest, and stays there: only a new
@@ -20,7 +20,7 @@ class Watchdog:
         arm: the arm with its limits.
         start: joint positions now, (n,), rad or m.
         dt: period of the servo, s.
-        timeout_s: how long the arm may continue without a word.
+        timeout_s: how long the arm may continue without a set-point.
     """
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float, timeout_s: float = 0.1) -> None:

@@ -1,6 +1,6 @@
 """Reads an MCAP file from front to back, and as far as it goes where it was cut or damaged.
 
-Nothing that the file says of its own sizes is believed: no record is longer than what is left of
+No size that the file states is trusted: no record is longer than what is left of
 the file, no chunk is unpacked to more than it says, and all of them to no more than a recording
 of that length can hold.
 """
@@ -57,7 +57,7 @@ class _DamagedError(Exception):
 
 
 class _RestOfFile:
-    """A file of which no more is asked than there is: a length in it may be anything."""
+    """A file that is never read beyond its end, whatever lengths it states."""
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file, self._left = file, size

@@ -1,4 +1,4 @@
-"""The same things as Foxglove's own message types, so that viewers show them without being told."""
+"""The same things as Foxglove's own message types, which viewers show without configuration."""
 
 from collections.abc import Mapping, Sequence
 

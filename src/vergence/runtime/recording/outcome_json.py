@@ -1,4 +1,4 @@
-"""How a run ended, as JSON values: for its recording, its summary and whoever asks on the way."""
+"""How a run ended, as JSON values: for its recording, its summary and other readers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -40,7 +40,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
 
 
 def read_outcome(words: Mapping[str, str], tasks: str = "[]") -> Outcome:
-    """Read kind, reason and time as text, and tasks as JSON, all of which may come from anybody.
+    """Read kind, reason and time as text, and tasks as JSON, all of which is untrusted.
 
     Raises:
         KeyError, ValueError: if they say anything else.

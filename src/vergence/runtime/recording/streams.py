@@ -83,7 +83,7 @@ def message_of(row: Row) -> dict[str, Any]:
 def row_of(message: Mapping[str, Any], trace: type, joints: int = 0) -> Row:
     """Return the row that `message_of` made JSON values of.
 
-    A list may have any length, since it may come from anybody: what is too much is left out, and
+    A list may have any length, since it is untrusted: what is too much is left out, and
     what is missing is not known.
 
     Args:

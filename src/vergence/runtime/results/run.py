@@ -69,8 +69,8 @@ class Run:
         """Return the numbers as a pandas table; needs pandas.
 
         Args:
-            of: the name of an arm or a camera, or "target": all that is known of it, a row a tick,
-                an image or an estimate. Without it a row a tick, with everything but matrices.
+            of: the name of an arm or a camera, or "target": all that is known of it, one row per
+            tick, image or estimate. Without it, one row per tick, with everything but matrices.
 
         Raises:
             InputError: if there is nothing of that name, or pandas is not installed.

@@ -15,7 +15,7 @@ from vergence.signals import Frame, ImagePoints, TargetState
 
 
 def arm_row(record: TickRecord, arm: str) -> Row:
-    """Return how an arm moves and how it was told to, a row of `ArmTrace`."""
+    """Return how an arm moves and was commanded, a row of `ArmTrace`."""
     state = record.sample.joints[arm]
     row: dict[str, Any] = {
         "time": record.time,

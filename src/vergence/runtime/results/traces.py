@@ -34,7 +34,7 @@ class ArmTrace(Trace):
     time: FloatArray = column()  # (K,) s
     position: FloatArray = column("n")  # (K, n) measured, rad or m
     velocity: FloatArray = column("n")  # (K, n) measured, rad/s or m/s
-    setpoint: FloatArray = column("n")  # (K, n) where the joints were last told to be, rad or m
+    setpoint: FloatArray = column("n")  # (K, n) the last set-points, rad or m
     setpoint_rate: FloatArray = column("n")  # (K, n) and how fast to move there, rad/s or m/s
     command: FloatArray = column("n")  # (K, n) rates the law asked for; NaN while the arm held
     v_camera: FloatArray = column(6)  # (K, 6) camera twist the command was made from, m/s, rad/s

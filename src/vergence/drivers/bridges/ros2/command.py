@@ -1,4 +1,4 @@
-"""What the arm is told, and how that fades to rest."""
+"""The command to the arm, and how it decays to rest."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,7 +13,7 @@ class Command(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether the arm is told to move."""
+        """Whether the arm is commanded to move."""
         return any(self.velocity)
 
     def seconds_to_rest(self, acceleration_max: Sequence[float]) -> float:

@@ -13,7 +13,7 @@ Transform = tuple[float, ...]
 
 
 class Frames:
-    """The tree of TF as far as it was told."""
+    """The tree of TF as far as it is known."""
 
     def __init__(self) -> None:
         self._links: dict[str, tuple[str, Transform]] = {}  # by child: its parent, and where it is
@@ -45,7 +45,7 @@ class Frames:
         return to_parent, to_child
 
     def wrong(self, parent: str, child: str) -> str:
-        """Return why a frame cannot be told in another, in a sentence; empty if it can."""
+        """Return why a frame is not known in another, in a sentence; empty if it can."""
         if self.between(parent, child) is None:
             known = sorted(self._links.keys() | {parent for parent, _ in self._links.values()})
             frames = f"it has {', '.join(known[:20])}" if known else "it has received no transforms"

@@ -38,7 +38,7 @@ _STOPPED, _RUNNING = "protective stop", "running"
 
 
 class Topics:
-    """Subscribes to what the robot says, and publishes what it is told.
+    """Subscribes to the robot's topics, and publishes commands.
 
     Args:
         settings: of the driver.
@@ -218,7 +218,7 @@ class Topics:
         self._scale = min(max(message.data / 100.0, 0.0), 1.0)
 
     def _robot(self) -> list[Any] | None:
-        """Return mode and speed scale; None if the robot tells neither."""
+        """Return mode and speed scale; None if the robot reports neither."""
         if self._runs is None and self._scale is None:
             return None
         scale = 1.0 if self._scale is None else self._scale
