@@ -1,3 +1,3 @@
-"""What a person sees: the command line, the report."""
+"""User interfaces: the command line, reports, and the live page."""
 
 __all__: list[str] = []

@@ -49,7 +49,7 @@ class Bar(Progress):
         self._compilations.__exit__(None, None, None)
 
     def begin(self) -> None:
-        """Say that the work itself begins now."""
+        """Note that the work itself begins now."""
         elapsed = max(task.elapsed or 0.0 for task in self.tasks)
         self._set_up_s = elapsed - self._compilations.spent_s
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def calibrate(options: "CalibrateOptions") -> int:
-    """Calibrate, write what a cell file reads, and say how well it is known.
+    """Calibrate, write files for a cell, and print how accurate they are.
 
     Raises:
         InputError: if what was asked or given cannot be used.

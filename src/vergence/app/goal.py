@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def goal(options: "GoalOptions") -> int:
-    """Take the photograph and say where it is; return the exit code."""
+    """Take the photograph and print where it is; return the exit code."""
     from vergence.app.run import overrides
     from vergence.assembly import open_driver
     from vergence.cell import load_cell

@@ -20,7 +20,7 @@ _SWING_DEG = 2.0
 
 
 def latency(options: "CalibrateOptions") -> int:
-    """Swing a joint, say how late images and servo are; return the exit code."""
+    """Swing a joint, print the delays of images and servo; return the exit code."""
     from vergence.assembly import check_driver, open_driver, rehearse
     from vergence.cell import load_cell
     from vergence.cell.settings_text import toml_value

@@ -77,7 +77,7 @@ def film(frames: Sequence[MarkedImage], name: str, caption: str) -> str:
 
     Args:
         frames: in order of time.
-        name: of what is shown, for who cannot see it.
+        name: of what is shown, for screen readers.
         caption: HTML below it.
     """
     if len(frames) < 2:

@@ -15,7 +15,7 @@ SUCCESS, FAILURE, BAD_INPUT = 0, 1, 2
 
 
 def say(text: str = "") -> None:
-    """Write a line for a person, who reads it now even where it goes through a pipe."""
+    """Write a line for the user, flushed at once, also in a pipe."""
     print(text, flush=True)
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def plan(options: "PlanOptions") -> int:
-    """Plan, draw and say what came of it; return the exit code.
+    """Plan, draw and print the result; return the exit code.
 
     Raises:
         InputError: if the cell cannot be read, or its task is not to reach.

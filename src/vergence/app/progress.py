@@ -54,7 +54,7 @@ def working(words: str) -> Iterator[None]:
 
 
 class RunProgress:
-    """A listener that shows how far a run is, how fast, and how well it goes."""
+    """A listener that shows the progress, the speed and the state of a run."""
 
     def __init__(self, duration_s: float) -> None:
         self._bar = bar("{task.fields[state]}")

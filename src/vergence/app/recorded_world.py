@@ -1,4 +1,4 @@
-"""The cell that a recording was made in, to be put up in the poses of the recording."""
+"""The cell that a recording was made in, to be shown in the poses of the recording."""
 
 from typing import Self
 
@@ -24,7 +24,7 @@ class RecordedWorld:
 
     @classmethod
     def of(cls, info: RunInfo) -> Self | str:
-        """Return the world of a recorded run, or why it cannot be put up here."""
+        """Return the world of a recorded run, or why it cannot be shown."""
         if not info.text:
             return "The recording names no cell."
         for source in (info.path, info.cell):

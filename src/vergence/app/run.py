@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def run(options: "RunOptions") -> int:
-    """Run a cell in a run folder and say how it went; return the exit code."""
+    """Run a cell in a run folder and print the outcome; return the exit code."""
     cell = _loaded(options)  # report mistakes before loading everything
     folder = run_folder(options.out, options.overwrite, cell.name)
     from vergence.runtime import Recorder

@@ -17,7 +17,7 @@ _MARGIN_PX = 6.0
 def board_view(
     camera: Camera, board: Board, depth_m: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return a pose T_camera_board (4, 4) that a person would hold the board at.
+    """Return a pose T_camera_board (4, 4) at which a person would hold the board.
 
     Args:
         camera: that sees it.

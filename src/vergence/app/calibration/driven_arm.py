@@ -22,7 +22,7 @@ _LONGER_S = 2.0  # that a line may take beside twice its usual time
 
 
 class DrivenArm:
-    """Drives the joints of an arm, within its limits and clear of what it must not touch.
+    """Drives the joints of an arm, within its limits and clear of obstacles.
 
     Args:
         driver: of the arm.

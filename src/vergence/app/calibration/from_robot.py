@@ -1,4 +1,4 @@
-"""Images and arm poses of a robot that somebody moves from stop to stop, as a folder."""
+"""Images and arm poses of a robot that is moved by hand from stop to stop, as a folder."""
 
 from collections import deque
 from pathlib import Path
@@ -20,7 +20,7 @@ _FEWEST = 3
 
 
 def take_robot_images(cell: Cell, driver: Driver, camera: str, count: int, folder: Path) -> Path:
-    """Take an image at each stop of an arm that somebody moves; nothing is sent to the arm.
+    """Take an image at each stop of an arm that is moved by hand; nothing is sent to the arm.
 
     Ctrl-C ends it before there are so many.
 

@@ -96,7 +96,7 @@ def _robot_data(options: "CalibrateOptions", board: "Board | None", folder: Path
 
 
 def _require_agreement(cell: "Cell", camera: str, agreed: bool) -> None:
-    """Refuse to drive an arm that does not carry the camera, or that nobody agreed to move."""
+    """Refuse to drive an arm that does not carry the camera, or for which consent is missing."""
     arm = cell.task.arm
     if cell.cameras[camera].arm != arm:
         allowed = f"a camera that {arm} carries; without --move you move the arm yourself"

@@ -1,4 +1,4 @@
-"""What `vergence calibrate` says at its end, in words and as JSON."""
+"""The result of `vergence calibrate`, as text and as JSON."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from vergence.camera.calibration import BadImage, CalibrationFailure
 
 
 def tell_failure(failure: CalibrationFailure, data: Dataset, as_json: bool) -> int:
-    """Say why there is no calibration; return the exit code."""
+    """Print why there is no calibration; return the exit code."""
     if as_json:
         emit(
             {

@@ -65,7 +65,7 @@ def chart_svg(chart: Chart, name: str) -> str:
 
     Args:
         chart: what to draw.
-        name: of the drawing, for who cannot see it.
+        name: of the drawing, for screen readers.
     """
     top = _EVENTS if chart.events else 0.0  # free for the numbers of the events
     parts: list[str] = []

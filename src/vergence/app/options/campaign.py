@@ -115,7 +115,7 @@ class MapOptions(CampaignOptions):
     ] = "own"
 
     def __post_init__(self) -> None:
-        """Raise InputError if a value is none of those allowed."""
+        """Raise InputError if a value is not among those allowed."""
         if self.over not in names.OVER:
             raise InputError("--over", "", self.over, nearest(self.over, names.OVER))
         if not 0 < self.extent < math.inf:

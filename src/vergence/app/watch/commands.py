@@ -1,4 +1,4 @@
-"""What a page may ask for: each command, and the range of its numbers."""
+"""Commands of a page: each command, and the range of its numbers."""
 
 from typing import Annotated, Literal, TypeAlias, get_args
 
@@ -40,13 +40,13 @@ class Pause(_Command):
 
 
 class Resume(_Command):
-    """Let time pass."""
+    """Let the run continue."""
 
     do: Literal["resume"]
 
 
 class Step(_Command):
-    """Let time pass until the next image."""
+    """Run until the next image."""
 
     do: Literal["step"]
 
@@ -64,7 +64,7 @@ class Reset(_Command):
 
 
 class SetSpeed(_Command):
-    """Let time pass so many times as fast as on the wall."""
+    """Set the speed, in multiples of real time."""
 
     do: Literal["speed"]
     value: Annotated[float, Field(ge=0.01, le=1000)]

@@ -1,4 +1,4 @@
-"""What pages ask for, until the thread that runs gets to it."""
+"""Requests of pages, until the running thread processes them."""
 
 import logging
 import queue
@@ -19,7 +19,7 @@ class Inbox:
         self._queue: queue.Queue[Request] = queue.Queue(_MOST_WAITING)
 
     def ask(self, request: Request) -> None:
-        """Ask for something; refused at once while too much is waiting."""
+        """Add a request; refused at once if too many are waiting."""
         try:
             self._queue.put_nowait(request)
         except queue.Full:

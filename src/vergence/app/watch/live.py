@@ -1,4 +1,4 @@
-"""A cell that runs while somebody watches, pauses it, turns its knobs and moves its target."""
+"""A running cell that can be watched, paused and changed, and whose target can be moved."""
 
 import contextlib
 from dataclasses import replace
@@ -45,7 +45,7 @@ _LOOK_UP_S = 0.1  # the longest wait without a look at whether Ctrl-C was presse
 
 
 class Live:
-    """Runs a cell beside the wall clock, again and again, and does what pages ask for.
+    """Runs a cell in step with the wall clock, repeatedly, and executes the requests of pages.
 
     It runs in the thread that calls `run`; `ask` may be called from any.
 
@@ -90,7 +90,7 @@ class Live:
         return self._recorder.folder
 
     def ask(self, request: Request) -> None:
-        """Ask for something; it is done between two turns of the loop."""
+        """Add a request; it is executed between two turns of the loop."""
         self._inbox.ask(request)
 
     def run(self) -> Run:
@@ -111,7 +111,7 @@ class Live:
         return result
 
     def close(self) -> None:
-        """Let go of everything; a recording that is not finished is closed as it is."""
+        """Release everything; a recording that is not finished is closed as it is."""
         reason = "the run ended unexpectedly, without a reason"
         self._recorder.close(Outcome(OutcomeKind.STOPPED, reason, self._recorder.now), {})
         self.scene.close()
@@ -315,7 +315,7 @@ class Live:
         self._say("law changed", ", ".join(changes) or "reset to the cell's settings")
 
     def _take_changes(self) -> None:
-        """Let a task that has just begun go by what was changed of its law since the run began."""
+        """Apply changes of a law since the start of the run to a task that has just begun."""
         assert self._context is not None
         try:
             law = self._editor.law_after(self._begun_with, self._context)

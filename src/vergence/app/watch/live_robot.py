@@ -1,4 +1,4 @@
-"""A real cell that somebody watches in the browser, and can stop."""
+"""A real cell that can be watched, and stopped, in the browser."""
 
 import contextlib
 from pathlib import Path
@@ -57,7 +57,7 @@ class LiveRobot:
         self.scene = Scene(self._mirror.world, self.view_state)
 
     def ask(self, request: Request) -> None:
-        """Ask for something; it is done between two turns of the loop."""
+        """Add a request; it is executed between two turns of the loop."""
         self._inbox.ask(request)
 
     def run(self) -> Run:
@@ -92,7 +92,7 @@ class LiveRobot:
         return result
 
     def close(self) -> None:
-        """Let go of everything; a recording that is not finished is closed as it is."""
+        """Release everything; a recording that is not finished is closed as it is."""
         reason = "the run ended unexpectedly, without a reason"
         self._recorder.close(Outcome(OutcomeKind.STOPPED, reason, self._recorder.now), {})
         self.scene.close()

@@ -1,4 +1,4 @@
-"""How fast simulated time passes for the one who watches."""
+"""The pace of simulated time on the live page."""
 
 from time import perf_counter
 
@@ -28,7 +28,7 @@ class Pace:
         self.paused = True
 
     def resume(self) -> None:
-        """Let time pass."""
+        """Let the run continue."""
         self.paused, self._steps, self._anchor = False, 0, None
 
     def step(self) -> None:
@@ -37,7 +37,7 @@ class Pace:
         self._steps += 1
 
     def set_speed(self, speed: float) -> None:
-        """Let time pass so many times as fast as on the wall."""
+        """Set the speed, in multiples of real time."""
         self.speed, self._anchor = speed, None
 
     def delay(self, time: float) -> float | None:

@@ -44,7 +44,7 @@ class PageConnection:
         self._ready = True
 
     async def serve(self) -> None:
-        """Tell the page what is new, and pass on what it asks."""
+        """Send news to the page, and pass on its requests."""
         listening = asyncio.create_task(self._listen())
         reader = Reader()
         try:

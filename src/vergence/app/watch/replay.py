@@ -1,4 +1,4 @@
-"""A recording that somebody watches: it plays, pauses and goes where the slider is."""
+"""A recording on the live page: it plays, pauses and follows the slider."""
 
 import contextlib
 from time import perf_counter
@@ -42,7 +42,7 @@ class Replay:
         self._begin("" if known is not None else str(world))
 
     def ask(self, request: Request) -> None:
-        """Ask for something; it is done before the next instant is shown."""
+        """Add a request; it is executed before the next instant is shown."""
         self._inbox.ask(request)
 
     def run(self) -> None:
@@ -51,7 +51,7 @@ class Replay:
             self._play()
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Release everything."""
         if self.scene is not None:
             self.scene.close()
 

@@ -1,4 +1,4 @@
-"""From where somebody looks at the world."""
+"""The viewpoint on the world."""
 
 from dataclasses import dataclass
 from typing import Self

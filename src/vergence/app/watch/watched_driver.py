@@ -1,4 +1,4 @@
-"""A simulated cell that somebody watches and moves the target of."""
+"""The driver of a simulated cell on the live page, where its target can be moved."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,7 @@ from vergence.simulation import SimulatedDriver
 
 
 class WatchedDriver(SimulatedDriver):
-    """Lets somebody in between two turns of the loop, who may make it wait.
+    """Calls a function between two turns of the loop, which may make the loop wait.
 
     Attributes:
         target: moves the target, and lets the mouse move it.
@@ -24,7 +24,7 @@ class WatchedDriver(SimulatedDriver):
         self._due = 0.0  # s, when the next turn is due if no image arrives
 
     def read(self) -> Sample:
-        """Return joints and images, after the watcher had its say."""
+        """Return joints and images, after the call between turns."""
         sample = super().read()
         if self.between is not None and (sample.frames or sample.time >= self._due):
             self._due = sample.time + 1.0 / self.cell.outer_rate_hz

@@ -1,4 +1,4 @@
-"""The driver of a real cell that somebody watches."""
+"""The driver of a real cell on the live page."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ from vergence.signals import Sample
 
 
 class WatchedRobot(DriverWrapper):
-    """Lets somebody in between two turns of the loop, who must not make it wait.
+    """Calls a function between two turns of the loop, which must not make the loop wait.
 
     Args:
         driver: of the robot.
@@ -25,7 +25,7 @@ class WatchedRobot(DriverWrapper):
         self._period_s, self._due = 1.0 / rate_hz, 0.0
 
     def read(self) -> Sample:
-        """Return joints and images, after the watcher had its say."""
+        """Return joints and images, after the call between turns."""
         sample = super().read()
         self.time = sample.time
         if self.between is not None and sample.time >= self._due:
