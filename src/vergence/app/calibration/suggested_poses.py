@@ -1,4 +1,4 @@
-"""Poses of an arm from which its camera sees a board from various directions, each reached on a free line."""
+"""Poses of an arm from which its camera sees a board, each reached on a free line."""
 
 from collections.abc import Callable, Iterator
 

@@ -105,7 +105,7 @@ class Studio:
         return Truth(self.fixed, self.camera, T, T_world_base)
 
     def pose(self) -> FloatArray:
-        """Move the arm to where the camera sees the board from a new direction; return T_base_flange.
+        """Move the arm so that the camera sees the board from elsewhere; return T_base_flange.
 
         Raises:
             InputError: if it finds no such place.
