@@ -135,10 +135,10 @@ def numpy_descend(field: Field, arm: Arm, upsilon: FloatArray, q: FloatArray) ->
         T, J = kinematics(q)
         R = Rotation.from_rotvec(after[3:]).as_matrix()
         desired = field.T_world_star[:3, :3] @ R
-        place_wanted = field.T_world_star[:3, :3] @ (field.distance * after[:3])
-        place_wanted += field.T_world_star[:3, 3]
+        place_desired = field.T_world_star[:3, :3] @ (field.distance * after[:3])
+        place_desired += field.T_world_star[:3, 3]
         turn = Rotation.from_matrix(T[:3, :3].T @ desired).as_rotvec()
-        missing = np.concatenate((T[:3, :3].T @ (place_wanted - T[:3, 3]), turn))
+        missing = np.concatenate((T[:3, :3].T @ (place_desired - T[:3, 3]), turn))
         q = q + np.linalg.pinv(J) @ missing
         upsilon, taken = after, taken + 1
     return taken

@@ -247,7 +247,7 @@ class Guard:
         self._dt = period_s
         self._position: FloatArray = position.copy()
         self._velocity: FloatArray = np.zeros(arm.joint_count)
-        self._wanted = np.zeros(arm.joint_count)  # writeable and contiguous, as the kernel expects
+        self._desired = np.zeros(arm.joint_count)  # writeable and contiguous, as the kernel expects
         self.joint_count = arm.joint_count
         self._braking, self.hindrance = braking, ""
         self.at_limit: BoolArray = np.zeros(arm.joint_count, dtype=np.bool_)
@@ -275,9 +275,9 @@ class Guard:
         Raises:
             ShapeError: if there is not one rate a joint; no set-point is made.
         """
-        self._wanted[:] = as_floats(rates, (self.joint_count,), "rates")
+        self._desired[:] = as_floats(rates, (self.joint_count,), "rates")
         position, velocity, at_limit = guarded_step(
-            self._position, self._velocity, self._wanted, self._limits, self._dt
+            self._position, self._velocity, self._desired, self._limits, self._dt
         )
         if self._braking is not None and not self.hindrance:
             self.hindrance = self._braking.hindrance(Setpoint(position, velocity))
@@ -292,11 +292,11 @@ class Guard:
         Returns:
             The last set-point; None, and no step is taken, where each must be looked at.
         """
-        self._wanted[:] = as_floats(rates, (self.joint_count,), "rates")
+        self._desired[:] = as_floats(rates, (self.joint_count,), "rates")
         if self.hindrance or not self._stays_clear(count):
             return None
         self._position, self._velocity, self.at_limit = same_steps(
-            self._position, self._velocity, self._wanted, self._limits, self._dt, count
+            self._position, self._velocity, self._desired, self._limits, self._dt, count
         )
         return self.setpoint
 
@@ -305,23 +305,23 @@ class Guard:
         if self._braking is None:
             return True
         q, (low, high, rate_max, _) = self._position, self._limits
-        fastest = np.maximum(np.abs(self._wanted), np.abs(self._velocity))
+        fastest = np.maximum(np.abs(self._desired), np.abs(self._velocity))
         # A joint outside its range is brought back at a rate of its own.
         fastest = np.where((q < low) | (q > high), rate_max, np.minimum(fastest, rate_max))
         return self._braking.stays_clear(q, fastest, count * self._dt)
 
     def brake(self) -> Setpoint:
         """Return the next set-point on the way to rest, also where that is outside the range."""
-        limits, self._wanted[:] = self._limits.copy(), 0.0
+        limits, self._desired[:] = self._limits.copy(), 0.0
         limits[0] = np.minimum(limits[0], self._position)
         limits[1] = np.maximum(limits[1], self._position)
         self._position, self._velocity, self.at_limit = guarded_step(
-            self._position, self._velocity, self._wanted, limits, self._dt
+            self._position, self._velocity, self._desired, limits, self._dt
         )
         return self.setpoint
 
     def approach(self, position: FloatArray) -> Setpoint:
         """Return the next set-point on the way to a position (n,), where it comes to rest."""
-        if np.shape(position) != self._wanted.shape:
-            raise ShapeError("position", np.shape(position), self._wanted.shape)
+        if np.shape(position) != self._desired.shape:
+            raise ShapeError("position", np.shape(position), self._desired.shape)
         return self.step(closing_rates(position - self._position, self._limits, self._dt))

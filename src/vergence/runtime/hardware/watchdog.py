@@ -11,10 +11,10 @@ from vergence.signals import Setpoint
 class Watchdog:
     """Sits between a link that may fail and an arm's servo, and is stepped by the servo's clock.
 
-    Between two set-points the arm continues at the speed of the last one, so that a late message is
-    not felt. After `timeout_s` without any it is braked to rest, and stays there: only a new
-    watchdog moves it again. Whatever arrives, no limit of the arm is passed. It waits patiently for
-    the first set-point.
+    Between two set-points the arm continues at the speed of the last one, so a late message has
+    no effect. After `timeout_s` without one the arm is braked to rest, and stays there: only a new
+    watchdog moves it again. No set-point passes a limit of the arm. The first set-point may come at
+    any time.
 
     Args:
         arm: the arm with its limits.
@@ -27,9 +27,9 @@ class Watchdog:
         self._guard = Guard(arm, start, dt)
         self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
         self._dt, self._timeout_s = dt, timeout_s
-        self._wanted: Setpoint | None = None
+        self._desired: Setpoint | None = None
         self._silent_s = 0.0
-        self.tripped = False  # whether it has given up waiting
+        self.tripped = False  # whether the timeout has passed
 
     @property
     def at_rest(self) -> bool:
@@ -37,11 +37,11 @@ class Watchdog:
         return not self._guard.moving
 
     def hear(self, setpoint: Setpoint, age_s: float = 0.0) -> None:
-        """Take a set-point; one that is not finite or not of the arm's length counts for nothing.
+        """Take a set-point; one that is not finite or not of the arm's length is ignored.
 
         Args:
             setpoint: where the arm should be, and how fast it should move there.
-            age_s: how long ago it was meant for; beyond the timeout it counts for nothing either.
+            age_s: how long ago it was meant for; beyond the timeout it is ignored, too.
         """
         position, velocity = (
             np.asarray(part, dtype=np.float64) for part in (setpoint.position, setpoint.velocity)
@@ -50,20 +50,20 @@ class Watchdog:
             return
         if not age_s <= self._timeout_s or not np.isfinite(position + velocity).all():
             return
-        self._wanted = Setpoint(position + age_s * velocity, velocity)
+        self._desired = Setpoint(position + age_s * velocity, velocity)
         self._silent_s = 0.0
 
     def step(self) -> Setpoint:
         """Return what to hand to the servo in this tick."""
-        if self._wanted is None:
+        if self._desired is None:
             return self._guard.step(np.zeros(self._guard.joint_count))
         self.tripped |= self._silent_s > self._timeout_s
         self._silent_s += self._dt
         if self.tripped:
             return self._guard.step(np.zeros(self._guard.joint_count))
-        out = self._guard.step(self._rates(self._wanted))
-        ahead = self._wanted.position + self._dt * self._wanted.velocity
-        self._wanted = Setpoint(ahead, self._wanted.velocity)
+        out = self._guard.step(self._rates(self._desired))
+        ahead = self._desired.position + self._dt * self._desired.velocity
+        self._desired = Setpoint(ahead, self._desired.velocity)
         return out
 
     def _rates(self, desired: Setpoint) -> FloatArray:
