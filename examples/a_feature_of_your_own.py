@@ -1,4 +1,4 @@
-"""A feature of one's own, the area of a triangle, stacked with its points."""
+"""A feature of your own, the area of a triangle, stacked with its points."""
 
 from pathlib import Path
 

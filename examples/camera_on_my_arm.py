@@ -1,4 +1,4 @@
-"""Joint rates of one's own arm, with a camera where a hand-eye calibration says it is."""
+"""Joint rates of your own arm, with a camera mounted as a hand-eye calibration says."""
 
 from pathlib import Path
 

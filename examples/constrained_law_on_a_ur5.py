@@ -1,4 +1,4 @@
-"""Ask a UR5 for an image that it must not reach: without limits, and with them.
+"""Servo a UR5 towards an image beyond its view limit, without limits and with them.
 
 The four points are desired beyond the border of the image. The pseudo-inverse goes there and loses
 them; the quadratic program stops at the border, and its recording says which limit held it back.
@@ -17,7 +17,7 @@ from vergence.signals import Reference
 from vergence.simulation import ExactPoints, SimulatedDriver
 
 MARGIN_PX = 20.0
-BEYOND_PX = np.array([320.0, 60.0])  # how far off the points are desired
+BEYOND_PX = np.array([320.0, 60.0])  # offset of the desired points
 
 
 def servo(driver: SimulatedDriver, law: Law, desired_px: np.ndarray, folder: Path) -> Recording:

@@ -1,4 +1,4 @@
-"""An objective of one's own: in Python, and as kind = "mine:Centre" in a cell beside this file.
+"""An objective of your own: in Python, and as kind = "mine:Centre" in a cell beside this file.
 
 The same class is compared with others by: vergence compare CELL --laws own,mine:Centre
 """

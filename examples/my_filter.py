@@ -1,4 +1,4 @@
-"""A filter of one's own: in a cell beside it, filter = "my_filter:Stationary" under [perception].
+"""A filter of your own: in a cell beside it, filter = "my_filter:Stationary" under [perception].
 
 A filter is a value: what it believes of the target is handed in and returned.
 """

@@ -1,4 +1,4 @@
-"""A whole law of one's own: kind = "my_law:Transpose" under [law] in a cell beside this file.
+"""A whole law of your own: kind = "my_law:Transpose" under [law] in a cell beside this file.
 
 vergence compare CELL --laws own,my_law:Transpose compares it with others.
 """

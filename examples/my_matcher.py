@@ -1,4 +1,4 @@
-"""A matcher of one's own: in a cell beside it, matcher = "my_matcher:Orb" under [task].
+"""A matcher of your own: in a cell beside it, matcher = "my_matcher:Orb" under [task].
 
 OpenCV's ORB stands for any features that recognise the points of one image in another.
 """

@@ -1,4 +1,4 @@
-"""A planner of one's own: planner = "my_planner:Straight" under [task] in a cell beside this file.
+"""A planner of your own: planner = "my_planner:Straight" under [task] in a cell beside this file.
 
 vergence plan CELL --planner my_planner:Straight draws its path.
 """

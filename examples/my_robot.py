@@ -1,4 +1,4 @@
-"""One's own robot behind the driver protocol: vergence run CELL --driver my_robot:MyRobot
+"""Your own robot behind the driver protocol: vergence run CELL --driver my_robot:MyRobot
 
 Here a simulated cell stands for the controller and the cameras; put calls of your own in its place.
 """

@@ -1,4 +1,4 @@
-"""A tracker of one's own: in a cell beside it, tracker = "my_tracker:LucasKanade" under [task].
+"""A tracker of your own: in a cell beside it, tracker = "my_tracker:LucasKanade" under [task].
 
 OpenCV's optical flow stands for any tracker that finds points again from image to image.
 """

@@ -1,4 +1,4 @@
-"""Servo by the grey values of a whole image, coarse to fine, and see from how far that works.
+"""Servo with the grey values of a whole image, coarse to fine, from various distances.
 
 A camera 0.5 m before a textured plane starts away from its goal. It arrives if the image still
 resembles the desired one; on coarser levels of the pyramid that reaches farther.

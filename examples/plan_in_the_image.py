@@ -1,4 +1,4 @@
-"""Two images of an object nobody has a model of: plan a path between them and look at it."""
+"""Two images of an object without a model: plan a path between them and plot it."""
 
 from vergence.cell import load_cell
 from vergence.planning import OptimisedPlanner, PlanningProblem, Trajectory

@@ -1,4 +1,4 @@
-"""Follow a moving board with a camera on a Puma, every part put together by hand."""
+"""Follow a moving board with a camera on a Puma, with every part assembled by hand."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The twist of a camera that sees four points and should see them elsewhere."""
+"""The camera twist that moves four image points towards their desired positions."""
 
 import vergence as vg
 

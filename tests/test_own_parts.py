@@ -1,4 +1,4 @@
-"""Planners, trackers and filters of one's own: found beside the cell, checked as all parts are."""
+"""Planners, trackers and filters of a user's own: found beside the cell, checked as all parts are."""
 
 import shutil
 from pathlib import Path
@@ -78,7 +78,7 @@ def test_a_filter_beside_the_cell_follows_the_target(tmp_path: Path) -> None:
     settings = {"perception.filter": '{ kind = "my_filter:Stationary", slow_m_s = 1.0 }', **SHORT}
     run = run_cell(own(tmp_path, "lippiello2005", settings), images=False)
     assert run.outcome.kind is OutcomeKind.COMPLETED
-    assert not run.target.velocity[1:].any()  # the filter of one's own says that it is at rest
+    assert not run.target.velocity[1:].any()  # the user's filter says that it is at rest
 
 
 @pytest.mark.parametrize(

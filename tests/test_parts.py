@@ -1,4 +1,4 @@
-"""One declaration per part: constructor, cell table and messages agree; one's own are found."""
+"""One declaration per part: constructor, cell table and messages agree; a user's own are found."""
 
 import sys
 from importlib.metadata import EntryPoint

@@ -1,4 +1,4 @@
-"""Matchers of one's own and learned ones: asked in turn, and held to what they promise."""
+"""Matchers of a user's own and learned ones, used in turn and checked."""
 
 import pickle
 import shutil
