@@ -1,4 +1,4 @@
-"""Planners, trackers and filters of a user's own: found beside the cell, checked as all parts are."""
+"""A user's planners, trackers and filters: found beside the cell, checked as all parts are."""
 
 import shutil
 from pathlib import Path
