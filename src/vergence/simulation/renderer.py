@@ -4,8 +4,9 @@ import importlib
 import os
 import sys
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from ctypes.util import find_library
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from vergence.simulation.sensor import Sensor
 # (root mean square, the Puma's cell). No other renderer knows the word.
 _SOFTWARE = ("LP_PERF", "no_mip_linear")
 _CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo settles on it, when imported
+_T = TypeVar("_T")
 _BLOTCH_PX = 24  # side of a place without depth
 
 
@@ -54,6 +56,9 @@ class CameraRenderer:
     draws without distortion, an image wide enough for all that the camera sees; each pixel of
     the camera's own image is then looked up in that one.
 
+    A thread of its own draws, beside physics and the loop: a graphics context belongs to one
+    thread. Images come out in the order in which they are begun, and the same as if waited for.
+
     Args:
         model: MuJoCo's.
         name: of the camera in it.
@@ -67,10 +72,13 @@ class CameraRenderer:
     ) -> None:
         import mujoco
 
+        self._thread = ThreadPoolExecutor(1, "renderer")
+        self._last: Future[ImageArray] | None = None  # image begun
         try:
             drawn = camera.undistorted()
             os.environ.setdefault(*_SOFTWARE)
-            self._renderer = mujoco.Renderer(model, drawn.height, drawn.width)
+            model.vis.quality.shadowsize = 0  # else a map of 4096 x 4096 is made, and never used
+            self._renderer = self._in_thread(mujoco.Renderer, model, drawn.height, drawn.width)
         except Exception as error:  # whatever the graphics library throws
             raise RenderingError(
                 f"the offscreen renderer does not start ({error}); "
@@ -91,7 +99,20 @@ class CameraRenderer:
             blind: whether no light comes in.
             settled: whether the automatic exposure is adjusted to the scene, see `Sensor.read`.
         """
-        light = np.zeros(self._shape, dtype=np.uint8) if blind else self.draw(data)
+        return self.begin(data, blind, settled).result()
+
+    def begin(self, data: Any, blind: bool = False, settled: bool = True) -> Future[ImageArray]:
+        """Begin to take an image of the present world, which may move on meanwhile.
+
+        Arguments and the image to come are those of `take`.
+        """
+        if not blind:
+            self._show(data)
+        self._last = self._thread.submit(self._image, blind, settled)
+        return self._last
+
+    def _image(self, blind: bool, settled: bool) -> ImageArray:
+        light = np.zeros(self._shape, dtype=np.uint8) if blind else self._drawn()
         return self._sensor.read(light, settled)
 
     def take_moving(
@@ -111,9 +132,18 @@ class CameraRenderer:
 
     def draw(self, data: Any) -> ImageArray:
         """Return the light (height, width) of the world in its present state, in grey levels."""
+        self._show(data)
+        return self._in_thread(self._drawn)
+
+    def _show(self, data: Any) -> None:
+        """Make the present world what is drawn next."""
+        if self._last is not None:
+            wait((self._last,))  # it is drawn from the same list of shapes
+        self._renderer.update_scene(data, self._name)
+
+    def _drawn(self) -> ImageArray:
         import cv2
 
-        self._renderer.update_scene(data, self._name)
         grey = cv2.cvtColor(self._renderer.render(), cv2.COLOR_RGB2GRAY)
         if self._lookup is not None:
             grey = cv2.remap(grey, *self._lookup, cv2.INTER_LINEAR)
@@ -123,10 +153,10 @@ class CameraRenderer:
         """Return the depth (height, width), m, of the present world; NaN where unknown."""
         import cv2
 
-        self._renderer.update_scene(data, self._name)
+        self._show(data)
         self._renderer.enable_depth_rendering()
         try:
-            drawn = self._renderer.render()
+            drawn = self._in_thread(self._renderer.render)
         finally:
             self._renderer.disable_depth_rendering()
         z = drawn if self._lookup is None else cv2.remap(drawn, *self._lookup, cv2.INTER_NEAREST)
@@ -155,7 +185,12 @@ class CameraRenderer:
 
     def close(self) -> None:
         """Free the graphics context."""
-        self._renderer.close()
+        self._in_thread(self._renderer.close)
+        self._thread.shutdown()
+
+    def _in_thread(self, function: Callable[..., _T], *arguments: Any) -> _T:
+        """Return what a function returns in the thread that draws."""
+        return self._thread.submit(function, *arguments).result()
 
 
 def _lookup(camera: Camera, drawn: Camera) -> tuple[Any, Any]:

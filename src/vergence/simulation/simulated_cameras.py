@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,6 +18,18 @@ from vergence.simulation.row_weights import row_weights
 from vergence.simulation.shutter import Shutter
 from vergence.simulation.subject import Subject
 from vergence.simulation.world import World
+
+
+class _Arriving(NamedTuple):
+    """An image under way."""
+
+    arrival: int  # tick
+    frame: Frame  # without its image, if that is drawn meanwhile
+    image: Future[ImageArray] | None = None
+
+    def complete(self) -> Frame:
+        """Return the frame with its image."""
+        return self.frame if self.image is None else replace(self.frame, image=self.image.result())
 
 
 class _Exposing(NamedTuple):
@@ -47,8 +60,8 @@ class SimulatedCameras:
     def __init__(self, cell: Cell, world: World, subject: Subject, images: bool) -> None:
         self._cell, self._world, self._subject = cell, world, subject
         self._exposed = dict.fromkeys(cell.cameras, 0)
-        self._queue: deque[tuple[int, Frame]] = deque()  # tick of arrival, frame
-        self._before_motion: list[tuple[int, Frame]] = []  # all that was exposed until the start
+        self._queue: deque[_Arriving] = deque()
+        self._before_motion: list[_Arriving] = []  # all that was exposed until the start
         self._exposing: list[_Exposing] = []
         self._renderers = {
             name: CameraRenderer(
@@ -82,8 +95,8 @@ class SimulatedCameras:
         self._exposed = dict.fromkeys(self._exposed, 0)
         for name, table in self._cell.cameras.items():
             if table.latency_frames:
-                frame = replace(self.frame(name, 0), time=-table.latency_frames / table.rate_hz)
-                self._queue.append((0, frame))
+                one, time = self._begin(name, 0, 0), -table.latency_frames / table.rate_hz
+                self._queue.append(one._replace(frame=replace(one.frame, time=time)))
         self._expose(0, self._world.update)
         self._before_motion = list(self._queue)
 
@@ -94,8 +107,8 @@ class SimulatedCameras:
 
     def tell_again(self) -> None:
         """Deliver once more what was exposed until the start, with what is true of it now."""
-        self._queue = deque((arrival, self._told(frame)) for arrival, frame in self._before_motion)
-        self._before_motion = list(self._queue)
+        self._before_motion = [o._replace(frame=self._told(o.frame)) for o in self._before_motion]
+        self._queue = deque(self._before_motion)
 
     def expose(self, tick: int, update: Callable[[], None]) -> None:
         """Take the images that are due at a tick, and complete those whose shutter has closed.
@@ -111,27 +124,38 @@ class SimulatedCameras:
         for one in [one for one in self._exposing if one.complete <= tick]:
             self._exposing.remove(one)
             frame = replace(one.frame, image=self._moving_image(one))
-            self._queue.append((max(one.arrival, tick), frame))
+            self._queue.append(_Arriving(max(one.arrival, tick), frame))
 
     def arrived(self, tick: int) -> tuple[Frame, ...]:
         """Return the frames that have arrived since the last call, the oldest first."""
-        frames = [frame for arrival, frame in self._queue if arrival <= tick]
-        self._queue = deque(one for one in self._queue if one[0] > tick)
+        frames = [one.complete() for one in self._queue if one.arrival <= tick]
+        self._queue = deque(one for one in self._queue if one.arrival > tick)
         return tuple(sorted(frames, key=lambda frame: frame.time))
 
-    def frame(self, camera: str, tick: int, settled: bool = True, shown: bool = True) -> Frame:
-        """Return what a camera sees now, its image only if shown; see `Sensor.read`."""
-        time = self._time(tick)
-        blind = self._is_blind(camera, time)
-        renderer = self._renderers.get(camera)
-        image = None
-        if renderer is not None and shown:
-            image = renderer.take(self._world.data, blind, settled)
+    def frame(self, camera: str, tick: int) -> Frame:
+        """Return what a camera sees now, its automatic exposure adjusted to the scene."""
+        return self._begin(camera, tick, tick).complete()
+
+    def _begin(self, camera: str, tick: int, arrival: int, settled: bool = True) -> _Arriving:
+        """Begin to take what a camera sees now; see `Sensor.read`."""
+        frame, renderer = self._without_image(camera, tick), self._renderers.get(camera)
+        if renderer is None:
+            return _Arriving(arrival, frame)
+        image = renderer.begin(self._world.data, self._is_blind(camera, frame.time), settled)
+        return _Arriving(arrival, self._with_depth(frame), image)
+
+    def _without_image(self, camera: str, tick: int) -> Frame:
         joints = {name: self._world.joint_position(name) for name in self._world.arms}
-        sensor, depth = self._cell.cameras[camera].depth, None
-        if sensor is not None and renderer is not None:
-            depth = renderer.depth(self._world.data, sensor)
-        return Frame(camera, time, image, joints, self._subject.truth(camera, blind), depth)
+        time = self._time(tick)
+        truth = self._subject.truth(camera, self._is_blind(camera, time))
+        return Frame(camera, time, None, joints, truth)
+
+    def _with_depth(self, frame: Frame) -> Frame:
+        sensor = self._cell.cameras[frame.camera].depth
+        if sensor is None:
+            return frame
+        depth = self._renderers[frame.camera].depth(self._world.data, sensor)
+        return replace(frame, depth_m=depth)
 
     def close(self) -> None:
         """Free the graphics contexts."""
@@ -154,7 +178,7 @@ class SimulatedCameras:
             first = not self._exposed[name]
             self._exposed[name] += 1
             if first:  # nothing has moved yet
-                self._queue.append((arrival, self.frame(name, tick)))
+                self._queue.append(self._begin(name, tick, arrival))
             elif not self._drops[name].random() < self._imaging[name].dropped:
                 self._take(name, tick, arrival)
 
@@ -166,10 +190,10 @@ class SimulatedCameras:
     def _take(self, name: str, tick: int, arrival: int) -> None:
         """Take an image now, or begin to."""
         if self._shutter is None or name not in self._renderers or not self._imaging[name].open_s:
-            self._queue.append((arrival, self.frame(name, tick, settled=False)))
+            self._queue.append(self._begin(name, tick, arrival, settled=False))
             return
         complete = tick + self._shutter.ticks_after(self._imaging[name])
-        frame = self.frame(name, tick, shown=False)
+        frame = self._with_depth(self._without_image(name, tick))
         self._exposing.append(_Exposing(tick, complete, arrival, frame))
 
     def _moving_image(self, one: _Exposing) -> ImageArray:
