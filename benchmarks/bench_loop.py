@@ -15,9 +15,9 @@ SECONDS = "4"
 ROUNDS = 3
 
 
-def factor(recorded: bool) -> float:
-    """Run the Puma's cell once: one camera, 640 × 480 at 30 Hz."""
-    cell = load_cell("puma560", {"duration_s": SECONDS}, 1)
+def factor(recorded: bool, name: str = "puma560") -> float:
+    """Run a cell once; the Puma's has one camera, 640 × 480 at 30 Hz."""
+    cell = load_cell(name, {"duration_s": SECONDS}, 1)
     with tempfile.TemporaryDirectory() as folder:
         listeners = (Recorder(Path(folder) / "run"),) if recorded else ()
         result = run_cell(cell, listeners)
@@ -34,6 +34,12 @@ def median_of(figure: Callable[[], float]) -> float:
 def run() -> list[dict[str, Any]]:
     unit = "× real time"
     return [
-        measured("loop: rendered, Puma 560", median_of(lambda: factor(False)), unit, at_least=3),
+        measured("loop: rendered, Puma 560", median_of(lambda: factor(False)), unit, at_least=6),
         measured("loop: rendered and recorded", median_of(lambda: factor(True)), unit),
+        measured(
+            "loop: rendered, four cameras",
+            median_of(lambda: factor(False, "four_cameras")),
+            unit,
+            at_least=2,
+        ),
     ]

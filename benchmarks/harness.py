@@ -1,5 +1,7 @@
 """Times us and our peers, round by round in turn, so that a busy machine slows both alike.
 
+Seconds are CPU seconds, of all threads of a process: what others do meanwhile does not count.
+
 A *block* runs a case a number of times and says the seconds per call: `calls(f)` makes one of a
 Python function, `loops(f)` of a function that repeats inside itself (a compiled loop), and
 `peers.py` hands out blocks of programs that run beside us. `compare` interleaves blocks and
@@ -64,10 +66,10 @@ def calls(function: Callable[[], object]) -> Block:
     """A block of a Python function; what a call from Python costs is part of the figure."""
 
     def block(count: int) -> float:
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(count):
             function()
-        return (time.perf_counter() - start) / count
+        return (time.process_time() - start) / count
 
     return block
 
@@ -76,9 +78,9 @@ def loops(function: Callable[[int], object]) -> Block:
     """A block of a function that itself repeats its case, such as a loop inside a kernel."""
 
     def block(count: int) -> float:
-        start = time.perf_counter()
+        start = time.process_time()
         function(count)
-        return (time.perf_counter() - start) / count
+        return (time.process_time() - start) / count
 
     return block
 
@@ -206,9 +208,19 @@ def row(
 
 
 def measured(
-    name: str, value: float, unit: str, *, at_least: float | None = None
+    name: str,
+    value: float,
+    unit: str,
+    *,
+    at_least: float | None = None,
+    at_most: float | None = None,
 ) -> dict[str, Any]:
     """A row of a figure that was measured elsewhere, such as a factor of real time."""
+    aim, aimed = None, holds([(value, at_most)])
+    if at_most is not None:
+        aim = aim_words(None, at_most, unit)
+    if at_least is not None:
+        aim, aimed = f"at least {at_least:g} {unit}".rstrip(), value >= at_least
     return {
         "name": name,
         "value": value,
@@ -220,8 +232,8 @@ def measured(
         "ratio": None,
         "ratio_low": None,
         "ratio_high": None,
-        "aim": None if at_least is None else f"at least {at_least:g} {unit}".rstrip(),
-        "holds": None if at_least is None else value >= at_least,
+        "aim": aim,
+        "holds": aimed,
     }
 
 

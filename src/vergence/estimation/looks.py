@@ -16,17 +16,21 @@ class Expected(NamedTuple):
     certain: bool  # whether the filter is consistent
 
 
-class PredictedFrame(NamedTuple):
-    """An image with what is expected of it."""
+class Predicted(NamedTuple):
+    """The C images of a tick, in order of exposure, with what is expected of them."""
 
-    frame: Frame
-    number: int  # of its camera in the rig
-    T_world_camera: FloatArray  # (4, 4)
-    T_camera_world: FloatArray  # (4, 4)
-    T_world_target: FloatArray  # (4, 4) predicted for the exposure
-    covariance: FloatArray  # (12, 12) of that prediction
-    doubt: float  # share of the last points that disagreed
-    certain: bool  # whether the filter is consistent
+    frames: tuple[Frame, ...]
+    numbers: IntArray  # (C,) of their cameras in the rig
+    T_world_camera: FloatArray  # (C, 4, 4)
+    T_camera_world: FloatArray  # (C, 4, 4)
+    T_world_target: FloatArray  # (C, 4, 4) predicted for each exposure
+    T_camera_target: FloatArray  # (C, 4, 4)
+    expected: tuple[Expected, ...]
+
+    @property
+    def newest(self) -> Expected:
+        """What is expected of the last image."""
+        return self.expected[-1]
 
 
 class Look(NamedTuple):

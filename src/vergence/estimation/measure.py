@@ -1,6 +1,6 @@
 """What perception asks of others: the poses of its cameras, and points inside windows."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeAlias
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.estimation.looks import Look
-from vergence.estimation.visibility import StatusArray
+from vergence.estimation.visibility import Visibility
 from vergence.signals import Frame, ImagePoints, SearchWindows
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
@@ -50,62 +50,58 @@ class Measure(Protocol):
         ...
 
 
-def nothing_measured(
-    camera: str, time: float, expected_px: FloatArray, status: StatusArray, widest_px: float
-) -> ImagePoints:
-    """Return image points of all M features of an image that was not looked at.
-
-    Args:
-        camera: whose image.
-        time: of its exposure, s.
-        expected_px: predicted places, (M, 2).
-        status: a `ViewStatus` each, (M,).
-        widest_px: half the widest window.
-    """
-    reasons = tuple([UNSEEN[value] for value in status.tolist()])
-    none = np.zeros(len(reasons), dtype=np.bool_)
-    covariance = np.zeros((len(reasons), 2, 2))
-    covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
-    nowhere = np.full_like(expected_px, np.nan)
-    windows = SearchWindows(nowhere, nowhere)
-    return ImagePoints(camera, time, expected_px, covariance, none, reasons, windows)
-
-
-def spread_out(
-    look: Look,
-    kept: IntArray,
-    expected_px: FloatArray,
-    status: StatusArray,
+def every_point(
+    frames: Sequence[Frame],
+    visibility: Visibility,
+    looks: Sequence[Look],
+    agreeing: Sequence[IntArray],
     widest_px: float,
-) -> ImagePoints:
-    """Return image points of all M features from those K that were measured.
+) -> tuple[ImagePoints, ...]:
+    """Return the image points of all M features of each of C images, whether looked for or not.
 
     A feature that was not found gets its expected place, with a covariance as wide as the
-    widest window and the reason.
+    widest window and the reason. The images share arrays: most of many are not even looked at.
 
     Args:
-        look: what was measured, K points.
-        kept: numbers of the features that agree with the pose.
-        expected_px: predicted places, (M, 2).
-        status: a `ViewStatus` each, (M,).
+        frames: the images, C.
+        visibility: what was expected of them.
+        looks: what was measured in some of them.
+        agreeing: for each look, the numbers of the features that agree with the pose.
         widest_px: half the widest window.
     """
-    found, features = look.found, look.features
-    places = expected_px.copy()
-    covariance = np.zeros((len(places), 2, 2))
-    covariance[:, 0, 0] = covariance[:, 1, 1] = widest_px**2
-    reasons = [UNSEEN[value] for value in status.tolist()]
-    seen = np.zeros(len(places), dtype=np.bool_)
-    seen[kept] = True
-    agreeing = seen[features]
-    for m, agrees, reason in zip(features.tolist(), agreeing.tolist(), found.reasons, strict=True):
-        reasons[m] = reason or ("" if agrees else "disagrees with the pose")
-    places[features[agreeing]] = found.points_px[agreeing]
-    covariance[features[agreeing]] = found.covariance_px[agreeing]
-    windows = SearchWindows(np.full_like(places, np.nan), np.full_like(places, np.nan))
-    windows.center_px[features] = expected_px[features]
-    windows.half_px[features] = look.half_px
-    return ImagePoints(found.camera, found.time, places, covariance, seen, tuple(reasons), windows)
+    places = visibility.points_px.copy()
+    covariance = np.zeros((*places.shape, 2))
+    covariance[..., 0, 0] = covariance[..., 1, 1] = widest_px**2
+    found = np.zeros(places.shape[:2], dtype=np.bool_)
+    center_px, half_px = np.full((2, *places.shape), np.nan)
+    reasons = [[UNSEEN[value] for value in row] for row in visibility.status.tolist()]
+    for look, kept in zip(looks, agreeing, strict=True):
+        found[look.number, kept] = True
+    if looks:
+        row = np.repeat([look.number for look in looks], [len(look.features) for look in looks])
+        features = np.concatenate([look.features for look in looks])
+        center_px[row, features] = places[row, features]
+        half_px[row, features] = np.concatenate([look.half_px for look in looks])
+        agrees = found[row, features]
+        at = row[agrees], features[agrees]
+        places[at] = np.concatenate([look.found.points_px for look in looks])[agrees]
+        covariance[at] = np.concatenate([look.found.covariance_px for look in looks])[agrees]
+        told = [reason for look in looks for reason in look.found.reasons]
+        every = zip(row.tolist(), features.tolist(), agrees.tolist(), told, strict=True)
+        for n, m, agreed, reason in every:
+            reasons[n][m] = reason or ("" if agreed else "disagrees with the pose")
+    return tuple(
+        ImagePoints(
+            frame.camera,
+            frame.time,
+            places[n],
+            covariance[n],
+            found[n],
+            tuple(reasons[n]),
+            SearchWindows(center_px[n], half_px[n]),
+        )
+        for n, frame in enumerate(frames)
+    )
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:

@@ -4,20 +4,20 @@ from collections.abc import Callable, Sequence
 from typing import Generic
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
-from vergence.estimation.looks import Expected, Look, PredictedFrame
+from vergence.estimation.looks import Expected, Look, Predicted
 from vergence.estimation.measure import (
     CameraPose,
     Find,
     Joints,
     Measure,
+    every_point,
     nothing_found,
-    nothing_measured,
-    spread_out,
 )
 from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
@@ -35,7 +35,7 @@ from vergence.estimation.visibility import (
 )
 from vergence.estimation.windows import WindowRule, innovation_spread
 from vergence.geometry import se3_compose, se3_inverse, transform_points
-from vergence.signals import Frame, ImagePoints, Observation, TargetState
+from vergence.signals import Frame, Observation, TargetState
 
 DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
 JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
@@ -97,7 +97,7 @@ class PosePerception(Generic[B]):
         self._history = FilterHistory(target_filter, start, self._settings.horizon)
         self._timeout_from = start.time
         self._last_seen = start
-        self._held: dict[str, BoolArray] = {}
+        self._held = np.zeros((len(rig.cameras), len(shape.points)), dtype=np.bool_)
         self._lost = ""
 
     @property
@@ -126,24 +126,20 @@ class PosePerception(Generic[B]):
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
             return None
-        beliefs = {time: self._expected(time) for time in {frame.time for frame in known}}
-        predictions = [
-            self._expect(frame, beliefs[frame.time])
-            for frame in sorted(known, key=lambda f: (f.time, f.camera))
-        ]
-        visibility = self._see(predictions)
-        chosen = self._choose(predictions, visibility)
+        predicted = self._predict(sorted(known, key=lambda frame: (frame.time, frame.camera)))
+        visibility = self._see(predicted)
+        chosen = self._choose(predicted, visibility)
         looks = [
-            self._look(predictions[n], n, chosen[n], visibility.points_px[n])
+            self._look(predicted, n, chosen[n], visibility.points_px[n])
             for n in np.flatnonzero(chosen.any(axis=1)).tolist()  # no other is even touched
         ]
         agreeing = self._correct(looks)
-        time = predictions[-1].frame.time
-        self._judge(
-            time, [look.view for look in looks], [prediction.frame for prediction in predictions]
-        )
-        points = self._points(predictions, visibility, looks, agreeing)
-        return Observation(time, points, None if self._lost else state_of(self.belief))
+        time = predicted.frames[-1].time
+        self._judge(time, [look.view for look in looks], predicted.frames)
+        points = every_point(predicted.frames, visibility, looks, agreeing, self._windows.most_px)
+        if self._lost:
+            return Observation(time, tuple(nothing_found(p, self._lost) for p in points))
+        return Observation(time, points, state_of(self.belief))
 
     def _expected(self, time: float) -> Expected:
         belief = self._last_seen if self._lost else self._history.at(time)
@@ -151,69 +147,78 @@ class PosePerception(Generic[B]):
         certain = belief.consistency.holds and doubt < DOUBT
         return Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
 
-    def _expect(self, frame: Frame, expected: Expected) -> PredictedFrame:
-        require_size(frame, self._rig)
-        number = self._rig.numbers[frame.camera]
-        T_world_camera = self._camera_pose(frame.camera, frame.joints)
-        return PredictedFrame(frame, number, T_world_camera, se3_inverse(T_world_camera), *expected)
-
-    def _see(self, predictions: list[PredictedFrame]) -> Visibility:
-        T_camera_target = np.array(
-            [se3_compose(p.T_camera_world, p.T_world_target) for p in predictions]
+    def _predict(self, frames: list[Frame]) -> Predicted:
+        """Return what is expected of images in order of exposure."""
+        for frame in frames:
+            require_size(frame, self._rig)
+        at = {time: self._expected(time) for time in {frame.time for frame in frames}}
+        expected = tuple(at[frame.time] for frame in frames)
+        T_world_camera = np.array([self._camera_pose(f.camera, f.joints) for f in frames])
+        T_world_target = np.array([e.T_world_target for e in expected])
+        T_camera_world, T_camera_target = seen_from(T_world_camera, T_world_target)
+        return Predicted(
+            tuple(frames),
+            np.array([self._rig.numbers[frame.camera] for frame in frames]),
+            T_world_camera,
+            T_camera_world,
+            T_world_target,
+            T_camera_target,
+            expected,
         )
+
+    def _see(self, predicted: Predicted) -> Visibility:
         visibility = predict_visibility(
             self._shape,
-            T_camera_target,
-            self._rig.lenses[[p.number for p in predictions]],
+            predicted.T_camera_target,
+            self._rig.lenses[predicted.numbers],
             margin_px=self._settings.margin_px,
             least_cosine=self._settings.least_cosine,
         )
         if self._blocked_at is not None:
-            for status, p in zip(visibility.status, predictions, strict=True):
-                blocked = self._blocked_at(p.frame.joints)
-                world = transform_points(p.T_world_target, self._shape.points)
-                add_obstacles(status, blocked, p.T_world_camera[:3, 3], world)
+            for n, frame in enumerate(predicted.frames):
+                blocked = self._blocked_at(frame.joints)
+                world = transform_points(predicted.T_world_target[n], self._shape.points)
+                eye = predicted.T_world_camera[n, :3, 3]
+                add_obstacles(visibility.status[n], blocked, eye, world)
         return visibility
 
-    def _choose(self, predictions: list[PredictedFrame], visibility: Visibility) -> BoolArray:
+    def _choose(self, predicted: Predicted, visibility: Visibility) -> BoolArray:
+        visible, numbers, newest = visibility.visible, predicted.numbers, predicted.newest
         if self._lost:
-            return visibility.visible
-        none = np.zeros(len(self._shape.points), dtype=np.bool_)
-        numbers = [p.number for p in predictions]
-        held = np.array([self._held.get(p.frame.camera, none) for p in predictions])
+            return visible
+        held = self._held[numbers]
         chosen = self._selection.choose(
             Candidates(
-                keep_apart(visibility.visible, visibility.points_px, held, self._settings.apart_px),
+                keep_apart(visible, visibility.points_px, held, self._settings.apart_px),
                 visibility.points_px,
                 self._shape.points,
-                np.array([p.T_world_target for p in predictions]),
-                np.array([p.T_camera_world for p in predictions]),
+                predicted.T_world_target,
+                predicted.T_camera_world,
                 self._noise[numbers],
                 self._diagonal[numbers],
-                np.ascontiguousarray(predictions[-1].covariance[:6, :6]),
+                np.ascontiguousarray(newest.covariance[:6, :6]),
                 held,
             ),
-            self._settings.budget if predictions[-1].certain else self._settings.budget_in_doubt,
+            self._settings.budget if newest.certain else self._settings.budget_in_doubt,
         )
-        for prediction, mask in zip(predictions, chosen, strict=True):
-            self._held[prediction.frame.camera] = mask
+        self._held[numbers] = chosen
         return chosen
 
     def _look(
-        self, prediction: PredictedFrame, n: int, chosen: BoolArray, expected: FloatArray
+        self, predicted: Predicted, n: int, chosen: BoolArray, expected_px: FloatArray
     ) -> Look:
-        """Measure the features chosen inside windows."""
+        """Measure the features chosen in an image inside windows."""
         features = np.flatnonzero(chosen)
-        half_px = self._half_sizes(prediction, features)
+        half_px = self._half_sizes(predicted, n, features)
         found = self._measure(
-            prediction.frame,
+            predicted.frames[n],
             features,
-            expected[features],
+            expected_px[features],
             half_px,
-            se3_compose(prediction.T_camera_world, prediction.T_world_target),
+            predicted.T_camera_target[n],
         )
-        camera = self._rig.cameras[prediction.number]
-        view = view_of(found, camera, prediction.T_world_camera, self._shape.points, features)
+        camera = self._rig.cameras[predicted.numbers[n]]
+        view = view_of(found, camera, predicted.T_world_camera[n], self._shape.points, features)
         return Look(n, features, half_px, found, view)
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
@@ -226,42 +231,21 @@ class PosePerception(Generic[B]):
             for look, update in zip(looks, updates, strict=True)
         ]
 
-    def _points(
-        self,
-        predictions: list[PredictedFrame],
-        visibility: Visibility,
-        looks: list[Look],
-        agreeing: list[IntArray],
-    ) -> tuple[ImagePoints, ...]:
-        """Return what became of every feature; of a target that is lost, none is found."""
-        expected, status, widest = visibility.points_px, visibility.status, self._windows.most_px
-        points = {
-            look.number: spread_out(look, kept, expected[look.number], status[look.number], widest)
-            for look, kept in zip(looks, agreeing, strict=True)
-        }
-        for n, prediction in enumerate(predictions):
-            if n not in points:
-                frame = prediction.frame
-                points[n] = nothing_measured(
-                    frame.camera, frame.time, expected[n], status[n], widest
-                )
-        every = (points[n] for n in range(len(predictions)))
-        return tuple(nothing_found(p, self._lost) for p in every) if self._lost else tuple(every)
-
-    def _half_sizes(self, prediction: PredictedFrame, features: IntArray) -> FloatArray:
+    def _half_sizes(self, predicted: Predicted, n: int, features: IntArray) -> FloatArray:
         if self._lost:
             return np.full((len(features), 2), self._windows.most_px)
+        expected, number = predicted.expected[n], predicted.numbers[n]
         spread = innovation_spread(
-            prediction.T_world_target,
-            prediction.T_camera_world,
+            predicted.T_world_target[n],
+            predicted.T_camera_world[n],
             self._shape.points[features],
-            prediction.covariance,
+            expected.covariance,
         )
-        camera, noise = self._rig.cameras[prediction.number], self._rig.noise_px[prediction.number]
-        scale = 1.0 + self._settings.doubt_widens * prediction.doubt
-        return self._windows.half_sizes(spread, camera.focal_px, float(noise), scale)
+        camera, noise_px = self._rig.cameras[number], float(self._rig.noise_px[number])
+        scale = 1.0 + self._settings.doubt_widens * expected.doubt
+        return self._windows.half_sizes(spread, camera.focal_px, noise_px, scale)
 
-    def _judge(self, time: float, views: list[View], frames: list[Frame]) -> None:
+    def _judge(self, time: float, views: list[View], frames: Sequence[Frame]) -> None:
         """Drop a target that contradicts the images for too long; search for a dropped one."""
         belief = self._history.belief
         if not self._lost:
@@ -275,7 +259,7 @@ class PosePerception(Generic[B]):
         if self._lost:
             self._recover(views, frames)
 
-    def _recover(self, views: list[View], frames: list[Frame]) -> None:
+    def _recover(self, views: list[View], frames: Sequence[Frame]) -> None:
         if self._find is not None:
             views = [view for frame in frames if (view := self._found(frame)) is not None]
         fit = pose_from_points([view for view in views if view.size])
@@ -305,6 +289,18 @@ class PosePerception(Generic[B]):
         camera = self._rig.cameras[self._rig.numbers[frame.camera]]
         T_world_camera = self._camera_pose(frame.camera, frame.joints)
         return view_of(points, camera, T_world_camera, self._shape.points)
+
+
+@njit(cache=True)
+def seen_from(
+    T_world_camera: FloatArray, T_world_target: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return T_camera_world and T_camera_target, (C, 4, 4) each, of C cameras."""
+    inverse, relative = np.empty_like(T_world_camera), np.empty_like(T_world_camera)
+    for c in range(len(T_world_camera)):
+        inverse[c] = se3_inverse(T_world_camera[c])
+        relative[c] = se3_compose(inverse[c], T_world_target[c])
+    return inverse, relative
 
 
 def require_size(frame: Frame, rig: CameraRig) -> None:

@@ -137,6 +137,33 @@ def greedy_information(
     return chosen
 
 
+@njit(cache=True)
+def choose_by_information(
+    T_world_target: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    noise: FloatArray,
+    visible: BoolArray,
+    held: BoolArray,
+    hold: float,
+    pose_covariance: FloatArray,
+    budget: int,
+) -> BoolArray:
+    """Return the choice of `greedy_information` as a mask (C, M); those held count `hold` times."""
+    rows, numbers = candidate_rows(T_world_target, T_camera_world, points, noise, visible)
+    chosen = np.zeros(visible.shape, dtype=np.bool_)
+    if len(rows) == 0 or budget <= 0:
+        return chosen
+    features = visible.shape[1]
+    weights = np.ones(len(rows))
+    for n in range(len(rows)):
+        if held[numbers[n] // features, numbers[n] % features]:
+            weights[n] = hold
+    for n in greedy_information(rows, weights, pose_covariance, budget):
+        chosen[numbers[n] // features, numbers[n] % features] = True
+    return chosen
+
+
 @dataclass(frozen=True, slots=True)
 class InformationSelection:
     """Greedy choice by the information gained about the pose, ½ log det(I + H P Hᵀ).
@@ -154,16 +181,15 @@ class InformationSelection:
 
     def choose(self, candidates: Candidates, budget: int) -> BoolArray:
         """Return which features to measure, (C, M), at most `budget` and only visible ones."""
-        chosen = np.zeros(candidates.visible.shape, dtype=np.bool_)
-        rows, numbers = candidate_rows(
+        chosen: BoolArray = choose_by_information(
             candidates.T_world_target,
             candidates.T_camera_world,
             candidates.points,
             candidates.noise,
             candidates.visible,
+            candidates.held,
+            self.hold,
+            candidates.pose_covariance,
+            budget,
         )
-        if len(rows) and budget > 0:
-            weights = np.where(candidates.held.reshape(-1)[numbers], self.hold, 1.0)
-            best = greedy_information(rows, weights, candidates.pose_covariance, budget)
-            chosen.reshape(-1)[numbers[best]] = True
         return chosen

@@ -68,7 +68,7 @@ class Resampling(NamedTuple):
 RESAMPLING_SIZE = AREA_PX * AREA_PX + PATCH_PX * PATCH_PX + 2 * PATCH_PX
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def make_resampling(memory: Patch, index: NDArray[np.int32]) -> Resampling:
     """Lay the parts out in flat memory of RESAMPLING_SIZE."""
     return Resampling(
@@ -227,7 +227,7 @@ def align(
     return Alignment(x, y, gain, correlation, residual, steps)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def agreement(template: AlignmentTemplate, work: Resampling) -> tuple[float, float]:
     """Correlation, and root mean square residual less gain and bias, of the last resampling."""
     sample, total = work.sample, product(ROOT_WEIGHTS, ROOT_WEIGHTS)

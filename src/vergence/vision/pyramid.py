@@ -14,7 +14,7 @@ from vergence.arrays import ImageArray
 Patch = NDArray[np.float32]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def anchor_of(coordinate: float) -> int:
     """Return the anchor of the windows whose centre is nearest to a coordinate."""
     return int(np.floor(coordinate)) + 1

@@ -6,6 +6,8 @@ a change of brightness costs nothing; a level of half the coarse resolution and 
 joins the coarse level, so that one of many equal marks is told by its surroundings; where several
 minima of the coarse level come near the best, all are followed to full resolution and compared
 there; a far window has to match a little better than a near one.
+
+Kernels that only kernels call are inlined, else all that they call would be compiled for each again.
 """
 
 from collections.abc import Callable
@@ -45,7 +47,7 @@ class SsdTemplate(NamedTuple):
 TEMPLATE_SIZE = 3 * 8 * 8 + 16 * 16
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def template_in(memory: Patch) -> SsdTemplate:
     """Lay a template out in flat memory of TEMPLATE_SIZE."""
     return SsdTemplate(
@@ -75,7 +77,7 @@ class SsdWorkspace(NamedTuple):
 WORKSPACE_SIZE = 3436
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def make_workspace(memory: Patch) -> SsdWorkspace:
     """Lay the parts of a workspace out in flat memory of WORKSPACE_SIZE."""
     return SsdWorkspace(
@@ -163,7 +165,7 @@ def lowest(surface: Patch, rows: int, columns: int) -> tuple[int, int]:
     return y, x
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
     """Take a minimum and its eight neighbours out of a surface."""
     for i in range(max(y - 1, 0), min(y + 2, rows)):
@@ -171,7 +173,7 @@ def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
             surface[i, j] = np.float32(STRUCK_OUT)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def vertex(before: float, here: float, after: float) -> float:
     """Where the parabola through three neighbouring values is lowest, within half a pixel."""
     bend = before - 2.0 * here + after
@@ -180,7 +182,7 @@ def vertex(before: float, here: float, after: float) -> float:
     return min(max(0.5 * (before - after) / bend, -0.5), 0.5)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def coarse_scores(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> None:
@@ -194,7 +196,7 @@ def coarse_scores(
     add_surroundings(work.surface, work.wide_surface, cost)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def distance_cost(template: SsdTemplate) -> float:
     """What a window pays for lying away from where it is expected, grey levels² a px²."""
     return float(DISTANCE_COST / RANGE_PX**2 * np.var(template.coarse))
@@ -244,7 +246,7 @@ def search(
     return count, best
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def follow_minima(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> int:
@@ -265,7 +267,7 @@ def follow_minima(
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def follow(
     image: ImageArray,
     anchor_x: int,
@@ -283,12 +285,18 @@ def follow(
     work.candidates[k, 0], work.candidates[k, 1] = dx + move_x, dy + move_y
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
+def first_entries(memory: Patch, side: int) -> Patch:
+    """The first entries of memory as a square without gaps, (side, side)."""
+    return memory.reshape(memory.size)[: side * side].reshape(side, side)
+
+
+@njit(cache=True, inline="always")
 def surroundings(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> float:
     """SSD of the coarse template and of the surroundings at an anchor, grey levels² an entry."""
-    area, around = work.window[:16, :16], work.middle[:8, :8]
+    area, around = first_entries(work.window, 16), first_entries(work.middle, 8)
     load_quarter(image, anchor_x, anchor_y, area)
     halve(area, around)
     ssd_surface_8(area, 4, template.coarse, 1, work.strip, work.tiny)
@@ -297,7 +305,7 @@ def surroundings(
     return float(coarse + WIDE_SHARE * work.tiny[0, 0]) / (SIDE * SIDE)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def search_middle(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[int, int]:
@@ -310,7 +318,7 @@ def search_middle(
     return MIDDLE * (column - MIDDLE_REACH), MIDDLE * (row - MIDDLE_REACH)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def search_full(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[float, float, float]:

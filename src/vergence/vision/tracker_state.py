@@ -5,6 +5,8 @@ image in which the point was found, as [Nelson1995] eq. (19) compares successive
 place, which must not drift, comes from an affine alignment to a key template that stays as long
 as the measured change of form since it was taken is small; the sub-pixel offset of the point goes
 with it.
+
+Kernels that only kernels call are inlined, else all that they call would be compiled for each again.
 """
 
 from typing import NamedTuple
@@ -112,25 +114,25 @@ def empty_state(count: int) -> TrackerState:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def affine_of(state: TrackerState, k: int) -> FloatArray:
     """Affine matrix of point k from the first image to the last, (2, 2)."""
     return state.places[k, 2:6].reshape(2, 2)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def key_affine_of(state: TrackerState, k: int, key: int) -> FloatArray:
     """Affine matrix of point k from the first image to that of a key template, (2, 2)."""
     return state.facts[k, key, 4:8].reshape(2, 2)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def key_covariance_of(state: TrackerState, k: int, key: int) -> FloatArray:
     """Covariance of the place of point k in a key template, (2, 2) px²."""
     return state.facts[k, key, 8:12].reshape(2, 2)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def key_template_of(state: TrackerState, k: int, key: int) -> AlignmentTemplate:
     """Key template of point k."""
     facts = state.facts[k, key]
@@ -139,13 +141,13 @@ def key_template_of(state: TrackerState, k: int, key: int) -> AlignmentTemplate:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def fits(x: float, y: float, width: int, height: int) -> bool:
     """Whether the 16 × 16 window around a point lies in the image."""
     return FIT_PX - 0.5 <= x <= width - FIT_PX - 0.5 and FIT_PX - 0.5 <= y <= height - FIT_PX - 0.5
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def inverse2(A: FloatArray) -> FloatArray:
     """Inverse of a 2 × 2 matrix."""
     determinant = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
@@ -155,7 +157,7 @@ def inverse2(A: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def product2(A: FloatArray, B: FloatArray) -> FloatArray:
     """A B for 2 × 2 matrices."""
     out = np.empty((2, 2))
@@ -165,7 +167,7 @@ def product2(A: FloatArray, B: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def apply2(A: FloatArray, x: FloatArray) -> FloatArray:
     """A x for a 2 × 2 matrix."""
     out = np.empty(2)
@@ -173,7 +175,7 @@ def apply2(A: FloatArray, x: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def stretch(A: FloatArray) -> float:
     """The larger of σ₁ and 1/σ₂ of a 2 × 2 matrix: 1 for a rotation."""
     total = 0.5 * (A[0, 0] ** 2 + A[0, 1] ** 2 + A[1, 0] ** 2 + A[1, 1] ** 2)
@@ -183,7 +185,7 @@ def stretch(A: FloatArray) -> float:
     return float(max(largest, largest / max(determinant, 1e-12)))
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def add_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArray) -> None:
     """Take a new key template of point k where it is; a full memory loses its newest."""
     key = min(state.keys[k, 0], KEYS - 1)
@@ -194,7 +196,7 @@ def add_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArr
     state.keys[k, 0], state.keys[k, 1] = key + 1, key
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def renew_search(image: ImageArray, state: TrackerState, k: int) -> None:
     """Take the window at point k as what to search for next."""
     x, y = state.places[k, 0], state.places[k, 1]
@@ -215,13 +217,13 @@ def start_points(image: ImageArray, state: TrackerState) -> None:
             remember_twins(image, k, state)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def twins_of(state: TrackerState, k: int) -> FloatArray:
     """Offsets of the places in the first image that look like point k, (TWINS, 2), 0 if none."""
     return state.places[k, 8:].reshape(TWINS, 2)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
     """Find the nearest places in the first image that would be taken for point k."""
     twins, place = twins_of(state, k), np.empty(COLUMNS + 4)
@@ -242,7 +244,7 @@ def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
                 twins[last, 0], twins[last, 1], distances[last] = off_x, off_y, distance
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def choose_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArray) -> None:
     """Keep the key template, go back to an older one whose form is near, or take a new one.
 
@@ -262,7 +264,7 @@ def choose_key(image: ImageArray, state: TrackerState, k: int, covariance: Float
         add_key(image, state, k, covariance)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
     """Return whether an alignment is the point: the verdict and its number."""
     if found.correlation < LOST_CORRELATION:
@@ -276,7 +278,7 @@ def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
     return FOUND, found.correlation
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
     """Find point k alone, expected at out[PLACE], in an image; returns the verdict."""
     places = np.empty((MOST_PLACES, COLUMNS + 4))
@@ -340,7 +342,7 @@ def settle_all(
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def starting_places(
     image: ImageArray, k: int, state: TrackerState, x: float, y: float
 ) -> FloatArray:
@@ -358,7 +360,7 @@ def starting_places(
     return places
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def nearest(places: FloatArray, x: float, y: float) -> float:
     """Distance from (x, y) to the nearest of some places (N, 2)."""
     least = np.inf
@@ -425,7 +427,7 @@ def take_over(image: ImageArray, k: int, state: TrackerState, place: FloatArray)
         choose_key(image, state, k, place[COVARIANCE].reshape(2, 2))
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def place_covariance(
     state: TrackerState, k: int, key: int, A: FloatArray, found: Alignment
 ) -> FloatArray:
@@ -441,7 +443,7 @@ def place_covariance(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def honest_spread(spread: FloatArray, noise: float) -> FloatArray:
     """Covariance of a place, (2, 2) px², from a template's spread and the noise in it.
 
@@ -512,7 +514,7 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
     return complete
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def widen_for_others(places: FloatArray, chosen: int) -> None:
     """Widen the covariance of the chosen place, so that the others lie within a deviation.
 
@@ -526,7 +528,7 @@ def widen_for_others(places: FloatArray, chosen: int) -> None:
     places[chosen, 5] += farthest
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def that_look_alike(places: FloatArray, count: int) -> int:
     """Bring those of the first places that match about as well as the best to the front; how many.
 
@@ -541,7 +543,7 @@ def that_look_alike(places: FloatArray, count: int) -> int:
     return alike
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def where_neighbours_go(
     k: int, expected: FloatArray, answers: FloatArray, sure: BoolArray
 ) -> tuple[float, float]:
@@ -555,7 +557,7 @@ def where_neighbours_go(
     return expected[k, 0] + np.median(moved[:, 0]), expected[k, 1] + np.median(moved[:, 1])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def look_again(
     image: ImageArray, state: TrackerState, expected: FloatArray, answers: FloatArray
 ) -> None:
