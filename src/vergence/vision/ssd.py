@@ -7,7 +7,7 @@ joins the coarse level, so that one of many equal marks is told by its surroundi
 minima of the coarse level come near the best, all are followed to full resolution and compared
 there; a far window has to match a little better than a near one.
 
-Kernels that only kernels call are inlined, else all that they call would be compiled for each again.
+Kernels that only kernels call are inlined: numba would compile each, and all it calls, once more.
 """
 
 from collections.abc import Callable

@@ -6,7 +6,7 @@ place, which must not drift, comes from an affine alignment to a key template th
 as the measured change of form since it was taken is small; the sub-pixel offset of the point goes
 with it.
 
-Kernels that only kernels call are inlined, else all that they call would be compiled for each again.
+Kernels that only kernels call are inlined: numba would compile each, and all it calls, once more.
 """
 
 from typing import NamedTuple
