@@ -1,11 +1,14 @@
 """Images are drawn in a thread beside physics, and are those that a waiting loop would get."""
 
+import gc
+import threading
+
 import numpy as np
 
 from vergence.arrays import ImageArray
 from vergence.camera import Camera
 from vergence.cell import load_cell
-from vergence.simulation import CameraRenderer
+from vergence.simulation import CameraRenderer, SimulatedDriver
 from vergence.simulation.renderer import choose_renderer
 from vergence.simulation.world import World
 
@@ -44,3 +47,16 @@ def test_images_of_other_moments_differ() -> None:
     assert np.mean(first != second) > 0.5
     assert blind.mean() < 3.0
     assert np.abs(first.astype(int) - last).mean() < 5.0  # the same place, with other noise
+
+
+def test_a_driver_that_nobody_closes_frees_its_graphics_and_ends_its_threads() -> None:
+    before = threading.active_count()
+    for _ in range(2):
+        driver = SimulatedDriver(CELL)
+        assert threading.active_count() > before
+        del driver
+        gc.collect()  # pytest makes an error of what a finalizer raises
+        for thread in threading.enumerate():
+            if thread.name.startswith("renderer"):
+                thread.join(10.0)
+    assert threading.active_count() == before

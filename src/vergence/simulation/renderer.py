@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from ctypes.util import find_library
 from typing import Any, TypeVar
+from weakref import finalize
 
 import numpy as np
 
@@ -84,6 +85,8 @@ class CameraRenderer:
                 f"the offscreen renderer does not start ({error}); "
                 "Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
             ) from None
+        self._end = finalize(self, _close_in, self._thread, self._renderer)
+        self._end.atexit = False
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._renderer.scene.flags[flag] = 0
         self._name, self._shape = name, (camera.height, camera.width)
@@ -185,12 +188,18 @@ class CameraRenderer:
 
     def close(self) -> None:
         """Free the graphics context."""
-        self._in_thread(self._renderer.close)
+        self._end()
         self._thread.shutdown()
 
     def _in_thread(self, function: Callable[..., _T], *arguments: Any) -> _T:
         """Return what a function returns in the thread that draws."""
         return self._thread.submit(function, *arguments).result()
+
+
+def _close_in(thread: ThreadPoolExecutor, renderer: Any) -> None:
+    """Free a graphics context in its own thread, without waiting for it."""
+    thread.submit(renderer.close)
+    thread.shutdown(wait=False)
 
 
 def _lookup(camera: Camera, drawn: Camera) -> tuple[Any, Any]:
