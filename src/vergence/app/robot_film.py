@@ -11,6 +11,7 @@ from vergence.app.recorded_world import RecordedWorld
 from vergence.arrays import FloatArray
 from vergence.runtime.recording import Recording
 from vergence.simulation.build import under_a_sky
+from vergence.simulation.renderer import offscreen
 
 _FRAMES, _PER_SECOND = 24, 5.0  # at most: to draw one takes a processor about 10 ms
 _WIDTH_PX, _HEIGHT_PX, _QUALITY = 400, 300, 80
@@ -53,12 +54,10 @@ def _drawn(model: Any, states: list[FloatArray], view: Any) -> list[bytes]:
     model.vis.global_.offheight = max(model.vis.global_.offheight, _HEIGHT_PX)
     data, kind = mujoco.MjData(model), int(mujoco.mjtState.mjSTATE_INTEGRATION)
     try:
-        renderer = mujoco.Renderer(model, _HEIGHT_PX, _WIDTH_PX)
+        renderer = offscreen(model, _HEIGHT_PX, _WIDTH_PX)
     except Exception:  # whatever the graphics library throws
         return []
     jpegs = []
-    for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-        renderer.scene.flags[flag] = 0
     with renderer:
         for state in states:
             mujoco.mj_setState(model, data, state, kind)

@@ -50,6 +50,20 @@ def choose_renderer(needed: bool = True) -> None:
     )
 
 
+def offscreen(model: Any, height: int, width: int) -> Any:
+    """Return MuJoCo's renderer of a model, without shadows and reflections, which cost the most.
+
+    It belongs to the thread that calls this.
+    """
+    import mujoco
+
+    model.vis.quality.shadowsize = 0  # else a map of 4096 x 4096 is made, and never used
+    renderer = mujoco.Renderer(model, height, width)
+    for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+        renderer.scene.flags[flag] = 0
+    return renderer
+
+
 class CameraRenderer:
     """Takes grey images with one camera of a world, with distortion and what its sensor does.
 
@@ -71,15 +85,12 @@ class CameraRenderer:
     def __init__(
         self, model: Any, name: str, camera: Camera, table: CameraTable, rng: np.random.Generator
     ) -> None:
-        import mujoco
-
         self._thread = ThreadPoolExecutor(1, "renderer")
         self._last: Future[ImageArray] | None = None  # image begun
         try:
             drawn = camera.undistorted()
             os.environ.setdefault(*_SOFTWARE)
-            model.vis.quality.shadowsize = 0  # else a map of 4096 x 4096 is made, and never used
-            self._renderer = self._in_thread(mujoco.Renderer, model, drawn.height, drawn.width)
+            self._renderer = self._in_thread(offscreen, model, drawn.height, drawn.width)
         except Exception as error:  # whatever the graphics library throws
             raise RenderingError(
                 f"the offscreen renderer does not start ({error}); "
@@ -87,8 +98,6 @@ class CameraRenderer:
             ) from None
         self._end = finalize(self, _close_in, self._thread, self._renderer)
         self._end.atexit = False
-        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self._renderer.scene.flags[flag] = 0
         self._name, self._shape = name, (camera.height, camera.width)
         self._lookup = _lookup(camera, drawn) if camera.distorted else None
         self._rng = rng

@@ -10,6 +10,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.cell.schema import CameraTable
 from vergence.geometry import matrix_to_quaternion, se3, so3_exp
+from vergence.simulation.renderer import offscreen
 from vergence.simulation.row_weights import row_weights
 from vergence.simulation.sensor import Sensor
 from vergence.studies.region_objects import Mesh
@@ -50,16 +51,12 @@ def film(
         light: by which share the light changes, 0 … 1.
         imaging: of the camera, see `ImagingTable`; ideal with noise if None.
     """
-    import mujoco
-
     random = np.random.default_rng(seed)
     width = float(np.median(np.ptp(mesh[0], axis=0)))
     model = _world(mesh, random, 0.5 * hidden * width)
     stage = _Stage(model, _swing(random), width, count / RATE_HZ, light)
     camera = _BadCamera(seed, imaging) if imaging is not None else None
-    renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
-    for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-        renderer.scene.flags[flag] = 0
+    renderer = offscreen(model, HEIGHT, WIDTH)
     try:
         for k in range(count):
             t = k / RATE_HZ
