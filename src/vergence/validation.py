@@ -83,6 +83,8 @@ def _allowed(complaint: ErrorDetails) -> str:
             return f"at most {complaint['ctx']['le']:g}"
         case "string_pattern_mismatch":
             return "a letter or digit, then at most 63 letters, digits, spaces, and . _ -"
+        case "string_too_long":
+            return f"at most {complaint['ctx']['max_length']} characters"
         case "too_long":
             return f"at most {complaint['ctx']['max_length']} values"
         case "too_short":

@@ -193,6 +193,7 @@ def test_desired_points_outside_the_image_or_too_few(folder: Path) -> None:
         ("law", "3", "law", "a table"),
         ("laws.other", "{}", "laws.other.kind", "a value"),
         ("name", '"../elsewhere"', "name", "letters, digits"),
+        ("name", f'"{"x" * 65}"', "name", "at most 64 characters"),
         ("law.axes", "[]", "law.axes", "at least 1 value"),
         ("law.R", "[1, -1]", "law.R.1", "greater than 0"),
         ("task.desired", "3", "task.desired", "centred, initial"),
