@@ -100,13 +100,14 @@ def test_covariance_matches_the_spread_of_repeated_measurements() -> None:
         )
         upsilons.append(view.upsilon)
         predicted.append(np.diag(view.covariance))
-    # 300 samples know a variance to within 8 %; the rest is curvature.
+    # 300 samples know a variance to within 8 %. The noise is not taken to be less than stated, and
+    # each match may be wrong, so deviations may be half as large again as those of right matches.
     ratio = np.var(upsilons, axis=0) / np.mean(predicted, axis=0)
-    assert (ratio > 0.6).all()
+    assert (ratio > 0.4).all()
     assert (ratio < 1.5).all()
 
 
-@pytest.mark.parametrize(("kind", "most_wrong"), [("plane", 0.02), ("general", 0.1)])
+@pytest.mark.parametrize(("kind", "most_wrong"), [("plane", 0.02), ("general", 0.03)])
 def test_motions_are_within_their_deviations(kind: str, most_wrong: float) -> None:
     answers = [
         answer
@@ -117,7 +118,48 @@ def test_motions_are_within_their_deviations(kind: str, most_wrong: float) -> No
     off = np.array([answer.deviations for answer in answers])
     assert len(off) > 30
     assert np.mean(off > 5.0) <= most_wrong
-    assert np.quantile(off, 0.9) > 1.0  # and they are not stated to be anywhere
+    assert np.quantile(off, 0.9) > 0.7  # and they are not stated to be anywhere
+
+
+# Scenes of the study in which one to three wrong matches, far from the others, bend the motion
+# until they agree: by three degrees at most, but across a narrow valley of the error.
+@pytest.mark.parametrize("scene", [1077, 1482, 1832, 1922, 2297, 3552])
+def test_deviations_cover_a_motion_that_wrong_matches_bend(scene: int) -> None:
+    (answer,) = try_scene(np.random.default_rng([0, 0, scene]), KINDS.index("general"))
+    assert answer.explanations > 0
+    assert answer.deviations < 5.0
+
+
+# Seven of eight or nine points happen to lie on the plane of a motion far longer than theirs.
+@pytest.mark.parametrize("scene", [1257, 2527])
+def test_a_plane_by_chance_does_not_hide_the_motion_of_all_points(scene: int) -> None:
+    (answer,) = try_scene(np.random.default_rng([0, 0, scene]), KINDS.index("general"))
+    assert answer.explanations != 1
+    assert not answer.deviations > 5.0
+
+
+def test_reference_plane_of_wrong_matches_is_refused_though_a_plane_is_a_rival() -> None:
+    (answer,) = try_scene(np.random.default_rng([0, 0, 1862]), KINDS.index("general"))
+    assert answer.explanations == 0
+    assert "points of the reference plane agree" in answer.reason
+
+
+def test_reference_plane_seen_edge_on_is_refused() -> None:
+    random = np.random.default_rng(5)
+    views = pair(random, shape(random, 12))
+    star = views.points_star.copy()
+    star[2] = 0.9 * (0.4 * star[0] + 0.6 * star[1])  # in a plane with the desired camera's centre
+    now = transform_points(se3_inverse(views.T_star_camera), star)
+    noise = 0.3 * random.normal(size=(2, 12, 2))
+    result = estimate_two_view(
+        CAMERA.project(now) + noise[0],
+        CAMERA.project(star) + noise[1],
+        CAMERA,
+        noise_px=0.3,
+        reference=np.arange(3),
+    )
+    assert isinstance(result, TwoViewFailure)
+    assert result.problem is TwoViewProblem.COLLINEAR
 
 
 def test_noise_of_nine_marks_leaves_about_one_degree() -> None:

@@ -44,6 +44,11 @@ def fewest_off_a_line(points: FloatArray, tolerance: float) -> int:
     return fewest
 
 
+def width(points: FloatArray) -> float:
+    """Return the root of the summed squared distances of points (K, 2) from their best line."""
+    return float(np.linalg.svd(points - points.mean(axis=0))[1][1])
+
+
 @njit(cache=True)
 def triangle_area(points: FloatArray, a: int, b: int, c: int) -> float:
     """Return twice the area of the triangle of three of the points (N, 2)."""

@@ -25,6 +25,7 @@ from vergence.vision.two_view.search import (
 RELIEF = 0.2  # of its distance: how deep an object is taken to be that may not be flat
 _TRIED = -0.5  # log₁₀ NFA below which a set of matches is fitted, before it is judged
 _CLEARLY = 2.0  # thresholds of a plane within which a match may still be on it
+_FARTHEST_ASIDE = 0.5  # of its distance: how far a camera moves that still recognises an object
 _OFF_PLANE = -2.0  # log₁₀ NFA of the matches off a plane that make an object not flat
 
 
@@ -103,7 +104,9 @@ def log_chance_of_flatness(plane: Fit, views: Views, near: BoolArray) -> float:
     error = max(float(errors_of(plane, views)[near].max()), views.noise)
     # Inverse depths are in units of the plane's distance, as the translation is.
     inverse_depths = homogeneous(views.m_star[near]) @ plane.state.n
-    parallax = RELIEF * float(np.linalg.norm(plane.state.t) * np.median(np.abs(inverse_depths)))
+    # A plane by chance often has a motion far too long.
+    aside = float(np.linalg.norm(plane.state.t) * np.median(np.abs(inverse_depths)))
+    parallax = RELIEF * min(aside, _FARTHEST_ASIDE)
     return float(log_chance_of_plane(len(views), int(np.count_nonzero(near)), error, parallax))
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vergence.arrays import BoolArray
+from vergence.geometry.chi_square import chi_square_quantile
 from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION
 from vergence.vision.two_view.consensus import (
     agreements,
@@ -26,6 +27,7 @@ from vergence.vision.two_view.fit import (
 
 _GATE = 3.7  # standard deviations within which a match agrees (99.9 % of two coordinates)
 FLAT_CHANCE = -4.0  # log₁₀ of the NFA above which a plane is taken for chance
+_TOO_LARGE = 2.33  # standard deviations: 99 %, of the errors of few matches
 _FEWEST = 5  # matches that determine every model
 FEW = 16  # matches below which one alone may bend the motion
 _ROUNDS = 2  # of fitting and finding the matches that agree
@@ -37,6 +39,7 @@ class Explanation:
 
     fits: list[Fit]  # the best first
     scale: float  # variance of the noise over the stated one, at least 1
+    views: Views  # all matches that may be used, agreeing or not
     turned: int = 0  # other matches, which a turn of the camera alone explains
 
 
@@ -52,19 +55,22 @@ def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoVie
         flat: whether the object is known to be flat.
     """
     found = _explain_once(views, usable, flat)
-    if isinstance(found, TwoViewFailure) or found.fits[0].model != ROTATION:
+    if isinstance(found, TwoViewFailure):
+        return found
+    turn = next((fit for fit in found.fits if fit.model == ROTATION), None)
+    if turn is None:
         return found
     rest = usable.copy()
-    rest[found.fits[0].views.index] = False
+    rest[turn.views.index] = False
     if np.count_nonzero(rest) >= FEWEST_GENERAL:
         second = _explain_once(views, rest, flat)
-        if isinstance(second, Explanation) and second.fits[0].model != ROTATION:
-            return replace(second, turned=len(found.fits[0].views))
+        if isinstance(second, Explanation) and all(f.model != ROTATION for f in second.fits):
+            return replace(second, turned=len(turn.views))
     return TwoViewFailure(
         TwoViewProblem.NO_TRANSLATION,
         "a turn of the camera alone explains both views, so the object's shape is unknown; if that "
         "is the background, give a mask of the object to match_features",
-        found.fits[0].state.R.T.copy(),
+        turn.state.R.T.copy(),
     )
 
 
@@ -77,18 +83,31 @@ def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | 
         sets = [agreement.kept for agreement in agreements(tried)] if len(tried) > 4 else []
     failure: TwoViewFailure | None = None
     perhaps_flat: list[Fit] = []
-    for kept in sets:
+    for k, kept in enumerate(sets):
         comparison = _settled(tried, kept)
         doubt = _doubted(comparison, tried, flat)
         if doubt is None:
             best, scale = comparison.fits[0], comparison.scale
             few = _FEWEST < len(best.views) < FEW and best.model != ROTATION
             others = hinging_on_one(best.views, best, scale) if few else []
-            return Explanation([*perhaps_flat, *comparison.fits, *others], scale)
+            if few and best.model == PLANE:
+                others += _solid_rivals(best, tried, sets[k + 1 :], flat)
+            return Explanation([*perhaps_flat, *comparison.fits, *others], scale, tried)
         failure = doubt if failure is None else failure
         if comparison.fits[0].model == PLANE and doubt.problem is TwoViewProblem.TOO_FEW:
             perhaps_flat.append(comparison.fits[0])
     return _by_chance(tried, 0) if failure is None else failure
+
+
+def _solid_rivals(plane: Fit, views: Views, sets: list[BoolArray], flat: bool) -> list[Fit]:
+    """Return the motions of a solid object that explain more of few matches than a plane does."""
+    for kept in sets if not flat else []:
+        comparison = _settled(views, kept)
+        solid = comparison.fits[0]
+        more = solid.model == GENERAL and len(solid.views) > len(plane.views)
+        if more and _doubted(comparison, views, flat) is None:
+            return [fit for fit in comparison.fits if fit.model == GENERAL]
+    return []
 
 
 def _settled(views: Views, kept: BoolArray) -> Comparison:
@@ -140,6 +159,13 @@ def _doubted(comparison: Comparison, views: Views, flat: bool) -> TwoViewFailure
         )
     if fit.model == GENERAL and len(fit.views) < FEWEST_GENERAL:
         return _by_chance(views, len(fit.views))
+    few = fit.model == GENERAL and len(views) < FEW  # of more, the noise is estimated
+    if few and fit.chi_square > chi_square_quantile(fit.freedom, _TOO_LARGE):
+        return TwoViewFailure(
+            TwoViewProblem.WRONG_MATCHES,
+            f"the best motion leaves {np.sqrt(fit.chi_square / fit.freedom):.1f} times the stated "
+            f"noise in {len(fit.views)} matches: one is wrong, or the noise is larger than stated",
+        )
     return None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.vision.two_view import bundle
 from vergence.vision.two_view.bundle import GENERAL, PLANE
-from vergence.vision.two_view.checks import widest_triples
+from vergence.vision.two_view.checks import widest_triples, width
 from vergence.vision.two_view.covariance import (
     points_in_desired,
     reference_plane,
@@ -19,9 +19,11 @@ from vergence.vision.two_view.explain import Explanation
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
 from vergence.vision.two_view.fit import Fit
 from vergence.vision.two_view.linear import homogeneous
-from vergence.vision.two_view.resampling import draw_replicas, widen_for_general
+from vergence.vision.two_view.motion_samples import covariance_of_likely, likelihood_of
 from vergence.vision.two_view.result import TwoView
 from vergence.vision.two_view.widening import DRAWS, widen_for_plane
+
+_EDGE_ON = 6.0  # deviations: from a line, of the points of a plane that is seen edge-on
 
 
 class Report(NamedTuple):
@@ -35,15 +37,17 @@ class Report(NamedTuple):
     def of(self, found: Explanation) -> TwoView | TwoViewFailure:
         """Return the likeliest motion with its alternatives."""
         motions: list[TwoView] = []
+        general = [fit for fit in found.fits if fit.model == GENERAL]
         for fit in found.fits:
-            motions += (
-                self._of_plane(fit, found) if fit.model == PLANE else self._of_any(fit, found)
-            )
+            told = self._of_plane(fit, found) if fit.model == PLANE else self._of_any(fit, found)
+            if isinstance(told, TwoViewFailure):
+                if fit is general[0]:  # what is left would hide the likeliest
+                    return told
+            else:
+                motions += told
         if not motions:
             return TwoViewFailure(
-                TwoViewProblem.WRONG_MATCHES,
-                "what explains the matches lies behind a camera, or the points of the reference "
-                "plane are wrong matches",
+                TwoViewProblem.WRONG_MATCHES, "what explains the matches lies behind a camera"
             )
         return _with_doubt(motions, found.turned)
 
@@ -89,32 +93,49 @@ class Report(NamedTuple):
             noise_px=self.noise_px * float(np.sqrt(found.scale)),
         )
 
-    def _of_any(self, fit: Fit, found: Explanation) -> list[TwoView]:
-        """Return the motion of an object of any shape, none without its reference plane."""
+    def _of_any(self, fit: Fit, found: Explanation) -> list[TwoView] | TwoViewFailure:
+        """Return the motion of an object of any shape, or why its reference plane is unknown."""
         if self.reference is None:
             chosen = widest_triples(fit.views.m_star, fit.views.m, 1)[0]
         else:
             chosen = np.flatnonzero(np.isin(fit.views.index, self.reference))
-        return [self._general_motion(fit, found, chosen)] if len(chosen) >= 3 else []
+        if len(chosen) < 3:
+            return TwoViewFailure(
+                TwoViewProblem.WRONG_MATCHES,
+                f"only {len(chosen)} points of the reference plane agree with the motion; give "
+                "others",
+            )
+        if width(fit.state.x_star[chosen]) < _EDGE_ON * np.sqrt(found.scale) * fit.views.noise:
+            return TwoViewFailure(
+                TwoViewProblem.COLLINEAR,
+                "the points of the reference plane lie on a line in the desired view, so its "
+                "distance is unknown; give others",
+            )
+        motion = self._general_motion(fit, found, chosen)
+        if motion is None:
+            return TwoViewFailure(
+                TwoViewProblem.WRONG_MATCHES,
+                "the points of the reference plane lie behind a camera, or too far for the noise",
+            )
+        return [motion]
 
-    def _general_motion(self, fit: Fit, found: Explanation, chosen: IntArray) -> TwoView:
+    def _general_motion(self, fit: Fit, found: Explanation, chosen: IntArray) -> TwoView | None:
         state = fit.state
         N = reference_plane(points_in_desired(state, chosen))
         inverse_distance = float(np.linalg.norm(N))
-        blocks = bundle.normal_blocks(GENERAL, state, fit.residuals, fit.views.weight)
         rays = homogeneous(state.x_star)
         rho_star = inverse_distance / state.w
-        covariance = found.scale * upsilon_covariance(GENERAL, state, blocks, chosen)
-        widen_for_general(
-            covariance[None],
+        views = found.views
+        covariance = covariance_of_likely(
+            likelihood_of(views.m_star, views.m, views.noise, len(views) - len(fit.views)),
             np.ascontiguousarray(state.R),
             state.t,
-            fit.views.m_star,
-            fit.views.m,
-            found.scale * fit.views.noise**2,
-            chosen,
-            *draw_replicas(len(fit.views)),
+            found.scale,
+            fit.views.m_star[chosen],
+            fit.views.m[chosen],
         )
+        if covariance is None:
+            return None
         return TwoView(
             rotation=state.R.T.copy(),
             translation=-state.R.T @ state.t * inverse_distance,

@@ -67,11 +67,16 @@ def find_motion(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
         m: the same points in the current view, (N, 2).
         noise: stated standard deviation of a normalized coordinate.
     """
-    matrices = five_point_matrices(_samples(len(m), 5, MOTION_SAMPLES), m_star, m)
+    matrices = sampled_motions(m_star, m)
     _, band = log_densities(m_star, m)
     return _agreement(
         *_best_motion(matrices, m_star, m, band, _FLOOR * noise, ceiling(len(m)) * noise)
     )
+
+
+def sampled_motions(m_star: FloatArray, m: FloatArray) -> FloatArray:
+    """Return the essential matrices of samples of five matches, (K, 3, 3)."""
+    return five_point_matrices(_samples(len(m), 5, MOTION_SAMPLES), m_star, m)
 
 
 def _agreement(log_alarms: float, error: float, errors: FloatArray) -> Agreement:
