@@ -95,6 +95,20 @@ def gallery(*names: str) -> None:
         cv2.imwrite(path, pair, [cv2.IMWRITE_JPEG_QUALITY, 84])
 
 
+def two_blocks() -> None:
+    """Two objects that hide each other, as both fixed cameras of that cell see them."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = ("run", "two_blocks", "--set", "duration_s=9.6", "--out", folder)
+        subprocess.run([VERGENCE, *run], stdout=subprocess.DEVNULL)
+        recording = Recording.open(folder)
+        both = []
+        for camera, time in (("left", 4.5), ("right", 9.4)):
+            film = camera_images(recording, camera).film
+            both.append(decoded(min(film, key=lambda frame: abs(frame.time - time)).jpeg))
+    path = str(DOCS / "images" / "two-blocks.jpg")
+    cv2.imwrite(path, np.hstack(both), [cv2.IMWRITE_JPEG_QUALITY, 84])
+
+
 DEFECTS = {  # what each panel of the image is called, and its `imaging`; stronger than usual
     "ideal": None,
     "exposure_s = 0.025": {"exposure_s": 0.025},
@@ -214,6 +228,7 @@ def screenshot(address: str, size: tuple[int, int], name: str, wait_ms: int = 0)
 if __name__ == "__main__":
     own_arm()
     own_object()
+    two_blocks()
     imaging()
     report()
     watch()

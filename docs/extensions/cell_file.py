@@ -32,6 +32,7 @@ UNITS = {
     "m": "m",
     "s": "s",
 }
+_SHORT = {"targets.NAME": "`[target]`, or several `[targets.NAME]`"}  # of tables with two forms
 _INLINE = "Placement"  # a table that is written where it is used, and has no section of its own
 
 
@@ -48,7 +49,7 @@ def reference() -> Iterator[str]:
     described: set[str] = set()
     for place, name, table in _tables(Cell.model_json_schema()):
         kind = table["properties"].get("kind", {})
-        title = f"`[{place}]`" if place else "The top of the file"
+        title = _SHORT.get(place, f"`[{place}]`" if place else "The top of the file")
         if "const" in kind:
             title += f" with `kind = {_toml(kind['const'])}`"
             yield from (f"({name.lower()})=", "") if name not in described else ()

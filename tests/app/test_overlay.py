@@ -45,7 +45,7 @@ def test_a_mark_is_centred_on_its_point_to_a_quarter_of_a_pixel(
         "desired": marks(desired_px=at),
         "true": marks(true_px=at),
     }[kind]
-    centre = drawn_centre(draw(GREY, what, width), width)
+    centre = drawn_centre(draw(GREY, [what], width), width)
     np.testing.assert_allclose(centre, point, atol=0.25)
 
 
@@ -56,7 +56,7 @@ def test_the_edges_of_a_window_are_where_they_should_be(
 ) -> None:
     center, half = np.array(point), np.array([20.0, 12.0])
     windows = SearchWindows(center[None], half[None])
-    ink = np.abs(draw(GREY, marks(windows=windows), width).astype(float) - 128).sum(axis=2)
+    ink = np.abs(draw(GREY, [marks(windows=windows)], width).astype(float) - 128).sum(axis=2)
     row, column = (round((point[k] + 0.5) * width / 100 - 0.5) for k in (1, 0))
     for profile, axis in ((ink[row], 0), (ink[:, column], 1)):
         place = (center[axis] + 0.5) * width / 100 - 0.5
@@ -69,35 +69,35 @@ def test_the_edges_of_a_window_are_where_they_should_be(
 
 
 def test_points_not_looked_for_stand_where_they_are_expected() -> None:
-    canvas = draw(GREY, marks([[50.0, 40.0]], found=False, asked=np.array([False])))
+    canvas = draw(GREY, [marks([[50.0, 40.0]], found=False, asked=np.array([False]))])
     np.testing.assert_allclose(drawn_centre(canvas, 100), (50.0, 40.0), atol=0.25)
 
 
 def test_unknown_points_are_not_drawn() -> None:
-    canvas = draw(GREY, marks(), 200)
+    canvas = draw(GREY, [marks()], 200)
     assert canvas.shape == (160, 200, 3)
     assert (canvas == 128).all()
 
 
 def test_far_away_points_do_no_harm() -> None:
-    assert (draw(GREY, marks([[1e9, -1e12]])) == 128).all()
+    assert (draw(GREY, [marks([[1e9, -1e12]])]) == 128).all()
 
 
 def test_the_image_itself_is_left_alone() -> None:
     image = GREY.copy()
-    draw(image, marks([[20.0, 20.0]]))
+    draw(image, [marks([[20.0, 20.0]])])
     np.testing.assert_array_equal(image, GREY)
 
 
 def test_found_and_lost_points_look_different() -> None:
     at = [[50.0, 40.0]]
-    assert (draw(GREY, marks(at)) != draw(GREY, marks(at, found=False))).any()
+    assert (draw(GREY, [marks(at)]) != draw(GREY, [marks(at, found=False)])).any()
 
 
 def test_a_point_nobody_looked_for_does_not_look_lost() -> None:
     at = [[50.0, 40.0]]
     lost, unasked = marks(at, found=False), marks(at, found=False, asked=np.array([False]))
-    assert (draw(GREY, lost) != draw(GREY, unasked)).any()
+    assert (draw(GREY, [lost]) != draw(GREY, [unasked])).any()
 
 
 def test_points_that_stand_for_a_curve_are_drawn_as_that_curve() -> None:
@@ -112,12 +112,12 @@ def test_points_that_stand_for_a_curve_are_drawn_as_that_curve() -> None:
         nowhere,
         np.ones(4, dtype=bool),
     )
-    closed = draw(GREY, curve) != 128
+    closed = draw(GREY, [curve]) != 128
     assert closed[20, 50].any()
     assert closed[40, 30].any()  # from the last point back to the first
     assert not closed[40, 50].any()
-    pairs = draw(GREY, replace(curve, joined=np.array([True, False, True, False]))) != 128
+    pairs = draw(GREY, [replace(curve, joined=np.array([True, False, True, False]))]) != 128
     assert pairs[20, 50].any()
     assert pairs[60, 50].any()
     assert not pairs[40, 30].any()
-    assert (draw(GREY, replace(curve, found=np.zeros(4, dtype=bool))) == 128).all()
+    assert (draw(GREY, [replace(curve, found=np.zeros(4, dtype=bool))]) == 128).all()

@@ -176,7 +176,7 @@ def test_a_trial_that_cannot_be_begun_is_a_result_with_its_reason(source):
 
 def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
     outcome = Outcome(OutcomeKind.STOPPED, "stopped by the user", 0.5)
-    stopped = Run(RunInfo("puma560"), {}, {}, None, (), outcome, {})
+    stopped = Run(RunInfo("puma560"), {}, {}, None, (), outcome, {}, {})
     module = sys.modules[RUN_TRIAL]
     monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
     monkeypatch.setattr(KinematicRun, "in_loop", lambda *_: stopped)

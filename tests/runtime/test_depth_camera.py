@@ -24,7 +24,7 @@ DEPTH = {"cameras.wrist.depth": "{ noise_m = 0.003, holes = 0.1 }"}
 def unknown_board(**keys: str) -> Cell:
     """The UR5 over its wandering board, of which no features are known."""
     cell = load_cell("ur5", SMALL | keys)
-    return cell.model_copy(update={"target": cell.target.model_copy(update={"features": None})})
+    return cell.with_target(features=None)
 
 
 def error_px(cell: Cell) -> float:

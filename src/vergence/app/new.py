@@ -146,10 +146,21 @@ def new(options: "NewOptions") -> int:
         text = text.replace(_LENS, f"calibration = {calibration}")
     (folder / CELL).write_text(text)
     if options.as_json:
-        emit({"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()})
+        answer = {"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()}
+        emit({**answer, "advice": _advice(folder, draft)})
     else:
         _tell(folder, options.body, draft, what)
     return SUCCESS
+
+
+def _advice(folder: Path, draft: "Draft") -> list[str]:
+    """Return what to know of the axes of the camera in the cell that was written."""
+    from vergence.app.first_axes import poorly_measured, poorly_served
+    from vergence.cell import load_cell
+    from vergence.simulation.build import intrinsics
+
+    camera = intrinsics(load_cell(folder).cameras["wrist"])
+    return list(filter(None, (poorly_measured(draft, camera), poorly_served(draft))))
 
 
 def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:
@@ -159,6 +170,8 @@ def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:
     if len(draft.arm.names) < 6:
         unserved = unserved_directions(draft.J_camera, draft.distance_m)
         say(f"  with so few joints the camera {unserved} (its own axes, at the start)")
+    for line in _advice(folder, draft):
+        say(f"  {line}")
     typed = shlex.quote(str(folder))
     say(f"next:  vergence watch {typed}      or  vergence run {typed}")
 

@@ -4,7 +4,7 @@ Pixel centres are at integers, here as everywhere; marks are placed to better th
 quarter of a pixel, which is what OpenCV's lines allow.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -56,12 +56,12 @@ class Marks:
         )
 
 
-def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[np.uint8]:
-    """Return the image in colour with the marks over it.
+def draw(image: ImageArray, marks: Sequence[Marks], width: int | None = None) -> NDArray[np.uint8]:
+    """Return the image in colour with marks over it.
 
     Args:
         image: (height, width) grey.
-        marks: where to draw.
+        marks: where to draw, of each target.
         width: of what is returned, the image's own if None; marks keep their size.
 
     Returns:
@@ -69,11 +69,17 @@ def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[n
     """
     canvas = _colored(image, width or image.shape[1])
     scale = np.array(canvas.shape[1::-1]) / image.shape[::-1]
+    for one in marks:
+        _draw_marks(canvas, one, scale)
+    return canvas
+
+
+def _draw_marks(canvas: NDArray[np.uint8], marks: Marks, scale: FloatArray) -> None:
     for low, high in _corners(marks.windows, scale):
         _frame(canvas, low, high)
     if marks.joined.any():
         _draw_curves(canvas, marks, scale)
-        return canvas
+        return
     for point in _known(marks.tracked_px[~marks.asked], scale):
         _cross(canvas, point, UNASKED, _SMALL_PX, upright=False)
     for point in _known(marks.desired_px, scale):
@@ -84,7 +90,6 @@ def draw(image: ImageArray, marks: Marks, width: int | None = None) -> NDArray[n
         _circle(canvas, point, FOUND, _RADIUS_PX)
     for point in _known(marks.tracked_px[marks.asked & ~marks.found], scale):
         _cross(canvas, point, LOST, _RADIUS_PX, upright=False)
-    return canvas
 
 
 def _draw_curves(canvas: NDArray[np.uint8], marks: Marks, scale: FloatArray) -> None:

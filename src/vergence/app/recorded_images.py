@@ -1,5 +1,6 @@
 """Images of a run for its report: a film's frames and a few key frames, marks drawn in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,11 +38,12 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
     film = range(0, count, max(1, -(-count // _FILM_FRAMES)))
     key = {round(number) for number in np.linspace(0, count - 1, _KEY_FRAMES)} if count else set()
     number_at = {time: number for number, time in enumerate(times)}
-    trace = recording.cameras[camera]
+    seen = (recording.cameras, *(other.cameras for other in recording.others.values()))
+    traces = [traces[camera] for traces in seen if len(traces[camera].time)]
     frames, key_frames = [], []
     for time, image in recording.images(camera, only={*film, *key}):
         number = number_at[time]
-        marks = Marks.at(trace, time)
+        marks = [Marks.at(trace, time) for trace in traces]
         if number in film:
             jpeg = _jpeg(image, marks, _FILM_WIDTH_PX, _FILM_QUALITY)
             frames.append(MarkedImage(time, jpeg))
@@ -51,7 +53,7 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
     return CameraImages(tuple(frames), tuple(key_frames))
 
 
-def _jpeg(image: ImageArray, marks: Marks, width: int, quality: int) -> bytes:
+def _jpeg(image: ImageArray, marks: Sequence[Marks], width: int, quality: int) -> bytes:
     import cv2
 
     drawn = draw(image, marks, width)

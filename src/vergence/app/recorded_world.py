@@ -1,5 +1,6 @@
 """The cell that a recording was made in, to be shown in the poses of the recording."""
 
+from collections.abc import Mapping
 from typing import Self
 
 from vergence.arrays import FloatArray
@@ -41,10 +42,15 @@ class RecordedWorld:
                 return str(error)
         return "The cell file that was run is not on this machine."
 
-    def place(self, joints: dict[str, FloatArray], T_world_target: FloatArray | None) -> FloatArray:
-        """Put the arms and the target somewhere, a target of None where it is; return the state."""
-        if T_world_target is not None:
-            self.world.move_target(T_world_target)
+    def place(
+        self, joints: Mapping[str, FloatArray], targets: Mapping[str, FloatArray]
+    ) -> FloatArray:
+        """Put arms and targets somewhere, by name; return the state.
+
+        Targets that are not among them stay where they are.
+        """
+        for name in targets.keys() & self.world.target_bodies.keys():
+            self.world.move_target(targets[name], name)
         self.world.place(joints)
         return self.world.state()
 

@@ -1,5 +1,6 @@
 """The report of a run: one page with numbers, images and figures, made from its recording."""
 
+from collections.abc import Mapping
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -28,7 +29,7 @@ from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows,
 from vergence.errors import InputError
 from vergence.places import RECORDING
 from vergence.runtime.recording import Recording
-from vergence.runtime.results import CameraTrace, Run
+from vergence.runtime.results import CameraTrace, Run, TargetTrace
 
 REPORT = "report.html"
 
@@ -100,7 +101,7 @@ def make_report(run: Run, signals: str = SIGNALS) -> str:
         _summary(run),
         goal_section(run) if isinstance(run, Recording) else "",
         *(_camera(run, name) for name in run.cameras),
-        _target(run),
+        _targets(run),
         *(_arm(run, name) for name in run.arms),
         _events(run),
         _cell(run),
@@ -178,18 +179,26 @@ def _robot(run: Run) -> str:
     return markup.film(robot_film(run), "the robot", caption)
 
 
-def _target(run: Run) -> str:
-    """Return what is known of the target, from the camera that the task is about."""
-    trace = run.cameras.get(run.info.task_camera)
+def _targets(run: Run) -> str:
+    """Return what is known of each target, from the camera that the task is about."""
+    seen = {"Target": (run.cameras, run.target)}
+    seen |= {f"Target {name}": (one.cameras, one.target) for name, one in run.others.items()}
+    return "\n".join(_target(run, name, *known) for name, known in seen.items())
+
+
+def _target(
+    run: Run, name: str, cameras: Mapping[str, CameraTrace], estimate: TargetTrace | None
+) -> str:
+    trace = cameras.get(run.info.task_camera)
     if trace is None:
         return ""
-    moved = target_chart(trace, run.target)
+    moved = target_chart(trace, estimate)
     return markup.section(
-        "Target",
+        name,
         _chart(run, moved, "Motion of the target since the first image."),
         _chart(
             run,
-            estimate_chart(trace, run.target),
+            estimate_chart(trace, estimate),
             "Error of the target's pose, as estimated by the filter.",
         ),
     )

@@ -20,8 +20,8 @@ _WIDTH_PX, _HEIGHT_PX, _QUALITY = 400, 300, 80
 def robot_film(recording: Recording) -> tuple[MarkedImage, ...]:
     """Return images of the cell, evenly over a run; none where its cell or a renderer is missing.
 
-    Arms are where their joints were measured. The target is where it truly was; where that is not
-    known, where the filter believed it, or else where the cell file places it.
+    Arms are where their joints were measured. Targets are where they truly were; where that is not
+    known, where a filter believed them, or else where the cell file places them.
     """
     times = _times(recording)
     world = RecordedWorld.of(recording.info) if len(times) else ""
@@ -30,7 +30,7 @@ def robot_film(recording: Recording) -> tuple[MarkedImage, ...]:
     poses = RecordedPoses(recording)
     states, seen = [], []
     for time in times.tolist():
-        states.append(world.place(poses.joints(time), poses.target(time)))
+        states.append(world.place(poses.joints(time), poses.targets(time)))
         seen.append(points_in_view(world.world))
     view = first_view(world.world, np.vstack((*seen[1:], seen[0])))
     jpegs = _drawn(under_a_sky(world.world.cell), states, view)

@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vergence.arrays import FloatArray
 from vergence.assembly.advance import advance_parts
 from vergence.assembly.follow import follow_parts
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.assembly.photograph import is_by_photograph, photograph_parts
+from vergence.assembly.pose import other_poses
 from vergence.assembly.reach import reach_parts
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.switch import switch_parts
@@ -17,9 +19,10 @@ from vergence.assembly.tag import located
 from vergence.assembly.tag_reach import tag_reach_parts
 from vergence.assembly.track import track_parts
 from vergence.cell import Cell
+from vergence.cell.named_targets import naming_target
 from vergence.cell.schema import AdvanceTable, FollowTable, ReachTable, SwitchTable, TrackTable
 from vergence.errors import Absent, DriverSilent, InputError
-from vergence.estimation import WithMeasuredDepth
+from vergence.estimation import SeveralTargets, WithMeasuredDepth
 from vergence.runtime.driver import Driver
 from vergence.signals import Frame, Outcome, OutcomeKind
 
@@ -64,7 +67,11 @@ def assemble_parts(
 
 
 def task_parts(
-    cell: Cell, started: StartedDriver, images: bool, model: "CellModel | None" = None
+    cell: Cell,
+    started: StartedDriver,
+    images: bool,
+    model: "CellModel | None" = None,
+    believed: Mapping[str, FloatArray] | None = None,
 ) -> Parts | Outcome:
     """Choose perception, planner and law by the kind of the task and the kind of the law.
 
@@ -73,6 +80,7 @@ def task_parts(
         started: its driver, with the images that the task begins with.
         images: look through images; if not, at the exact projections of a simulated driver.
         model: of the cell, compiled already; it is placed where the arms are.
+        believed: T_world_target (4, 4) by name, of targets known better than by the cell.
 
     Returns:
         The parts, or why the task ends before anything moves.
@@ -80,16 +88,24 @@ def task_parts(
     Raises:
         InputError: if the cell cannot be run as it is written.
     """
-    context = LawContext.of(cell, started, model)
+    context = LawContext.of(cell, started, model, believed)
     if images:
-        context, outcome = located(context, started)
+        with naming_target(cell.target_name):
+            context, outcome = located(context, started)
         if outcome is not None:
             return outcome
-    parts = _parts(context, started, images)
-    if images and isinstance(parts, Parts) and any(cell.cameras[n].depth for n in cell.watched):
+    others = other_poses(context, images, min(frame.time for frame in started.frames.values()))
+    with naming_target(cell.target_name):
+        parts = _parts(context, started, images)
+    if not isinstance(parts, Parts):
+        return parts
+    perception = parts.perception
+    if images and any(cell.cameras[n].depth for n in cell.watched):
         _require_depth(cell, started)
-        return parts._replace(perception=WithMeasuredDepth(parts.perception))
-    return parts
+        perception = WithMeasuredDepth(perception)
+    if others:
+        perception = SeveralTargets(perception, others)
+    return parts._replace(perception=perception)
 
 
 def _require_depth(cell: Cell, started: StartedDriver) -> None:

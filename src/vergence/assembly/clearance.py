@@ -28,8 +28,9 @@ def cell_clearance(
     """
     from vergence.simulation.clearance import CellClearance
 
-    table, target = cell.collision, cell.target
-    if "target" in table.avoid and kind_of(target.motion) != "stationary":
-        given = f"target, with motion {kind_of(target.motion)}"
+    table = cell.collision
+    moving = [n for n, target in cell.targets.items() if kind_of(target.motion) != "stationary"]
+    if "target" in table.avoid and moving:
+        given = f"target, with motion {kind_of(cell.targets[moving[0]].motion)}"
         raise InputError(str(cell.path), "collision.avoid", given, "a stationary target")
     return CellClearance(model, cell.task.arm, table.avoid, table.margin_m, states)

@@ -1,7 +1,7 @@
 """What a law may know of a cell and its driver."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from vergence.assembly.started_driver import StartedDriver
 from vergence.camera import Camera
 from vergence.cell import Cell
 from vergence.errors import Absent, InputError
+from vergence.estimation import FollowedPose
 from vergence.features import inverse_depth_plane
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.parts import kind_of
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 class LawContext:
     """A cell, its models, and what its driver said at the start; no ground truth.
 
-    Poses are those that the cell file states, at the joint positions that the driver reports.
+    Poses are those that the cell file states, at the joint positions that the driver reports; of a
+    target that the task before has followed, the last that was believed.
     """
 
     cell: Cell
@@ -40,17 +42,26 @@ class LawContext:
     joints_now: Callable[[], Mapping[str, FloatArray]]  # newest positions by arm name, (n,)
     clearance: Clearance  # distances of the task's arm from what it must not touch, for the loop
     bodies: Clearance  # and the same for planners, which may run beside it
+    # Who follows the pose of a target, by its name, as far as that has begun.
+    followed: dict[str, FollowedPose] = field(default_factory=dict)
     # Whether the points may lie on anything in the cell, so that nothing is known to hide them.
     points_on_anything: bool = False
 
     @classmethod
-    def of(cls, cell: Cell, driver: StartedDriver, model: "CellModel | None" = None) -> Self:
+    def of(
+        cls,
+        cell: Cell,
+        driver: StartedDriver,
+        model: "CellModel | None" = None,
+        believed: Mapping[str, FloatArray] | None = None,
+    ) -> Self:
         """Return the context of a cell and a driver.
 
         Args:
             cell: the cell.
             driver: of its arms and cameras.
             model: of the cell, compiled already; it is placed at the start.
+            believed: T_world_target (4, 4) by name, of targets known better than by the cell.
 
         Raises:
             InputError: if the models of the cell cannot be read.
@@ -59,7 +70,9 @@ class LawContext:
         from vergence.simulation.cell_model import CellModel
 
         model, joints = model or CellModel(cell, hulls=True), driver.joints
-        model.move_target(placement_pose(cell.target))
+        model.target_name = cell.target_name
+        for name, target in cell.targets.items():
+            model.move_target((believed or {}).get(name, placement_pose(target)), name)
         model.place(driver.start)
         clearance = cell_clearance(cell, model, lambda: driver.states)
         bodies = clearance.twin()
@@ -182,10 +195,14 @@ class LawContext:
     @property
     def declared_stationary(self) -> bool:
         """Whether the cell declares the target stationary before the task's camera."""
-        target = self.cell.target
-        if kind_of(target.motion) != "stationary":
+        return self.rests(self.cell.target_name)
+
+    def rests(self, target: str) -> bool:
+        """Tell whether the cell declares a target stationary, but for the task's arm."""
+        table = self.cell.targets[target]
+        if kind_of(table.motion) != "stationary":
             return False
-        holder = target.carried_by
+        holder = table.carried_by
         return holder in (None, self.cell.task.arm) or self.cell.arms[holder].motion is None
 
     @property

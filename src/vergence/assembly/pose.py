@@ -1,6 +1,7 @@
 """Perception of a target's pose, as a cell describes it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from vergence.assembly.law_context import LawContext
 from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
 from vergence.assembly.tag import TagFinder
 from vergence.cell import Cell
+from vergence.cell.named_targets import naming_target, target_body
 from vergence.errors import InputError
 from vergence.estimation import (
     Blocked,
@@ -34,6 +36,7 @@ from vergence.estimation.outline_perception import OutlinePerception
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.loading import asking
 from vergence.robot import forward_kinematics
+from vergence.signals import Frame
 from vergence.simulation import ExactCorners
 
 if TYPE_CHECKING:
@@ -53,7 +56,7 @@ def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
         return ObjectModel.from_face(name, tag.corners)
     if cell.target.features:
         return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
-    return as_followed(object_model_of(model.model, "target"))
+    return as_followed(object_model_of(model.model, target_body(cell.target_name)))
 
 
 def follow_pose(
@@ -61,12 +64,38 @@ def follow_pose(
 ) -> FollowedPose:
     """Return the perception that a cell describes, for a target of known geometry.
 
+    From then on the context knows who follows the target, for what it hides of others.
+
     Args:
         context: of the cell, with the target at its placement.
         model: the target's geometry.
         images: whether frames carry images; if not, corners are exact projections with noise.
         begin: time of the first frame, s.
     """
+    followed = _followed(context, model, images, begin)
+    context.followed[context.cell.target_name] = followed
+    return followed
+
+
+def other_poses(context: LawContext, images: bool, begin: float) -> dict[str, FollowedPose]:
+    """Return the perception of every target that the task is not about, by name.
+
+    Raises:
+        InputError: if one of them cannot be followed.
+    """
+    others = {}
+    for name in context.cell.targets:
+        if name != context.cell.target_name:
+            about = replace(context, cell=context.cell.about(name))
+            with naming_target(name):
+                shape = target_shape(about.cell, about.model)
+                others[name] = follow_pose(about, shape, images, begin)
+    return others
+
+
+def _followed(
+    context: LawContext, model: "ObjectModel", images: bool, begin: float
+) -> FollowedPose:
     cell, cameras = context.cell, context.cameras
     table = cell.perception
     if images and by_outline(model):
@@ -152,16 +181,18 @@ def _measure(
 ) -> Measure:
     """Return what measures corners, as a cell describes it."""
     cell = context.cell
-    table = cell.perception
+    table, number = cell.perception, list(cell.targets).index(cell.target_name)
     measure: Measure
     if finder is not None:
         measure = finder
     elif images:
         measure = CornerWindows(model, context.cameras)
     else:
-        measure = ExactCorners(table.noise_px, np.random.default_rng([cell.seed, 3]))
+        rng = np.random.default_rng([cell.seed, 3, number])
+        measure = ExactCorners(table.noise_px, rng, cell.target_name)
     if table.outliers:
-        measure = with_outliers(measure, table.outliers, np.random.default_rng([cell.seed, 5]))
+        rng = np.random.default_rng([cell.seed, 5, number])
+        measure = with_outliers(measure, table.outliers, rng)
     if table.believed_noise_px is not None:
         measure = with_noise(measure, table.believed_noise_px)
     return measure
@@ -171,7 +202,7 @@ class Surroundings(NamedTuple):
     """What perception knows of the cell, in the frame in which it follows the target."""
 
     camera_pose: CameraPose
-    blocked_at: Callable[[Joints], Blocked]
+    blocked_at: Callable[[Frame], Blocked]
     start: FloatArray  # (4, 4) the target's pose as well as it is known
     tip_pose: TipPose | None  # where that frame is in the world, if it is the arm's tip
 
@@ -179,10 +210,11 @@ class Surroundings(NamedTuple):
 def _surroundings(context: LawContext) -> Surroundings:
     """Return the cell around the target: in the tip's frame if the task's arm holds it."""
     camera_pose, blocked_at = camera_poses(context), _blocked_at(context)
-    start, arm = context.model.target_pose(), context.cell.task.arm
+    name, arm = context.cell.target_name, context.cell.task.arm
+    start = context.model.target_pose(name)
     if context.cell.target.carried_by != arm:
         return Surroundings(camera_pose, blocked_at, start, None)
-    chain = context.arm_to_target.chain
+    chain = context.model.arm_to_target(name).chain
 
     def tip_pose(joints: Joints) -> FloatArray:
         T_world_tip: FloatArray = forward_kinematics(chain, joints[arm])
@@ -214,13 +246,21 @@ def camera_poses(context: LawContext) -> CameraPose:
     return pose
 
 
-def _blocked_at(context: LawContext) -> Callable[[Joints], Blocked]:
+def _blocked_at(context: LawContext) -> Callable[[Frame], Blocked]:
+    """Return what tells what is in the way at an exposure: other targets where they are believed.
+
+    One that nobody follows is where the cell places it, if it is stationary; else nobody knows.
+    """
     from vergence.simulation.obstacles import Obstacles
 
-    obstacles = Obstacles(context.model)
+    name, followed = context.cell.target_name, context.followed
+    obstacles = Obstacles(context.model, name)
+    others = [other for other in context.cell.targets if other != name]
+    placed = {n: context.model.target_pose(n) for n in others if context.rests(n)}
 
-    def at(joints: Joints) -> Blocked:
-        obstacles.move(joints)
+    def at(frame: Frame) -> Blocked:
+        known = {n: followed[n].pose_at(frame) for n in others if n in followed}
+        obstacles.move(frame.joints, placed | known)
         return obstacles.blocked
 
     return at

@@ -110,8 +110,8 @@ def run_driver(
         cell, images, everyone, lambda parts: attend(loops[0], parts) if attend else None
     )
     parts = sequence.first(driver, frames)
-    path = str(cell.path)
-    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path)
+    path, targets = str(cell.path), tuple(cell.targets)
+    info = RunInfo.of(driver, cell.name, cell.text, cell.seed, cell.task.camera, path, targets)
     Listeners(everyone).begin(info)
     if isinstance(parts, Outcome):
         outcome = parts

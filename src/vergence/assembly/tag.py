@@ -151,7 +151,6 @@ def _first_pose(context: LawContext, driver: StartedDriver, finder: TagFinder) -
 def _placed(context: LawContext, fit: PoseFit) -> LawContext:
     """Return the context with the target at a pose, known as well as it is."""
     T, deviations = fit.T_world_target, np.sqrt(np.diag(fit.covariance))
-    target = context.cell.target.model_copy(update=_placement(T))
     perception = context.cell.perception.model_copy(
         update={
             "start_error_m": _KNOWN * float(deviations[:3].max()),
@@ -160,7 +159,8 @@ def _placed(context: LawContext, fit: PoseFit) -> LawContext:
     )
     context.model.move_target(T)
     context.model.update()
-    cell = context.cell.model_copy(update={"target": target, "perception": perception})
+    cell = context.cell.with_target(**_placement(T))
+    cell = cell.model_copy(update={"perception": perception})
     return replace(context, cell=cell)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 
+from vergence.arrays import FloatArray
 from vergence.assembly.assemble import assemble_parts, task_parts
 from vergence.assembly.check_task import check_task
 from vergence.assembly.parts import Parts
@@ -14,6 +15,7 @@ from vergence.cell import Cell
 from vergence.cell.schema import FollowTable, TrackTable
 from vergence.cell.tasks import naming_task
 from vergence.errors import InputError
+from vergence.estimation import FollowedPose
 from vergence.runtime import Driver, Listener
 from vergence.runtime.listeners import Listeners
 from vergence.runtime.stages import Stages
@@ -47,6 +49,7 @@ class TaskSequence:
         self._number = 0  # of the task that runs, or is prepared
         self._begun = 0.0  # s, when it was
         self._first: Parts | None = None
+        self._followed: Mapping[str, FollowedPose] = {}  # by target, in the task that ran last
         self._rest: Rest | None = None  # while the next task is prepared
         self._ended: list[TaskOutcome] = []
         self._failed: Outcome | None = None  # why the next task could not be prepared
@@ -73,6 +76,8 @@ class TaskSequence:
             # A target that moves is no longer where the first images show it; by now this is quick.
             parts = self._assembled(driver, model=parts.context.model)
         self._first = parts if isinstance(parts, Parts) else None
+        if isinstance(parts, Parts):
+            self._followed = parts.context.followed
         return parts
 
     def _assembled(
@@ -134,13 +139,24 @@ class TaskSequence:
             started.frames = started.driver.take_up(cell.task, frames)
         try:
             with self._naming(self._number):
-                parts = task_parts(cell, started, self._images, self._first.context.model)
+                model, believed = self._first.context.model, self._believed(frames)
+                parts = task_parts(cell, started, self._images, model, believed)
         except InputError as error:
             reason = str(error).removeprefix(f"{error.source}: ")
             return Outcome(OutcomeKind.INFEASIBLE, reason, time)
         if isinstance(parts, Parts):
+            self._followed = parts.context.followed
             warm_up(parts, cell.task.arm, 1.0 / cell.outer_rate_hz)
         return parts
+
+    def _believed(self, frames: Mapping[str, Frame]) -> dict[str, FloatArray]:
+        """Return where the last task left the targets that it followed, (4, 4) by name."""
+        newest = max(frames.values(), key=lambda frame: frame.time)
+        return {
+            name: followed.pose_at(newest)
+            for name, followed in self._followed.items()
+            if not followed.lost
+        }
 
     def _prepared(self, rest: Rest, outcome: Outcome) -> Stages | None:
         self._rest = None

@@ -6,6 +6,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
+from vergence.cell.named_targets import (
+    TARGET,
+    as_in_file,
+    naming_single_target,
+    target_key,
+    with_named_targets,
+)
 from vergence.cell.schema import (
     TABLES,
     ArmTable,
@@ -26,10 +33,10 @@ from vergence.cell.schema import (
     TrackTable,
 )
 from vergence.cell.settings_text import is_whole, settings_text
-from vergence.cell.tagged import check_tag, with_tag
+from vergence.cell.tagged import check_tags, with_tags
 from vergence.cell.tasks import check_sequence, naming_task, with_first_task
 from vergence.cell.toml_text import read_toml, setting
-from vergence.errors import InputError, KeyConflict, nearest
+from vergence.errors import NOTHING, InputError, KeyConflict, nearest
 from vergence.loading import Place, load_part, names_law
 from vergence.places import find_cell
 from vergence.registry import find
@@ -48,7 +55,8 @@ class Cell(Table):
     arms: dict[Name, ArmTable] = Field(min_length=1, max_length=16)  # arms, by name
     cameras: dict[Name, CameraTable] = Field(min_length=1, max_length=32)  # cameras, by name
     collision: CollisionTable = CollisionTable()  # collision avoidance
-    target: TargetTable  # object that the cameras observe
+    # Objects that the cameras observe, by name; [target] is one alone, without a name.
+    targets: dict[Name, TargetTable] = Field(min_length=1, max_length=16)
     task: Task  # what the arm should do
     # Sequence of tasks, instead of a single one.
     tasks: Annotated[tuple[Task, ...], Field(max_length=64)] = ()
@@ -78,6 +86,20 @@ class Cell(Table):
         return max(camera.rate_hz for camera in self.cameras.values())
 
     @property
+    def target(self) -> TargetTable:
+        """The target that the task is about."""
+        return self.targets[self.target_name]
+
+    @property
+    def target_name(self) -> str:
+        """Its name."""
+        return self.name_of_target(self.task)
+
+    def name_of_target(self, task: Task) -> str:
+        """Return the name of the target that a task of the cell is about."""
+        return task.target or next(iter(self.targets))
+
+    @property
     def tool(self) -> ToolTable | None:
         """What the task's arm holds before a second camera, if it does."""
         return self.task.tool if isinstance(self.task, TrackTable) else None
@@ -100,6 +122,10 @@ class Cell(Table):
         )
         return named or tuple(self.cameras)
 
+    def as_tables(self) -> dict[str, Any]:
+        """Return what the file of a cell with one task says, for `replace` and for JSON."""
+        return as_in_file(self.model_dump(mode="json", exclude={"tasks"}))
+
     @property
     def stages(self) -> tuple["Cell", ...]:
         """The cell with each of its tasks alone, in order, under the law of that task."""
@@ -121,14 +147,26 @@ class Cell(Table):
     def _follows(self) -> bool:
         return any(task.kind == "follow" for task in self._all_tasks)
 
+    def about(self, target: str) -> "Cell":
+        """Return a copy whose task is about another target."""
+        return self.model_copy(update={"task": self.task.model_copy(update={"target": target})})
+
+    def with_target(self, **values: Any) -> "Cell":
+        """Return a copy with some values of the task's target replaced, as they are validated."""
+        target = self.target.model_copy(update=values)
+        return self.model_copy(update={"targets": {**self.targets, self.target_name: target}})
+
     def replace(self, **tables: Any) -> "Cell":
         """Return a copy with some values replaced, by nested dictionaries as in the file.
 
         A table that names its kind, or a law its objectives, replaces the whole table, and `tasks`
-        the one task.
+        the one task. Of several targets, `target` is the one that the task is about.
         """
         several = bool(self.tasks) or "tasks" in tables
-        own = self.model_dump(exclude={"task"} if several else {"tasks"})
+        own = as_in_file(self.model_dump(exclude={"task"} if several else {"tasks"}))
+        if TARGET in tables and TARGET not in self.targets:
+            own_target = {self.target_name: tables.pop(TARGET)}
+            tables["targets"] = _merge(tables.get("targets", {}), own_target)
         values = _merge(own, tables)
         return _validate(values, self._path, self._text + settings_text(tables, values))
 
@@ -157,7 +195,7 @@ def load_cell(
     if seed is not None:
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
-    check_tag(values, str(path))
+    check_tags(values, str(path))
     return _validate(values, path, text)
 
 
@@ -198,15 +236,19 @@ def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:
-    values = with_first_task(with_tag(_with_calibrations(values, path)), str(path))
+    values = with_named_targets(_with_calibrations(values, path), str(path))
+    values = with_first_task(with_tags(values), str(path))
     number = 0 if "tasks" in values else None
-    with naming_task(number):
+    with naming_task(number), naming_single_target():
         try:
             cell = Cell.model_validate(values)
         except ValidationError as error:
             raise explain(error, str(path), values, _known_keys) from None
     cell._path, cell._text = path, text
     check_sequence(cell)
+    for number, task in enumerate(cell.tasks or (cell.task,)):
+        with naming_task(number if cell.tasks else None):
+            _check_target(cell, task)
     for number, stage in enumerate(cell.stages):
         with naming_task(number if cell.tasks else None):
             _check_names(stage)
@@ -245,7 +287,10 @@ def _with_parts(cell: Cell) -> Cell:
     update = {
         "law": law("law", cell.law),
         "laws": {name: law(f"laws.{name}", table) for name, table in cell.laws.items()},
-        "target": filled(cell.target, "target", motion="motion"),
+        "targets": {
+            name: filled(target, target_key(name), motion="motion")
+            for name, target in cell.targets.items()
+        },
         "arms": {
             name: filled(arm, f"arms.{name}", motion="arm_motion")
             for name, arm in cell.arms.items()
@@ -291,7 +336,18 @@ def _calibrated(table: Mapping[str, Any], path: Path, place: str) -> dict[str, A
 def _known_keys(parts: list[str]) -> list[str]:
     """Return the keys of the table that a place lies in, its kind being the last name that fits."""
     tables = [TABLES[part] for part in parts if part in TABLES]
-    return list((tables[-1] if tables else Cell).model_fields)
+    if not tables:
+        return [*Cell.model_fields, TARGET]
+    return list(tables[-1].model_fields)
+
+
+def _check_target(cell: Cell, task: Task) -> None:
+    """Refuse a task that is about no target of the cell, or does not say which of several."""
+    allowed = f"one of {nearest(task.target or '', cell.targets)}"
+    if task.target is None and len(cell.targets) > 1:
+        raise InputError(str(cell.path), "task.target", NOTHING, allowed)
+    if task.target is not None and task.target not in cell.targets:
+        raise InputError(str(cell.path), "task.target", task.target, allowed)
 
 
 def _check_names(cell: Cell) -> None:
@@ -309,8 +365,9 @@ def _check_names(cell: Cell) -> None:
             raise InputError(str(cell.path), f"cameras.{name}.rate_hz", camera.rate_hz, allowed)
     for name in cell.perception.cameras or ():
         check("perception.cameras", name, cell.cameras)
-    if cell.target.carried_by is not None:
-        check("target.carried_by", cell.target.carried_by, cell.arms)
+    for name, target in cell.targets.items():
+        if target.carried_by is not None:
+            check(f"{target_key(name)}.carried_by", target.carried_by, cell.arms)
     for name, output in cell.outputs.items():
         check(f"outputs.{name}.arm", output.arm, cell.arms)
     if isinstance(cell.task, SwitchTable):

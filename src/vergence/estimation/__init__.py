@@ -26,6 +26,7 @@ from vergence.estimation.rpy_filter import RpyPoseFilter
 from vergence.estimation.selected_points import SelectedPoints
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.self_calibration import SelfCalibration, SelfCalibrator
+from vergence.estimation.several_targets import SeveralTargets
 from vergence.estimation.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.tracked_points import TrackedPoints
@@ -73,6 +74,7 @@ __all__ = [
     "RpyBelief",
     "RpyPoseFilter",
     "Seen",
+    "SeveralTargets",
     "Selection",
     "ViewStatus",
     "TargetBelief",

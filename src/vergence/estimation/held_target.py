@@ -27,6 +27,10 @@ class FollowedPose(Protocol):
         """Return what the frames show, or None if none of them concerns it."""
         ...
 
+    def pose_at(self, frame: Frame) -> FloatArray:
+        """Return T_world_target (4, 4) as it is expected at an exposure; of a lost one the last."""
+        ...
+
 
 class HeldTarget:
     """Follows a target that an arm holds, with cameras that do not move with it.
@@ -57,6 +61,11 @@ class HeldTarget:
         held = replace(observation.target, time=newest.time)
         return replace(observation, target=_in_world(held, self._tip_pose(newest.joints)))
 
+    def pose_at(self, frame: Frame) -> FloatArray:
+        """Return T_world_target (4, 4) as it is expected at an exposure."""
+        T: FloatArray = se3_compose(self._tip_pose(frame.joints), self._perception.pose_at(frame))
+        return T
+
 
 def seen_from_tip(camera_pose: CameraPose, tip_pose: TipPose) -> CameraPose:
     """Return the function that gives T_hand_camera (4, 4) where the other gives T_world_camera."""
@@ -71,12 +80,12 @@ def seen_from_tip(camera_pose: CameraPose, tip_pose: TipPose) -> CameraPose:
 
 
 def blocked_from_tip(
-    blocked_at: Callable[[Joints], Blocked], tip_pose: TipPose
-) -> Callable[[Joints], Blocked]:
+    blocked_at: Callable[[Frame], Blocked], tip_pose: TipPose
+) -> Callable[[Frame], Blocked]:
     """Return what tells, of an eye and points in the tip's frame, which points are hidden."""
 
-    def at(joints: Joints) -> Blocked:
-        T, blocked = tip_pose(joints), blocked_at(joints)
+    def at(frame: Frame) -> Blocked:
+        T, blocked = tip_pose(frame.joints), blocked_at(frame)
 
         def hidden(eye: FloatArray, points: FloatArray) -> BoolArray:
             return blocked(T[:3, :3] @ eye + T[:3, 3], transform_points(T, points))

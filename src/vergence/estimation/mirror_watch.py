@@ -62,6 +62,10 @@ class MirrorWatch:
         """Whether the last images left a second pose open."""
         return self._doubtful
 
+    def pose_at(self, frame: Frame) -> FloatArray:
+        """Return T_world_target (4, 4) as it is expected at an exposure."""
+        return self._perception.pose_at(frame)
+
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
         """Return what the images show and where the target is, or None without an image."""
         observation = self._perception.observe(frames)

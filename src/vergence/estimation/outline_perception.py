@@ -63,6 +63,10 @@ class OutlinePerception:
         """Why the target counts as lost; empty while it is followed."""
         return self._lost
 
+    def pose_at(self, frame: Frame) -> FloatArray:
+        """Return T_world_target (4, 4) where it was seen last."""
+        return self._last_seen
+
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
         """Return what the images show and where the target is, or None without an image."""
         own = [f for f in frames if f.camera == self._name and f.image is not None]

@@ -14,7 +14,6 @@ from vergence.estimation.looks import Expected, Look, Predicted
 from vergence.estimation.measure import (
     CameraPose,
     Find,
-    Joints,
     Measure,
     every_point,
     nothing_found,
@@ -67,7 +66,7 @@ class PosePerception(Generic[B]):
         selection: Selection | None = None,
         windows: WindowRule | None = None,
         settings: PerceptionSettings | None = None,
-        blocked_at: Callable[[Joints], Blocked] | None = None,
+        blocked_at: Callable[[Frame], Blocked] | None = None,
         find: Find | None = None,
     ) -> None:
         """Prepare to follow a target.
@@ -82,7 +81,7 @@ class PosePerception(Generic[B]):
             selection: how features are chosen; by information unless told.
             windows: how large windows are.
             settings: budget and limits on missed images.
-            blocked_at: gives, for the joints at an exposure, the function that returns what is
+            blocked_at: gives, for what was so at an exposure, the function that returns what is
                 between a camera and points of the target; the target itself must not count.
             find: finds the target in a whole image, when it is lost.
         """
@@ -114,6 +113,10 @@ class PosePerception(Generic[B]):
     def state(self) -> TargetState:
         """What is believed after the newest image, as it is passed on."""
         return state_of(self.belief)
+
+    def pose_at(self, frame: Frame) -> FloatArray:
+        """Return T_world_target (4, 4) as it is expected at an exposure; of a lost one the last."""
+        return self._expected(frame.time).T_world_target
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
         """Return what the images show and where the target is, or None without an image.
@@ -176,7 +179,7 @@ class PosePerception(Generic[B]):
         )
         if self._blocked_at is not None:
             for n, frame in enumerate(predicted.frames):
-                blocked = self._blocked_at(frame.joints)
+                blocked = self._blocked_at(frame)
                 world = transform_points(predicted.T_world_target[n], self._shape.points)
                 eye = predicted.T_world_camera[n, :3, 3]
                 add_obstacles(visibility.status[n], blocked, eye, world)

@@ -36,6 +36,7 @@ def is_ideal(cell: Cell) -> bool:
         and camera.arm == cell.task.arm
         and not camera.blind_s
         and not renders(cell)
+        and len(cell.targets) == 1
         and cell.target.features is not None
         and not isinstance(cell.task.tracker, CurveTracking)
         and cell.target.carried_by is None
@@ -139,4 +140,5 @@ def _apart_from(cell: Cell) -> dict[str, Any]:
     """Return what of a cell is not in its world, or is set in it at each run's start."""
     arms = {name: {"start_deg"} for name in cell.arms}
     rest = dict.fromkeys(("law", "laws", "task", "duration_s", "seed"), True)
-    return {"arms": arms, "target": {"motion"}, **rest}
+    targets = {name: {"motion"} for name in cell.targets}
+    return {"arms": arms, "targets": targets, **rest}

@@ -43,7 +43,7 @@ class CellSource:
         if isinstance(cell, Cell):
             source = cls.of(cell.path, {}, None)
             require_one_task(cell, _ONE_TASK)
-            given = cell.model_dump(mode="json", exclude={"tasks"})
+            given = cell.as_tables()
             return replace(source, changes=merged(given, changes))
         return replace(cls.of(cell, {}, None), changes=changes)
 

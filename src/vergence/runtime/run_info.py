@@ -45,6 +45,7 @@ class _RunData(BaseModel):
     seed: int | None
     task_camera: _Name
     path: Annotated[str, StringConstraints(max_length=4096)] = ""
+    targets: Annotated[tuple[_Name, ...], Field(max_length=64)] = ()
     arms: Annotated[dict[_Name, _ArmData], Field(max_length=64)]
     cameras: Annotated[dict[_Name, _CameraData], Field(max_length=64)]
 
@@ -93,6 +94,7 @@ class RunInfo:
     cameras: Mapping[str, Camera] = field(default_factory=dict)
     task_camera: str = ""  # the one whose points the reference speaks of; the first if empty
     path: str = ""  # where the cell file was, with the models beside it
+    targets: tuple[str, ...] = ()  # names of the targets; none are known of old recordings
 
     def __post_init__(self) -> None:
         if not self.task_camera:
@@ -107,10 +109,11 @@ class RunInfo:
         seed: int | None,
         task_camera: str = "",
         path: str = "",
+        targets: tuple[str, ...] = (),
     ) -> Self:
         """Keep what a driver and a cell file say."""
         arms = {name: ArmInfo.of(arm) for name, arm in driver.arms.items()}
-        return cls(cell, text, seed, arms, dict(driver.cameras), task_camera, path)
+        return cls(cell, text, seed, arms, dict(driver.cameras), task_camera, path, targets)
 
     def as_json(self) -> dict[str, Any]:
         """Return JSON values of all but the text."""
@@ -119,6 +122,7 @@ class RunInfo:
             "seed": self.seed,
             "task_camera": self.task_camera,
             "path": self.path,
+            "targets": list(self.targets),
             "arms": {name: arm.as_json() for name, arm in self.arms.items()},
             "cameras": {name: _camera_json(camera) for name, camera in self.cameras.items()},
         }
@@ -139,6 +143,7 @@ class RunInfo:
             {name: Camera(**camera.model_dump()) for name, camera in given.cameras.items()},
             given.task_camera,
             given.path,
+            given.targets,
         )
 
 

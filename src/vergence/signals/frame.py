@@ -1,7 +1,7 @@
 """An image as a driver delivers it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,7 @@ class FrameTruth:
     points_px: FloatArray  # (M, 2) its features, truly projected
     depth_m: FloatArray  # (M,) their depth along the optical axis
     visible: BoolArray  # (M,) in the image and in front of the camera
+    others: Mapping[str, "FrameTruth"] = field(default_factory=dict)  # by name, of other targets
 
 
 @dataclass(frozen=True, slots=True)

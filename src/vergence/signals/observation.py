@@ -1,6 +1,7 @@
 """What perception passes on: image points with covariance, and a target state from a filter."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -80,3 +81,5 @@ class Observation:
     views: tuple[ImagePoints, ...]  # one per image that arrived
     target: TargetState | None = None
     needs_target: bool = True  # whether the arm is held while the target is not seen
+    # By name, what was seen of the targets that the task is not about.
+    others: Mapping[str, "Observation"] = field(default_factory=dict)

@@ -14,27 +14,28 @@ P = TypeVar("P", bound=Placement)
 
 
 def as_built(cell: Cell) -> Cell:
-    """Return a cell whose target and cameras are where they truly are.
+    """Return a cell whose targets and cameras are where they truly are.
 
-    A file holds what its user knows. The target's placement is off by `perception.start_error_*`,
+    A file holds what its user knows. A target's placement is off by `perception.start_error_*`,
     a camera's by its `calibration_error_*`, in random directions that follow from the seed. Without
     such errors the cell is returned as it is.
     """
-    target, cameras = cell.target, dict(cell.cameras)
+    targets, cameras = dict(cell.targets), dict(cell.cameras)
     distance, angle = cell.placement_error
-    if distance or angle:
-        off = _small_motion(np.random.default_rng([cell.seed, 4]), distance, angle)
-        T = placement_pose(target)
-        true = se3(off[:3, :3].T @ T[:3, :3], T[:3, 3] - off[:3, 3])
-        target = _placed(target, true)
+    for number, (name, target) in enumerate(cell.targets.items()):
+        if distance or angle:
+            off = _small_motion(np.random.default_rng([cell.seed, 4, number]), distance, angle)
+            T = placement_pose(target)
+            true = se3(off[:3, :3].T @ T[:3, :3], T[:3, 3] - off[:3, 3])
+            targets[name] = _placed(target, true)
     for number, (name, table) in enumerate(cell.cameras.items()):
         distance, angle = table.calibration_error_m, table.calibration_error_deg
         if distance or angle:
             off = _small_motion(np.random.default_rng([cell.seed, 6, number]), distance, angle)
             cameras[name] = _placed(table, placement_pose(table) @ se3_inverse(off))
-    if target is cell.target and cameras == cell.cameras:
+    if targets == cell.targets and cameras == cell.cameras:
         return cell
-    return cell.model_copy(update={"target": target, "cameras": cameras})
+    return cell.model_copy(update={"targets": targets, "cameras": cameras})
 
 
 def _placed(table: P, T: FloatArray) -> P:

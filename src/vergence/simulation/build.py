@@ -1,4 +1,4 @@
-"""From a cell file to MuJoCo's description: arms with servos, cameras with lenses, the target."""
+"""From a cell file to MuJoCo's description: arms with servos, cameras with lenses, targets."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,8 @@ import numpy as np
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
 from vergence.cell.locate import locate_model
-from vergence.cell.schema import ArmTable, CameraTable, OutputTable, Placement
+from vergence.cell.named_targets import target_body, target_key
+from vergence.cell.schema import ArmTable, CameraTable, OutputTable, Placement, TargetTable
 from vergence.errors import InputError, nearest
 from vergence.geometry import matrix_to_quaternion
 from vergence.robot.mesh_files import SHELL
@@ -24,7 +25,10 @@ _ROOM = Path(__file__).with_name("scene.xml")
 
 
 def assemble(cell: Cell) -> Any:
-    """Return the MjSpec of a cell; everything of arm A is named "A/…", of the target "target/…"."""
+    """Return the MjSpec of a cell; everything of arm A is named "A/…".
+
+    Everything of a target is named with its `target_body` and a slash.
+    """
     spec = mujoco.MjSpec()
     spec.option.timestep = 1.0 / cell.inner_rate_hz
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -45,7 +49,8 @@ def assemble(cell: Cell) -> Any:
         _add_arm(spec, cell, name, arm)
     for name, camera in cell.cameras.items():
         _add_camera(spec, cell, name, camera)
-    _add_target(spec, cell)
+    for name, target in cell.targets.items():
+        _add_target(spec, cell, name, target)
     if cell.tool is not None:
         model = _read(cell, "task.tool.model", cell.tool.model)
         spec.attach(
@@ -107,20 +112,18 @@ def _add_output(spec: Any, cell: Cell, name: str, output: OutputTable) -> None:
         spec.attach(model, frame=frame, prefix=f"{place}/")
 
 
-def _add_target(spec: Any, cell: Cell) -> None:
-    """Attach the target to the arm that carries it, else to a body that is moved about."""
-    target = cell.target
-    model = mujoco.MjSpec()
+def _add_target(spec: Any, cell: Cell, name: str, target: TargetTable) -> None:
+    """Attach a target to the arm that carries it, else to a body that is moved about."""
+    model, body = mujoco.MjSpec(), target_body(name)
     if target.model is not None:
-        model = _read(cell, "target.model", target.model)
+        model = _read(cell, f"{target_key(name)}.model", target.model)
     if target.tag is not None:
         add_tag(model, target.tag)
-    arm = cell.target.carried_by
-    if arm is None:
-        frame = spec.worldbody.add_body(name="target", mocap=True).add_frame()
+    if target.carried_by is None:
+        frame = spec.worldbody.add_body(name=body, mocap=True).add_frame()
     else:
-        frame = _held(spec, cell, "target", model, cell.target, arm)
-    spec.attach(model, frame=frame, prefix="target/")
+        frame = _held(spec, cell, body, model, target, target.carried_by)
+    spec.attach(model, frame=frame, prefix=f"{body}/")
 
 
 def _read(cell: Cell, key: str, model: Path, last_body: str | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""The cell as its file and its models describe it: geometry, arms, cameras, the target."""
+"""The cell as its file and its models describe it: geometry, arms, cameras, targets."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -11,6 +11,7 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
 from vergence.cell.cell import Cell
 from vergence.cell.joint_positions import joint_accelerations, joint_positions, joint_rates
+from vergence.cell.named_targets import target_body
 from vergence.errors import InputError
 from vergence.geometry import matrix_to_quaternion, se3_inverse
 from vergence.robot import Arm
@@ -32,10 +33,11 @@ class CellModel:
         hulls: whether distances between bodies will be asked for, which hulls of meshes make fast.
 
     Attributes:
-        model: MuJoCo's model; everything of arm A is named "A/…", of the target "target/…".
+        model: MuJoCo's model; everything of arm A is named "A/…", see `assemble`.
         data: its state.
         cameras: intrinsics by camera name.
         arms: by name, each up to the first camera it carries, else up to its last body.
+        target_name: the target that the task is about, which is meant where none is named.
     """
 
     def __init__(self, cell: Cell, hulls: bool = False) -> None:
@@ -48,9 +50,9 @@ class CellModel:
         self._joints = {name: self._joint_ids(name) for name in cell.arms}
         self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
         self._axis_qpos = {name: self._axis_addresses(name) for name in cell.arms}
-        self._target = int(self.model.body("target").id)
-        self._rail = int(self.model.body("target").mocapid[0])  # -1 if an arm carries it
-        self._target_bodies = _descendants(self.model, self._target)
+        self.target_name = cell.target_name
+        self.target_bodies = {n: int(self.model.body(target_body(n)).id) for n in cell.targets}
+        self._parts = {n: _descendants(self.model, body) for n, body in self.target_bodies.items()}
         self._camera_ids = {name: self.model.camera(name).id for name in cell.cameras}
         self._place_at_start()
 
@@ -77,9 +79,9 @@ class CellModel:
             self._to_camera[camera] = self._arm(name, camera)
         return self._to_camera[camera]
 
-    def target_pose(self) -> FloatArray:
-        """Return T_world_target (4, 4), as of the last `update`."""
-        return self._body_pose(self._target)
+    def target_pose(self, name: str | None = None) -> FloatArray:
+        """Return T_world_target (4, 4) of a target, the task's if None, as of the last `update`."""
+        return self._body_pose(self.target_bodies[name or self.target_name])
 
     def tool_pose(self) -> FloatArray:
         """Return T_world_tool (4, 4) of what the task's arm holds, as of the last `update`."""
@@ -89,22 +91,18 @@ class CellModel:
         """Return T_world_output (4, 4) of an output on an arm, as of the last `update`."""
         return self._body_pose(int(self.model.body(f"output {name}").id))
 
-    def move_target(self, T_world_target: FloatArray) -> None:
-        """Put the target somewhere; it takes effect with the next step or `update`.
+    def move_target(self, T_world_target: FloatArray, name: str | None = None) -> None:
+        """Put a target, the task's if None, somewhere; see `put_target`.
 
-        A target that an arm carries stays with it.
+        It takes effect with the next step or `update`. A target that an arm carries stays with it.
         """
-        if not self.target_is_free:
-            return
-        self.data.mocap_pos[self._rail] = T_world_target[:3, 3]
-        self.data.mocap_quat[self._rail] = matrix_to_quaternion(
-            np.ascontiguousarray(T_world_target[:3, :3])
-        )
+        if self.target_is_free(name):
+            body = self.target_bodies[name or self.target_name]
+            put_target(self.model, self.data, body, T_world_target)
 
-    @property
-    def target_is_free(self) -> bool:
-        """Whether `move_target` moves it: no arm carries it."""
-        return self._rail >= 0
+    def target_is_free(self, name: str | None = None) -> bool:
+        """Whether `move_target` moves a target: no arm carries it."""
+        return bool(self.model.body_mocapid[self.target_bodies[name or self.target_name]] >= 0)
 
     def place_arm(self, arm: str, position: FloatArray) -> None:
         """Put an arm's joints somewhere (n,), against all physics, and update every pose."""
@@ -130,7 +128,7 @@ class CellModel:
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
         """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.
 
-        A ray that misses the target gives NaN.
+        It is the task's. A ray that misses it gives NaN.
         """
         T_world_camera = self.camera_pose(camera)
         T_target_world = se3_inverse(self.target_pose())
@@ -139,7 +137,7 @@ class CellModel:
             ray = T_world_camera[:3, :3] @ np.array([x, y, 1.0])
             ray /= np.linalg.norm(ray)
             distance, body = self.ray(T_world_camera[:3, 3].copy(), ray)
-            if self.belongs_to_target(body):
+            if self.target_of(body) == self.target_name:
                 met = T_world_camera[:3, 3] + distance * ray
                 points[j] = T_target_world[:3, :3] @ met + T_target_world[:3, 3]
         return points
@@ -157,17 +155,17 @@ class CellModel:
         )
         return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
 
-    def sees(self, camera: str, points: FloatArray, inside_target: bool = False) -> BoolArray:
+    def sees(self, camera: str, points: FloatArray, inside: str | None = None) -> BoolArray:
         """Return which points (N, 3) in the world no surface hides from a camera, (N,).
 
-        Points inside the target are not hidden by it.
+        Points inside a target, if one is named, are not hidden by it.
         """
         eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
         geoms = hiding(self.model, self.data, eye, points)
         seen: BoolArray = geoms < 0
-        if inside_target:
-            own = [self.belongs_to_target(body) for body in self.model.geom_bodyid[geoms].tolist()]
-            seen |= np.array(own, dtype=np.bool_)
+        if inside is not None:
+            bodies = self.model.geom_bodyid[geoms].tolist()
+            seen |= np.array([self.target_of(body) == inside for body in bodies], dtype=np.bool_)
         return seen
 
     def in_the_way(self, camera: str, points: FloatArray) -> tuple[str, ...]:
@@ -177,9 +175,9 @@ class CellModel:
         bodies = {int(self.model.geom_bodyid[geom]) for geom in geoms if geom >= 0}
         return tuple(sorted(self.model.body(body).name for body in bodies))
 
-    def belongs_to_target(self, body: int) -> bool:
-        """Whether a body is the target or a part of it."""
-        return body in self._target_bodies
+    def target_of(self, body: int) -> str | None:
+        """Return the name of the target that a body is or is a part of; None of any other."""
+        return next((name for name, parts in self._parts.items() if body in parts), None)
 
     def bodies_of(self, arm: str) -> frozenset[int]:
         """Return the bodies of an arm."""
@@ -197,10 +195,12 @@ class CellModel:
         """Return an arm with its last body as its tip."""
         return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")
 
-    def arm_to_target(self) -> Arm:
-        """Return the arm that carries the target, with the target as its tip."""
-        assert self.cell.target.carried_by is not None
-        return self._arm_to(self.cell.target.carried_by, "target", "body")
+    def arm_to_target(self, name: str | None = None) -> Arm:
+        """Return the arm that carries a target, the task's if None, with it as its tip."""
+        name = name or self.target_name
+        carrier = self.cell.targets[name].carried_by
+        assert carrier is not None
+        return self._arm_to(carrier, target_body(name), "body")
 
     def _body_pose(self, body: int) -> FloatArray:
         T = np.eye(4)
@@ -243,8 +243,23 @@ class CellModel:
             given = self.cell.arms[name].start_deg
             start = joint_positions(self.cell, key, given, self.arms[name])
             self.write_position(self.data, name, start)
-        self.move_target(placement_pose(self.cell.target))
+        for name, target in self.cell.targets.items():
+            self.move_target(placement_pose(target), name)
         self.update()
+
+
+def put_target(model: Any, data: Any, body: int, T_world_target: FloatArray) -> None:
+    """Put a target that no arm carries somewhere in a state of a model.
+
+    Args:
+        model: MuJoCo's.
+        data: its state.
+        body: the target's.
+        T_world_target: where, (4, 4).
+    """
+    rail = model.body_mocapid[body]
+    data.mocap_pos[rail] = T_world_target[:3, 3]
+    data.mocap_quat[rail] = matrix_to_quaternion(np.ascontiguousarray(T_world_target[:3, :3]))
 
 
 def hidden(

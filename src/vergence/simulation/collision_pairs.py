@@ -81,7 +81,7 @@ def _pairs(model: "CellModel", arm: str) -> Iterator[tuple[int, int, int]]:
     def kind_of(body: int) -> str:
         if body in own:  # what the arm holds is a part of it
             return "self"
-        if model.belongs_to_target(body):
+        if model.target_of(body) is not None:
             return "target"
         return "arms" if body in arms else "fixtures"
 

@@ -15,10 +15,13 @@ class ExactCorners:
     Args:
         noise_px: standard deviation of the noise on each coordinate.
         rng: draws the noise.
+        target: name of the target that they are of; the task's if None.
     """
 
-    def __init__(self, noise_px: float, rng: np.random.Generator) -> None:
-        self._noise_px, self._rng = noise_px, rng
+    def __init__(
+        self, noise_px: float, rng: np.random.Generator, target: str | None = None
+    ) -> None:
+        self._noise_px, self._rng, self._target = noise_px, rng, target
 
     def __call__(
         self,
@@ -32,6 +35,8 @@ class ExactCorners:
         truth, count = frame.truth, len(features)
         if truth is None:
             raise no_truth(frame.camera)
+        if self._target is not None:
+            truth = truth.others.get(self._target, truth)
         measured = truth.points_px[features] + self._rng.normal(0.0, self._noise_px, (count, 2))
         visible = truth.visible[features]
         found = visible & (np.abs(measured - points_px) <= half_px).all(axis=1)

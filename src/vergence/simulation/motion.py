@@ -23,6 +23,16 @@ def target_pose(start: Placement, motion: Motion, seed: int) -> TargetPose:
     return lambda time: poses(np.array([time]))[0]
 
 
+def target_seed(seed: int, number: int) -> int:
+    """Return the seed of a target's motion, each target's another; that of the first is the cell's.
+
+    Args:
+        seed: of the cell.
+        number: of the target in the cell, from 0.
+    """
+    return seed if number == 0 else int(np.random.default_rng([seed, 8, number]).integers(1 << 62))
+
+
 def target_poses(start: Placement, motion: Motion, seed: int) -> TargetPoses:
     """Return the poses of the target as a function of many times.
 

@@ -1,4 +1,4 @@
-"""What in a cell is between a camera and the target, for the joints the arms report."""
+"""What in a cell is between a camera and a target, for the joints the arms report."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -11,37 +11,55 @@ from vergence.arrays import BoolArray, FloatArray
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
 
-_TARGET_GROUP = 5  # MuJoCo's last group of geometry
+_LEFT_OUT = 5  # MuJoCo's last group of geometry
 
 
 class Obstacles:
-    """Arms and fixtures of a cell as they are known from its file and from joint positions.
+    """Arms and fixtures of a cell as they are known, and other targets where they are believed.
 
-    It asks rays whether anything is in the way. The target is left out: where it is has to be
-    estimated, and how it hides itself follows from that estimate.
+    It asks rays whether anything is in the way. The target itself is left out: where it is has to
+    be estimated, and how it hides itself follows from that estimate. So is any other target of
+    which nothing is known.
 
     Args:
         model: of the cell; its geometry is copied, its state is not looked at.
+        target: name of the target; the task's if None.
     """
 
-    def __init__(self, model: "CellModel") -> None:
+    def __init__(self, model: "CellModel", target: str | None = None) -> None:
         import mujoco
 
-        self._cell_model = model
+        self._cell_model, self._target = model, target or model.target_name
         self._model = copy(model.model)
-        of_target = [model.belongs_to_target(int(body)) for body in self._model.geom_bodyid]
-        group = np.minimum(self._model.geom_group, _TARGET_GROUP - 1)
-        self._model.geom_group[:] = np.where(of_target, _TARGET_GROUP, group)
-        self._groups = np.array([1] * _TARGET_GROUP + [0], dtype=np.uint8)
+        self._group = np.minimum(self._model.geom_group, _LEFT_OUT - 1)
+        self._owner = np.array(
+            [model.target_of(int(body)) or "" for body in self._model.geom_bodyid], dtype=object
+        )
+        self._groups = np.array([1] * _LEFT_OUT + [0], dtype=np.uint8)
         self._data = mujoco.MjData(self._model)
+        self._show(frozenset())
 
-    def move(self, joints: Mapping[str, FloatArray]) -> None:
-        """Put the arms where their joints say, arm name to positions (n,)."""
+    def move(
+        self, joints: Mapping[str, FloatArray], targets: Mapping[str, FloatArray] | None = None
+    ) -> None:
+        """Put arms and other targets where they are.
+
+        Args:
+            joints: arm name to positions (n,).
+            targets: other targets' names to T_world_target (4, 4), as far as they are known.
+        """
         import mujoco
 
         for arm, position in joints.items():
             self._cell_model.write_position(self._data, arm, position)
         mujoco.mj_kinematics(self._model, self._data)
+        others = {name: T for name, T in (targets or {}).items() if name != self._target}
+        if others.keys() != self._shown:
+            self._show(frozenset(others))
+        if others:
+            for name, T_world_target in others.items():
+                self._put(self._cell_model.target_bodies[name], T_world_target)
+            mujoco.mj_kinematics(self._model, self._data)
 
     def blocked(self, eye: FloatArray, points: FloatArray) -> BoolArray:
         """Return which points (N, 3) are hidden from an eye (3,), (N,); world frame, m."""
@@ -49,3 +67,25 @@ class Obstacles:
 
         eye = np.ascontiguousarray(eye, dtype=np.float64)
         return hidden(self._model, self._data, eye, points, self._groups)
+
+    def _show(self, others: frozenset[str]) -> None:
+        """Let no target but these be in the way."""
+        self._shown = others
+        left_out = np.array([owner != "" and owner not in others for owner in self._owner])
+        self._model.geom_group[:] = np.where(left_out, _LEFT_OUT, self._group)
+
+    def _put(self, body: int, T_world_target: FloatArray) -> None:
+        """Put a target somewhere, also one that an arm carries."""
+        from vergence.geometry import matrix_to_quaternion, se3_inverse
+        from vergence.simulation.cell_model import put_target
+
+        if self._model.body_mocapid[body] >= 0:
+            put_target(self._model, self._data, body, T_world_target)
+            return
+        holder = self._model.body_parentid[body]
+        T_world_holder = np.eye(4)
+        T_world_holder[:3, :3] = self._data.xmat[holder].reshape(3, 3)
+        T_world_holder[:3, 3] = self._data.xpos[holder]
+        T = se3_inverse(T_world_holder) @ T_world_target
+        self._model.body_pos[body] = T[:3, 3]
+        self._model.body_quat[body] = matrix_to_quaternion(np.ascontiguousarray(T[:3, :3]))

@@ -63,11 +63,13 @@ class Shutter:
     def moments(self, camera: str, tick: int, imaging: ImagingTable) -> FloatArray:
         """Return the ticks to render for an image exposed about a tick, (J,), evenly spaced.
 
-        As many as make the image move by half a pixel in between, at the target's distance; one if
-        nothing moves.
+        As many as make the image move by half a pixel in between, at the targets' distances; one
+        if nothing moves.
         """
         half = imaging.open_s / 2 * self._rate
-        moved = self._displacement(camera, tick + half * np.linspace(-1.0, 1.0, 5))
+        ticks = tick + half * np.linspace(-1.0, 1.0, 5)
+        bodies = self._world.target_bodies.values()
+        moved = max(self._displacement(camera, ticks, body) for body in bodies)
         if moved < 0.05:
             return np.array([float(tick)])
         count = int(np.clip(np.ceil(moved / _STEP_PX) + 1, 3, _MOST_MOMENTS))
@@ -86,13 +88,12 @@ class Shutter:
         mujoco.mj_camlight(self._world.model, self._past)
         return self._past
 
-    def _displacement(self, camera: str, ticks: FloatArray) -> float:
+    def _displacement(self, camera: str, ticks: FloatArray, target: int) -> float:
         """Return how far the image moves over some ticks, px: the most over the image.
 
-        Both what is stationary and what moves with the target is looked at, at the target's
-        distance.
+        Both what is stationary and what moves with a target is looked at, at its distance.
         """
-        poses = [self._poses(camera, tick) for tick in ticks]
+        poses = [self._poses(camera, tick, target) for tick in ticks]
         T_camera, T_target = poses[len(poses) // 2]
         depth = (se3_inverse(T_camera) @ T_target)[2, 3]
         lens = self._world.cameras[camera]
@@ -112,11 +113,11 @@ class Shutter:
             moved = max(moved, float(steps.sum(axis=0).max()))
         return moved
 
-    def _poses(self, camera: str, tick: float) -> tuple[FloatArray, FloatArray]:
-        """Return T_world_camera and T_world_target, (4, 4) each, at a tick."""
+    def _poses(self, camera: str, tick: float, body: int) -> tuple[FloatArray, FloatArray]:
+        """Return T_world_camera and T_world_target, (4, 4) each, of a target's body at a tick."""
         data, model = self.at(tick), self._world.model
         T_camera, T_target = np.eye(4), np.eye(4)
-        number, body = model.camera(camera).id, model.body("target").id
+        number = model.camera(camera).id
         T_camera[:3, :3] = data.cam_xmat[number].reshape(3, 3) @ FROM_MUJOCO_CAMERA
         T_camera[:3, 3] = data.cam_xpos[number]
         T_target[:3, :3], T_target[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]

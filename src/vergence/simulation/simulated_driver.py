@@ -12,7 +12,7 @@ from vergence.cell.schema import Task
 from vergence.robot import Arm
 from vergence.signals import Frame, JointState, Sample, Setpoint
 from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
-from vergence.simulation.motion import target_pose
+from vergence.simulation.motion import target_pose, target_seed
 from vergence.simulation.renderer import choose_renderer
 
 
@@ -22,7 +22,7 @@ class SimulatedDriver:
     With `images` off frames carry no image, only the truth, for perception that is exact by
     construction. How images come about is told by `SimulatedCameras`.
 
-    Target and cameras are where `as_built` has them: off the cell's placements by the errors that
+    Targets and cameras are where `as_built` has them: off the cell's placements by the errors that
     the cell states.
     """
 
@@ -39,12 +39,15 @@ class SimulatedDriver:
         self.cell = cell
         built = as_built(cell)
         self.world = World(built)
-        self._pose = target_pose(built.target, cell.target.motion, cell.seed)
+        self._motions = {
+            name: target_pose(built.targets[name], target.motion, target_seed(cell.seed, number))
+            for number, (name, target) in enumerate(cell.targets.items())
+        }
         self._grippers = {n: Gripper(self.world, n, t) for n, t in cell.outputs.items()}
-        self._let_go: FloatArray | None = None  # (4, 4) where a target was let go last
+        self._let_go: dict[str, FloatArray] = {}  # (4, 4) where targets were let go last, by name
         self._tick = 0
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
-        self.world.move_target(self._pose(0.0))
+        self._move_targets()
         self.world.update()
         self._subject = Subject(cell, self.world)
         self._subject.take_up(cell.task, images)
@@ -151,7 +154,7 @@ class SimulatedDriver:
         for name, trajectory in self._trajectories.items():
             self.world.command(name, *trajectory.at(self._tick))
         self._tick += 1
-        self.world.move_target(self._target_pose())
+        self._move_targets()
         self.world.step()
         self._cameras.expose(self._tick, self._update)
 
@@ -164,10 +167,10 @@ class SimulatedDriver:
         """Close a gripper, from a value of a half on, or open it; see `Gripper`."""
         self.world.update()
         gripper = self._grippers[name]
-        held = gripper.target_pose()
+        target, held = gripper.holds, gripper.target_pose()
         gripper.set(value)
-        if held is not None and not gripper.holds:
-            self._let_go = held
+        if target is not None and held is not None and not gripper.holds:
+            self._let_go[target] = held
 
     def close(self) -> None:
         """Free the graphics contexts."""
@@ -179,20 +182,26 @@ class SimulatedDriver:
         else:
             self._cameras.tell_again()
 
-    def _target_pose(self) -> FloatArray:
+    def _move_targets(self) -> None:
+        """Put every target where it is now."""
+        for name in self._motions:
+            self.world.move_target(self._target_pose(name), name)
+
+    def _target_pose(self, name: str) -> FloatArray:
         """Return T_world_target (4, 4): with the arm, where it was let go, or as it moves."""
-        poses = (gripper.target_pose() for gripper in self._grippers.values())
-        held = next((T for T in poses if T is not None), self._let_go)
-        return self._pose(self.time) if held is None else held
+        for gripper in self._grippers.values():
+            if gripper.holds == name and (held := gripper.target_pose()) is not None:
+                return held
+        return self._let_go[name] if name in self._let_go else self._motions[name](self.time)
 
     def _update(self) -> None:
         """Bring all that cameras see to now: a target that is held, too, not one tick ago."""
         self.world.update()
         if any(gripper.holds for gripper in self._grippers.values()):
-            self.world.move_target(self._target_pose())
+            self._move_targets()
             self.world.update()
 
     def _own_motion(self, name: str) -> JointTrajectory:
-        carries = self.cell.target.carried_by == name
-        arm = self.world.arm_to_target() if carries else self.world.arm_to_body(name)
+        held = [n for n, target in self.cell.targets.items() if target.carried_by == name]
+        arm = self.world.arm_to_target(held[0]) if held else self.world.arm_to_body(name)
         return arm_trajectory(self.cell, name, arm, self.world.joint_position(name))

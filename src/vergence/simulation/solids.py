@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class Solids:
     """Fixtures and other arms as rounded boxes, where they are now.
 
-    The target is left out, since how it hides itself follows from its own pose, and so is the arm
-    that carries the camera. Floors hide nothing above them. A mesh is taken for the box
+    Targets are left out, since where they are is estimated, and so is the arm that carries the
+    camera. Floors hide nothing above them. A mesh is taken for the box
     around it, a cylinder for one with rounded ends.
 
     Args:
@@ -41,7 +41,8 @@ class Solids:
             [
                 geom
                 for geom, body in enumerate(model.model.geom_bodyid)
-                if not (model.belongs_to_target(int(body)) or int(body) in own)
+                if model.target_of(int(body)) is None
+                and int(body) not in own
                 and _hides(model.model, geom)
             ],
             dtype=np.int64,

@@ -1,12 +1,14 @@
 """What the cameras look at for a task, and the truth of it."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
+from vergence.cell.named_targets import target_body
 from vergence.cell.schema import FollowTable, Task, TrackTable
 from vergence.errors import InputError
 from vergence.features import inverse_depth_plane
@@ -17,18 +19,26 @@ from vergence.simulation.world import World
 from vergence.vision import CurveTracking
 
 
+class _Points(NamedTuple):
+    """Points of an object."""
+
+    features: FloatArray  # (M, 3) in its frame, m
+    inside: str | None  # the target that they lie inside of, which does not hide them
+
+
 class Subject:
-    """The features of target or tool, and where they truly are in an image.
+    """The features of target or tool, and of the other targets, and where they truly are.
 
     Args:
-        cell: whose target and tool they are.
+        cell: whose targets and tool they are.
         world: as it is now.
     """
 
     def __init__(self, cell: Cell, world: World) -> None:
         self._cell, self._world = cell, world
         self._curve: CurveTracking | None = None
-        self._inside = False  # whether the features lie inside the target
+        self._inside: str | None = None  # the target that the features lie inside of
+        self._others: dict[str, _Points] = {}  # of the targets that the task is not about
         self.features = np.empty((0, 3))  # in the target's frame, m
 
     def take_up(self, task: Task, images: bool) -> None:
@@ -38,17 +48,12 @@ class Subject:
         """
         tracker = getattr(task, "tracker", None)
         self._curve = tracker if isinstance(tracker, CurveTracking) else None
-        self._inside = False
-        known = self._cell.target.features
-        if known:
-            self.features = np.array(known, dtype=np.float64)
-        elif isinstance(task, FollowTable) or looks_for_target(task.until):
-            from vergence.vision.known_object import as_followed, object_model_of
-
-            model = object_model_of(self._world.model, "target")
-            followed = as_followed(model)
-            self._inside = followed is not model
-            self.features = followed.corners
+        self._inside = None
+        name = self._world.target_name = self._cell.name_of_target(task)
+        self._others = {other: self._known(other) for other in self._cell.targets if other != name}
+        known = self._cell.targets[name].features
+        if known or isinstance(task, FollowTable) or looks_for_target(task.until):
+            self.features, self._inside = self._known(name)
         elif images or not isinstance(task, TrackTable):
             self.features = np.empty((0, 3))
         else:
@@ -59,21 +64,45 @@ class Subject:
     def truth(self, camera: str, blind: bool) -> FrameTruth:
         """Return what is true of an image that a camera takes now."""
         T_world_target, features = self._seen_by(camera)
+        truth = self._truth_of(camera, T_world_target, _Points(features, self._inside), blind)
+        if self._curve is not None:
+            truth = _truth_of_curve(truth, self._curve, self._world.cameras[camera])
+        others = {
+            name: self._truth_of(camera, self._world.target_pose(name), points, blind)
+            for name, points in self._others.items()
+        }
+        return replace(truth, others=others)
+
+    def _known(self, name: str) -> "_Points":
+        """Return the points of a target that follow from its table or its geometry."""
+        features = self._cell.targets[name].features
+        if features:
+            return _Points(np.array(features, dtype=np.float64), None)
+        from vergence.vision.known_object import as_followed, object_model_of
+
+        model = object_model_of(self._world.model, target_body(name))
+        followed = as_followed(model)
+        return _Points(followed.corners, None if followed is model else name)
+
+    def _truth_of(
+        self, camera: str, T_world_target: FloatArray, points: "_Points", blind: bool
+    ) -> FrameTruth:
+        """Return where the points of one object truly are in an image."""
+        features = points.features
         T_world_camera = self._world.camera_pose(camera)
         T_camera_target = se3_inverse(T_world_camera) @ T_world_target
-        points = transform_points(T_camera_target, features)
+        in_camera = transform_points(T_camera_target, features)
         intrinsics = self._world.cameras[camera]
-        depth = points[:, 2].copy()
+        depth = in_camera[:, 2].copy()
         in_front = depth > 1e-3
-        points_px = np.full((len(points), 2), np.nan)
-        points_px[in_front] = intrinsics.project(points[in_front])
-        visible = intrinsics.in_view(points) & in_front & np.bool_(not blind)
+        points_px = np.full((len(in_camera), 2), np.nan)
+        points_px[in_front] = intrinsics.project(in_camera[in_front])
+        visible = intrinsics.in_view(in_camera) & in_front & np.bool_(not blind)
         in_sight = np.flatnonzero(visible)
         if len(in_sight):
             points_world = transform_points(T_world_target, features[in_sight])
-            visible[in_sight] = self._world.sees(camera, points_world, self._inside)
-        truth = FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
-        return truth if self._curve is None else _truth_of_curve(truth, self._curve, intrinsics)
+            visible[in_sight] = self._world.sees(camera, points_world, points.inside)
+        return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
 
     def _seen_by(self, camera: str) -> tuple[FloatArray, FloatArray]:
         """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""

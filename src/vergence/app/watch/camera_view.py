@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,18 @@ from vergence.signals import ImagePoints, curves_of
 
 _JPEG_QUALITY = 80
 _DECIMALS = 3  # of a pixel: nobody sees more
+
+
+class OtherMarks(NamedTuple):
+    """What was measured in an image of another target, and what is true."""
+
+    points: ImagePoints | None
+    true_px: FloatArray | None  # (M, 2)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what the page draws."""
+        true = {} if self.true_px is None else {"true": _places(self.true_px)}
+        return true if self.points is None else {**true, **_measured(self.points)}
 
 
 @dataclass(frozen=True)
@@ -28,6 +40,7 @@ class CameraView:
     T_world_target: FloatArray | None = None  # (4, 4) likewise
     outline_px: FloatArray | None = None  # (K, 2) around the target, where it is known
     kept: bytes = b""  # the image as JPEG, in place of the image
+    others: tuple["OtherMarks", ...] = ()  # of the targets that the task is not about
 
     @cached_property
     def jpeg(self) -> bytes:
@@ -49,6 +62,8 @@ class CameraView:
                 header[name] = _places(places)
         if self.points is not None:
             header |= _measured(self.points)
+        if self.others:
+            header["others"] = [one.as_json() for one in self.others]
         return header
 
 

@@ -124,7 +124,7 @@ class Live:
         about = {
             "mode": "live",
             "scene": True,
-            "draggable": self._driver.world.target_is_free,
+            "draggable": self._driver.world.target_is_free(),
             "carried_by": cell.target.carried_by,
             "images": self._images,
             "truth": True,
@@ -248,7 +248,7 @@ class Live:
                 self._replace_law(self._editor.choose(name, self._law_context))
             case TurnKnob(key=key, value=value):
                 self._replace_law(self._editor.turn(key, value, self._law_context))
-            case _ if self._driver.world.target_is_free:
+            case _ if self._driver.world.target_is_free():
                 self._move_target(command)
 
     def _stop(self) -> None:

@@ -14,14 +14,20 @@ _NEAR_M = 1e-3
 _BOX = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T.astype(np.float64)
 
 
-def target_corners(world: World) -> FloatArray:
-    """Return the corners of the boxes around the target's parts, (K, 3), m, in its frame."""
+def target_corners(world: World, name: str | None = None) -> FloatArray:
+    """Return the corners of the boxes around a target's parts, (K, 3), m, in its frame.
+
+    Args:
+        world: that it is in.
+        name: of the target; the task's if None.
+    """
+    name = name or world.target_name
     model: Any = world.model
     data: Any = world.data
-    T_target_world = se3_inverse(world.target_pose())
+    T_target_world = se3_inverse(world.target_pose(name))
     corners = [np.zeros((1, 3))]
     for geom in range(model.ngeom):
-        if world.belongs_to_target(int(model.geom_bodyid[geom])):
+        if world.target_of(int(model.geom_bodyid[geom])) == name:
             middle, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
             places = (middle + _BOX * half) @ data.geom_xmat[geom].reshape(3, 3).T
             corners.append(transform_points(T_target_world, places + data.geom_xpos[geom]))

@@ -7,7 +7,7 @@ import numpy as np
 from vergence.app.figures.arm import drawn_positions
 from vergence.app.recorded_poses import RecordedPoses, newest
 from vergence.app.recorded_world import RecordedWorld
-from vergence.app.watch.camera_view import CameraView
+from vergence.app.watch.camera_view import CameraView, OtherMarks
 from vergence.app.watch.limits_now import LimitsNow
 from vergence.app.watch.plots import (
     MANIPULABILITY,
@@ -19,6 +19,8 @@ from vergence.app.watch.plots import (
     error_key,
     error_plot,
     joints_plot,
+    other_key,
+    other_plot,
     row,
 )
 from vergence.app.watch.view_state import Row
@@ -63,6 +65,7 @@ class Playback:
             *self._error_rows(),
             *self._pose_rows(),
             *self._target_rows(),
+            *self._other_rows(),
         ]
         return sorted(found, key=lambda entry: entry[0])
 
@@ -84,7 +87,7 @@ class Playback:
         """Return MuJoCo's state of the world at a time; None where the world is not known."""
         if self._world is None:
             return None
-        return self._world.place(self._poses.joints(time), self._poses.target(time))
+        return self._world.place(self._poses.joints(time), self._poses.targets(time))
 
     def limits(self, time: float) -> list[dict[str, object]]:
         """Return the limits that shaped the motion at a time, as `LimitsNow` does."""
@@ -101,6 +104,9 @@ class Playback:
                 yield from (POSE_MM, POSE_DEG)
         if self._recording.target is not None and len(self._poses.true_times):
             yield TARGET_MM
+        for name, other in self._recording.others.items():
+            if len(other.pose_errors.time):
+                yield other_plot(name)
         if not self._arm:
             return
         yield joints_plot(self._recording.info.arms[self._arm])
@@ -151,6 +157,13 @@ class Playback:
             away = T[:3, 3] - self._poses.true_poses[newest(times, time)][:3, 3]
             yield row(time, self.plots, {"target_mm": np.array([_MM * np.linalg.norm(away)])})
 
+    def _other_rows(self) -> Iterator[Row]:
+        for name, other in self._recording.others.items():
+            errors = other.pose_errors
+            for time, away in zip(errors.time.tolist(), errors.target_m, strict=True):
+                values = {other_key(name): np.array([_MM * np.linalg.norm(away)])}
+                yield row(time, self.plots, values)
+
     def _camera_view(self, name: str, time: float) -> CameraView:
         trace, jpegs = self._recording.cameras[name], self._jpegs[name]
         index, kept = newest(trace.received, time), b""
@@ -166,7 +179,15 @@ class Playback:
             trace.desired_px[index],
             trace.true_px[index],
             kept=kept,
+            others=tuple(self._other_marks(name, float(trace.time[index]))),
         )
+
+    def _other_marks(self, camera: str, time: float) -> Iterator[OtherMarks]:
+        """Yield what is to be drawn of the other targets in an image."""
+        for other in self._recording.others.values():
+            trace = other.cameras[camera]
+            for index in np.flatnonzero(trace.time == time):
+                yield OtherMarks(_points(camera, trace, int(index)), trace.true_px[index])
 
 
 def _moved_arm(recording: Recording) -> str:

@@ -63,6 +63,16 @@ def error_key(camera: str = "") -> str:
     return f"error_px {camera}".rstrip()
 
 
+def other_plot(target: str) -> Plot:
+    """Return the panel of the error of a target that the task is not about."""
+    return Plot(other_key(target), f"{TARGET_MM.title} {target}", "mm", TARGET_MM.series)
+
+
+def other_key(target: str) -> str:
+    """Return the key of that panel."""
+    return f"{TARGET_MM.key} {target}"
+
+
 def joints_plot(arm: ArmInfo) -> Plot:
     """Return the panel of an arm's joints."""
     title = "joint positions"
@@ -91,6 +101,9 @@ def live_plots(cell: Cell, points: int, arm: ArmInfo, truth: bool = True) -> tup
         poses = (POSE_MM, POSE_DEG)
         by_estimate = [replace(plot, title=f"{plot.title} by the estimate") for plot in poses]
         panels += (*poses, TARGET_MM) if truth else by_estimate
+    if truth:  # each task may be about another
+        known = {stage.target_name for stage in cell.stages}
+        panels += [other_plot(name) for name in cell.targets if known != {name}]
     return (*panels, joints_plot(arm), MANIPULABILITY)
 
 

@@ -5,18 +5,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from vergence.app.figures.arm import drawn_positions
-from vergence.app.watch.camera_view import CameraView
+from vergence.app.watch.camera_view import CameraView, OtherMarks
 from vergence.app.watch.limits_now import LimitsNow
 from vergence.app.watch.outline import outline, target_corners
-from vergence.app.watch.plots import Plot, drawn_errors, error_key, live_plots, row
+from vergence.app.watch.plots import Plot, drawn_errors, error_key, live_plots, other_key, row
 from vergence.app.watch.view_state import ViewState
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
 from vergence.geometry import se3_inverse, transform_points
 from vergence.robot import manipulability_measure
 from vergence.runtime import RunInfo, TickRecord
-from vergence.runtime.results import angle_between, tick_pose_errors
-from vergence.signals import Frame, FrameTruth, ImagePoints, Outcome, Reference
+from vergence.runtime.results import about_other, angle_between, other_names, tick_pose_errors
+from vergence.signals import Frame, FrameTruth, ImagePoints, Observation, Outcome, Reference
 from vergence.simulation import SimulatedDriver
 
 _MM = 1e3
@@ -85,9 +85,7 @@ class Publisher:
         self._view_state.status(outcome={**end, "succeeded": outcome.succeeded})
 
     def _camera_view(self, frame: Frame, record: TickRecord) -> CameraView:
-        views = record.observation.views if record.observation else ()
-        mine = (view for view in views if (view.camera, view.time) == (frame.camera, frame.time))
-        view, truth = next(mine, None), frame.truth
+        view, truth = _view(record.observation, frame), frame.truth
         camera = self._driver.cameras[frame.camera]
         around = None
         if truth is not None and not self._looks_at_tool(frame.camera):
@@ -103,6 +101,7 @@ class Publisher:
             truth.T_world_camera if truth else None,
             truth.T_world_target if truth else None,
             around,
+            others=tuple(_other_marks(about_other(record, n), frame) for n in other_names(record)),
         )
 
     def _desired(
@@ -130,7 +129,18 @@ class Publisher:
                 [manipulability_measure(self._driver.arms[name].jacobian(q))]
             ),
             **self._errors(record),
+            **self._other_errors(record),
         }
+
+    def _other_errors(self, record: TickRecord) -> dict[str, FloatArray]:
+        """Return how far the other targets are from where they are believed to be."""
+        assert self._info is not None, "a run begins before it ticks"
+        drawn = {}
+        for name in other_names(record):
+            errors = tick_pose_errors(about_other(record, name), self._info)
+            if len(errors.time):
+                drawn[other_key(name)] = _MM * np.linalg.norm(errors.target_m, axis=1)
+        return drawn
 
     def _errors(self, record: TickRecord) -> dict[str, FloatArray]:
         if record.observation is None or record.reference is None:
@@ -183,6 +193,20 @@ class Publisher:
 
     def _looks_at_tool(self, camera: str) -> bool:
         return self._cell.tool is not None and self._cell.tool.camera == camera
+
+
+def _view(observation: Observation | None, frame: Frame) -> ImagePoints | None:
+    """Return what was measured in an image."""
+    views = observation.views if observation else ()
+    mine = (view for view in views if (view.camera, view.time) == (frame.camera, frame.time))
+    return next(mine, None)
+
+
+def _other_marks(record: TickRecord, frame: Frame) -> OtherMarks:
+    """Return what to draw in an image of another target, which a tick is about."""
+    same = (f for f in record.sample.frames if (f.camera, f.time) == (frame.camera, frame.time))
+    truth, view = next(same).truth, _view(record.observation, frame)
+    return OtherMarks(view, _true(truth, view))
 
 
 def _true(truth: FrameTruth | None, view: ImagePoints | None) -> FloatArray | None:

@@ -12,14 +12,14 @@ class WatchedDriver(SimulatedDriver):
     """Calls a function between two turns of the loop, which may make the loop wait.
 
     Attributes:
-        target: moves the target, and lets the mouse move it.
+        target: moves the task's target, and lets the mouse move it.
         between: called with the time, s, at each turn, once the loop runs.
     """
 
     def __init__(self, cell: Cell, images: bool = True) -> None:
         super().__init__(cell, images)
-        self.target = MovedTarget(self._pose)
-        self._pose = self.target.pose
+        self.target = MovedTarget(self._motions[cell.target_name])
+        self._motions[cell.target_name] = self.target.pose
         self.between: Callable[[float], None] | None = None
         self._due = 0.0  # s, when the next turn is due if no image arrives
 

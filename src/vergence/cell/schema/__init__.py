@@ -73,6 +73,7 @@ TABLES: dict[str, type[Table]] = {
     "cameras": CameraTable,
     "collision": CollisionTable,
     "target": TargetTable,
+    "targets": TargetTable,
     "tag": TagTable,
     "track": TrackTable,
     "tool": ToolTable,

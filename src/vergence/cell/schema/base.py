@@ -60,6 +60,7 @@ class TaskTable(Table):
     """What every task has."""
 
     name: Name | None = None  # name in messages and reports; the kind of the task if absent
+    target: Name | None = None  # name of one of [targets]; may be absent if there is only one
     law: Name | None = None  # name of one of [laws], only in [[tasks]]; [law] if absent
     until: Part = None  # condition that ends the task; if absent, a task with a goal ends there
 

@@ -1,7 +1,7 @@
 """A bag as a recording that can be watched: images and joints, whoever wrote it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -114,15 +114,14 @@ def _recording(
     ends = [float(each.time[-1]) for each in joints.values()]
     ends += [seen[-1][0] for seen in kept.values()]
     return BagRecording(
-        info=RunInfo(
-            info.cell, info.text, info.seed, arms, dict(cameras), info.task_camera, info.path
-        ),
+        info=replace(info, arms=arms, cameras=dict(cameras)),
         arms={name: _arm_trace(each) for name, each in joints.items()},
         cameras={name: _camera_trace(seen) for name, seen in kept.items()},
         target=None,
         events=(),
         outcome=Outcome(OutcomeKind.COMPLETED, "the bag ends here", max(ends)),
         summary={},
+        others={},
         path=path,
         version="",
         complete=True,

@@ -11,6 +11,8 @@ Topics of a recording, X being an arm or a camera; times are seconds since the s
 | `/camera/X/annotations` | foxglove.ImageAnnotations | tracked, lost, desired and true points |
 | `/camera/X/calibration` | foxglove.CameraCalibration | intrinsic parameters, once |
 | `/target` | JSON | pose, velocity and covariance as a filter believes them |
+| `/target/X` | JSON | the same of a target X that the task is not about |
+| `/target/X/camera/Y/features` | JSON | its points in camera Y |
 | `/tf` | foxglove.FrameTransforms | camera, target and target estimate in the world |
 | `/events` | foxglove.Log | what happened once |
 

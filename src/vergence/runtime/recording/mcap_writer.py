@@ -13,7 +13,14 @@ from vergence.runtime.json_numbers import finite
 from vergence.runtime.recording import messages, streams
 from vergence.runtime.recording.mcap_file import McapFile
 from vergence.runtime.recording.outcome_json import outcome_json
-from vergence.runtime.results import arm_row, camera_row, images_of, target_row
+from vergence.runtime.results import (
+    about_other,
+    arm_row,
+    camera_row,
+    images_of,
+    other_names,
+    target_row,
+)
 from vergence.runtime.run_info import RunInfo
 from vergence.runtime.tick import TickRecord
 from vergence.signals import Frame, ImagePoints, Outcome
@@ -51,11 +58,11 @@ class McapWriter:
         self.now = record.time
         for arm in record.sample.joints:
             self._record_arm(record, arm)
-        for frame, view in images_of(record):
-            if frame is not None:
-                self._record_image(frame)
-            self._record_points(record, frame, view)
-        self._record_target(record)
+        for frame in record.sample.frames:
+            self._record_image(frame)
+        self._record_seen(record, "target", "")
+        for name in other_names(record):
+            self._record_seen(about_other(record, name), f"target {name}", f"/target/{name}")
         if record.time - self._flushed >= _FLUSH_PERIOD:
             self._file.flush()
             self._flushed = record.time
@@ -94,19 +101,32 @@ class McapWriter:
         joints = messages.joints(state.time, names, state.position, state.velocity)
         self._file.typed(f"/arm/{arm}/joints", self.now, joints)
 
+    def _record_seen(self, record: TickRecord, name: str, at: str) -> None:
+        """Record what was seen of a target, under a topic of its own if it is not the task's."""
+        for frame, view in images_of(record):
+            self._record_points(record, frame, view, name, at)
+        target = record.observation.target if record.observation else None
+        if target is None:
+            return
+        row = streams.message_of(target_row(record, target))
+        self._file.numbers(at or "/target", self.now, streams.TARGET_SCHEMA, row)
+        poses = {f"{name} estimate": target.T_world_target}
+        self._file.typed("/tf", self.now, messages.transforms(target.time, poses))
+
     def _record_points(
-        self, record: TickRecord, frame: Frame | None, view: ImagePoints | None
+        self, record: TickRecord, frame: Frame | None, view: ImagePoints | None, name: str, at: str
     ) -> None:
         row = camera_row(record, self._info, frame, view)
         camera, time = row["camera"], row["time"]
         message = streams.message_of(row)
-        self._file.numbers(f"/camera/{camera}/features", self.now, streams.FEATURES_SCHEMA, message)
+        topic = f"{at}/camera/{camera}"
+        self._file.numbers(f"{topic}/features", self.now, streams.FEATURES_SCHEMA, message)
         marks = messages.annotations(time, view, row.get("desired_px"), row.get("true_px"))
-        self._file.typed(f"/camera/{camera}/annotations", self.now, marks)
+        self._file.typed(f"{topic}/annotations", self.now, marks)
         if "T_world_camera" in row:
             poses = {camera: row["T_world_camera"]}
             if camera == self._info.task_camera:  # another may look at a tool
-                poses["target"] = row["T_world_target"]
+                poses[name] = row["T_world_target"]
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
 
     def _record_image(self, frame: Frame) -> None:
@@ -116,15 +136,6 @@ class McapWriter:
             return
         image = messages.image(frame.camera, frame.time, _jpeg(frame.image, self._jpeg_quality))
         self._file.typed(f"/camera/{frame.camera}/image", self.now, image)
-
-    def _record_target(self, record: TickRecord) -> None:
-        target = record.observation.target if record.observation else None
-        if target is None:
-            return
-        row = streams.message_of(target_row(record, target))
-        self._file.numbers("/target", self.now, streams.TARGET_SCHEMA, row)
-        poses = {"target estimate": target.T_world_target}
-        self._file.typed("/tf", self.now, messages.transforms(target.time, poses))
 
 
 def _warm_up() -> None:

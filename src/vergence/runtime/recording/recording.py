@@ -17,7 +17,15 @@ from vergence.runtime.recording.checked_messages import checked_messages
 from vergence.runtime.recording.mcap_contents import McapContents, messages_on
 from vergence.runtime.recording.outcome_json import read_outcome
 from vergence.runtime.recording.streams import row_of
-from vergence.runtime.results import ArmTrace, CameraTrace, Columns, Event, Run, TargetTrace
+from vergence.runtime.results import (
+    ArmTrace,
+    CameraTrace,
+    Columns,
+    Event,
+    OtherTarget,
+    Run,
+    TargetTrace,
+)
 from vergence.runtime.results.columns import Table
 from vergence.runtime.run_info import RunInfo
 from vergence.signals import Outcome, OutcomeKind
@@ -61,21 +69,19 @@ class Recording(Run):
             name: read.table(f"/arm/{name}/state", streams.ARM_SCHEMA, ArmTrace, len(arm.names))
             for name, arm in info.arms.items()
         }
-        cameras = {
-            name: read.table(f"/camera/{name}/features", streams.FEATURES_SCHEMA, CameraTrace)
-            for name in info.cameras
-        }
-        target = read.table("/target", streams.TARGET_SCHEMA, TargetTrace)
+        cameras, target = read.seen("", info)
+        others = {name: read.seen(f"/target/{name}", info) for name in info.targets}
         outcome, summary = _end(contents.metadata.get("outcome"))
         ends = [float(trace.time[-1]) for trace in arms.values() if len(trace.time)]
         return cls(
             info=info,
             arms=arms,
             cameras=cameras,
-            target=target if len(target.time) else None,
+            target=target,
             events=read.events(),
             outcome=outcome or _cut_off(max(ends, default=0.0)),
             summary=summary,
+            others={name: OtherTarget(*seen) for name, seen in others.items() if _any(*seen)},
             path=path,
             version=version,
             complete=contents.complete and outcome is not None,
@@ -154,6 +160,20 @@ class _Messages:
             columns.append(row_of(message, trace, joints))
         return columns.table()
 
+    def seen(self, at: str, info: RunInfo) -> tuple[dict[str, CameraTrace], TargetTrace | None]:
+        """Return what was seen of a target, and as a filter believed it; see `OtherTarget`.
+
+        Args:
+            at: the topic of a target that the task was not about; empty for its own.
+            info: of the run.
+        """
+        cameras = {
+            name: self.table(f"{at}/camera/{name}/features", streams.FEATURES_SCHEMA, CameraTrace)
+            for name in info.cameras
+        }
+        target = self.table(at or "/target", streams.TARGET_SCHEMA, TargetTrace)
+        return cameras, target if len(target.time) else None
+
     def events(self) -> tuple[Event, ...]:
         """Return what happened, in order."""
         kept = []
@@ -165,6 +185,10 @@ class _Messages:
             except ValueError:
                 self.skipped += 1
         return tuple(kept)
+
+
+def _any(cameras: Mapping[str, CameraTrace], target: TargetTrace | None) -> bool:
+    return target is not None or any(len(trace.time) for trace in cameras.values())
 
 
 def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:

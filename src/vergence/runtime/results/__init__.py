@@ -1,6 +1,7 @@
 """What a run was: one object, in memory or read from a recording, and what is computed from it."""
 
 from vergence.runtime.results.columns import Columns, Row
+from vergence.runtime.results.other_target import OtherTarget, about_other, other_names
 from vergence.runtime.results.pose_errors import (
     PoseErrors,
     angle_between,
@@ -35,16 +36,19 @@ __all__ = [
     "CameraTrace",
     "Columns",
     "Event",
+    "OtherTarget",
     "PoseErrors",
     "Row",
     "Run",
     "RunRecorder",
     "TargetTrace",
+    "about_other",
     "angle_between",
     "arm_row",
     "camera_row",
     "images_of",
     "largest",
+    "other_names",
     "points_at_pose",
     "pose_errors",
     "summarise",

@@ -70,7 +70,17 @@ def _traces(run: "Run") -> dict[str, AnyTrace]:
     """Return everything with rows by its name; a camera called as an arm is distinguished."""
     cameras = {f"camera {n}" if n in run.arms else n: one for n, one in run.cameras.items()}
     target: Mapping[str, AnyTrace] = {} if run.target is None else {"target": run.target}
-    return {**run.arms, **cameras, **target}
+    others = {
+        f"target {name}": other.target
+        for name, other in run.others.items()
+        if other.target is not None
+    }
+    seen = {
+        f"target {name} {camera}": trace
+        for name, other in run.others.items()
+        for camera, trace in other.cameras.items()
+    }
+    return {**run.arms, **cameras, **target, **others, **seen}
 
 
 def _joints(run: "Run", name: str) -> tuple[str, ...]:

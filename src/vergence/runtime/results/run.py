@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.runtime.results.other_target import OtherTarget
 from vergence.runtime.results.pose_errors import PoseErrors, pose_errors
 from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace
 from vergence.runtime.run_info import RunInfo
@@ -47,6 +48,8 @@ class Run:
     events: tuple[Event, ...]  # in order of time
     outcome: Outcome
     summary: Mapping[str, float]  # the few numbers that say how it went
+    # Targets that the task was not about, by name.
+    others: Mapping[str, OtherTarget]
 
     @property
     def times(self) -> FloatArray:
@@ -69,8 +72,9 @@ class Run:
         """Return the numbers as a pandas table; needs pandas.
 
         Args:
-            of: the name of an arm or a camera, or "target": all that is known of it, one row per
-            tick, image or estimate. Without it, one row per tick, with everything but matrices.
+            of: the name of an arm or a camera, "target", or "target NAME" of another: all that is
+                known of it, one row per tick, image or estimate. Without it, one row per tick,
+                with everything but matrices.
 
         Raises:
             InputError: if there is nothing of that name, or pandas is not installed.

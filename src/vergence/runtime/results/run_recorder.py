@@ -6,6 +6,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from vergence.runtime.results.columns import Columns
+from vergence.runtime.results.other_target import OtherTarget, about_other, other_names
 from vergence.runtime.results.run import Event, Run
 from vergence.runtime.results.summary import summarise
 from vergence.runtime.results.tick_rows import arm_row, camera_row, images_of, target_row
@@ -13,6 +14,35 @@ from vergence.runtime.results.traces import ArmTrace, CameraTrace, TargetTrace
 from vergence.runtime.run_info import RunInfo
 from vergence.runtime.tick import TickRecord
 from vergence.signals import Outcome
+
+
+class _Seen:
+    """What was seen of one target.
+
+    Args:
+        info: of the run.
+        most: see `RunRecorder`.
+    """
+
+    def __init__(self, info: RunInfo, most: int | None) -> None:
+        self._info, self._most = info, most
+        self._cameras = {name: Columns(CameraTrace, most=most) for name in info.cameras}
+        self._target: Columns[TargetTrace] | None = None
+
+    def add(self, record: TickRecord) -> None:
+        """Keep what a tick tells of it."""
+        for frame, view in images_of(record):
+            row = camera_row(record, self._info, frame, view)
+            self._cameras[row["camera"]].append(row)
+        if record.observation is not None and record.observation.target is not None:
+            if self._target is None:
+                self._target = Columns(TargetTrace, most=self._most)
+            self._target.append(target_row(record, record.observation.target))
+
+    def tables(self) -> tuple[dict[str, CameraTrace], TargetTrace | None]:
+        """Return its traces: in the images by camera, and as a filter believed it."""
+        cameras = {name: columns.table() for name, columns in self._cameras.items()}
+        return cameras, None if self._target is None else self._target.table()
 
 
 class RunRecorder:
@@ -32,8 +62,8 @@ class RunRecorder:
         self._arms = {
             name: Columns(ArmTrace, len(arm.names), self._most) for name, arm in info.arms.items()
         }
-        self._cameras = {name: Columns(CameraTrace, most=self._most) for name in info.cameras}
-        self._target: Columns[TargetTrace] | None = None
+        self._served = _Seen(info, self._most)
+        self._others: dict[str, _Seen] = {}
         self._events: deque[Event] = deque(maxlen=self._most)
         self._first: tuple[float, float] | None = None  # time in the run and on the wall, s
         self._pace = float("nan")
@@ -43,16 +73,13 @@ class RunRecorder:
         """Keep one turn of the loop."""
         for name in record.sample.joints:
             self._arms[name].append(arm_row(record, name))
-        for frame, view in images_of(record):
-            row = camera_row(record, self._info, frame, view)
-            self._cameras[row["camera"]].append(row)
-        if record.observation is None:
-            return
-        self._keep_pace(record.time)
-        if record.observation.target is not None:
-            if self._target is None:
-                self._target = Columns(TargetTrace, most=self._most)
-            self._target.append(target_row(record, record.observation.target))
+        self._served.add(record)
+        for name in other_names(record):
+            if name not in self._others:
+                self._others[name] = _Seen(self._info, self._most)
+            self._others[name].add(about_other(record, name))
+        if record.observation is not None:
+            self._keep_pace(record.time)
 
     def event(self, time: float, name: str, text: str) -> None:
         """Keep something that happened once."""
@@ -68,11 +95,11 @@ class RunRecorder:
         run = Run(
             self._info,
             {name: columns.table() for name, columns in self._arms.items()},
-            {name: columns.table() for name, columns in self._cameras.items()},
-            None if self._target is None else self._target.table(),
+            *self._served.tables(),
             tuple(self._events),
             self._outcome,
             {},
+            {name: OtherTarget(*seen.tables()) for name, seen in self._others.items()},
         )
         values = {**summarise(run), "duration_s": self._outcome.time}
         if self._pace == self._pace:

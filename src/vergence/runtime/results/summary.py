@@ -17,11 +17,18 @@ def summarise(run: Run) -> dict[str, float]:
         ("target", errors.target_m, errors.target_rad),
         ("pose", errors.camera_m, errors.camera_rad),
     ):
-        values |= _final_and_max(f"{name}_error_m", np.linalg.norm(metres, axis=1))
-        values |= _final_and_max(f"{name}_error_deg", np.rad2deg(radians))
+        values |= _pose(name, metres, radians)
+    for name, other in run.others.items():
+        errors = other.pose_errors
+        values |= _pose(f"target_{name}", errors.target_m, errors.target_rad)
     if run.info.task_camera in run.cameras:
         values |= _of_camera(run.cameras[run.info.task_camera])
     return values
+
+
+def _pose(name: str, metres: FloatArray, radians: FloatArray) -> dict[str, float]:
+    away = _final_and_max(f"{name}_error_m", np.linalg.norm(metres, axis=1))
+    return away | _final_and_max(f"{name}_error_deg", np.rad2deg(radians))
 
 
 def _of_arm(arm: ArmTrace) -> dict[str, float]:

@@ -7,7 +7,7 @@ import { Steering } from "./steering.js";
 
 /** @import { Mouse } from "./mouse.js" */
 /** @import { Picking } from "./picking.js" */
-/** @import { About, CameraAbout, ImageHeader, Place } from "./protocol.js" */
+/** @import { About, CameraAbout, ImageHeader, Marks, Place } from "./protocol.js" */
 
 const INK = {
   found: "#14e696", lost: "#ff6e0a", predicted: "#ffffff", windows: "#d6dbe1",
@@ -198,7 +198,9 @@ class View {
     const kx = canvas.width / camera.width, ky = canvas.height / camera.height;
     /** @type {(place: Place) => Place} */
     const at = ([u, v]) => [(u + 0.5) * kx, (v + 0.5) * ky];
-    marks(context, header, at, this.images.layers, window.devicePixelRatio);
+    for (const target of [header, ...header.others ?? []]) {
+      marks(context, target, at, this.images.layers, window.devicePixelRatio);
+    }
     if (this.picks) picked(context, this.images.picking.points.map(at), window.devicePixelRatio);
     if (this.picks && this.steering?.points) {
       new Pen(context, window.devicePixelRatio).sight(at(this.steering.cursor), INK.picked);
@@ -221,15 +223,16 @@ function described({ found = [], asked = [], time, reasons = [] }) {
 }
 
 /**
+ * Draws what was measured of one target.
  * @param {CanvasRenderingContext2D} context
- * @param {ImageHeader} header
+ * @param {Marks} target
  * @param {(place: Place) => Place} at
  * @param {Set<string>} layers
  * @param {number} unit
  */
-function marks(context, header, at, layers, unit) {
+function marks(context, target, at, layers, unit) {
   const pen = new Pen(context, unit);
-  const { points, predicted, half, found = [], asked = [] } = header;
+  const { points, predicted, half, found = [], asked = [] } = target;
   /** @type {(places: Place[] | undefined, draw: (place: Place, j: number) => void) => void} */
   const each = (places, draw) => places?.forEach((place, j) => { if (place[0] !== null) draw(at(place), j); });
   if (layers.has("windows") && predicted && half) {
@@ -238,22 +241,22 @@ function marks(context, header, at, layers, unit) {
       pen.box(at([u - hu, v - hv]), at([u + hu, v + hv]), INK.windows);
     });
   }
-  if (header.curves?.length) {
-    for (const { points: numbers, closed } of header.curves) {
+  if (target.curves?.length) {
+    for (const { points: numbers, closed } of target.curves) {
       /** @type {(name: "true" | "desired" | "found", places: Place[] | undefined) => void} */
       const curve = (name, places) => {
         if (!places || !layers.has(name)) return;
         const known = numbers.map((j) => places[j]);
         if (known.every((place) => place && place[0] !== null)) pen.curve(known.map(at), closed, INK[name]);
       };
-      curve("true", header.true);
-      curve("desired", header.desired);
+      curve("true", target.true);
+      curve("desired", target.desired);
       if (numbers.every((j) => found[j])) curve("found", points);
     }
     return;
   }
-  if (layers.has("desired")) each(header.desired, (place) => pen.plus(place, 8, INK.desired));
-  if (layers.has("true")) each(header.true, (place) => pen.ring(place, 2.5, INK.true));
+  if (layers.has("desired")) each(target.desired, (place) => pen.plus(place, 8, INK.desired));
+  if (layers.has("true")) each(target.true, (place) => pen.ring(place, 2.5, INK.true));
   if (layers.has("predicted")) each(predicted, (place) => pen.diamond(place, 3.5, INK.predicted));
   if (layers.has("found")) each(points, (place, j) => { if (found[j]) pen.ring(place, 6, INK.found); });
   if (layers.has("lost")) {

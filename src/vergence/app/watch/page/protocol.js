@@ -55,13 +55,9 @@
  * @property {number} [fovy]
  * @property {{ kind: string, reason: string, time: number, succeeded: boolean } | null} [outcome]
  *
- * @typedef {object} ImageHeader
- * @property {string} camera
- * @property {number} time
- * @property {number} bytes
+ * @typedef {object} Marks  what was measured of one target
  * @property {Place[]} [desired]
  * @property {Place[]} [true]
- * @property {Place[]} [outline]
  * @property {Place[]} [points]
  * @property {Place[]} [predicted]
  * @property {Place[]} [half]
@@ -69,6 +65,15 @@
  * @property {boolean[]} [found]
  * @property {boolean[]} [asked]
  * @property {string[]} [reasons]
+ *
+ * @typedef {object} ImageAbout
+ * @property {string} camera
+ * @property {number} time
+ * @property {number} bytes
+ * @property {Place[]} [outline]
+ * @property {Marks[]} [others]  of the targets that the task is not about
+ *
+ * @typedef {ImageAbout & Marks} ImageHeader
  *
  * @typedef {{ time: number, name: string, text: string }} Event
  *
