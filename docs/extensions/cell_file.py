@@ -143,7 +143,7 @@ def _tables(root: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
             if place == "" and key in ("law", "laws"):
                 continue  # a part: it has sections of its own
             for ref in _references(value):
-                below = ".NAME" if "additionalProperties" in value else ""
+                below = ".NAME" if _by_name(value) else ""
                 at = f"{place}.{key}{below}" if place else f"{key}{below}"
                 inner.append((at, ref, root["$defs"][ref]))
         waiting[:0] = inner
@@ -155,9 +155,14 @@ def _references(value: dict[str, Any]) -> list[str]:
         name = value["$ref"].rpartition("/")[2]
         return [] if name == _INLINE else [name]
     options = value.get("oneOf", []) + value.get("anyOf", [])
-    if isinstance(value.get("additionalProperties"), dict):
-        options.append(value["additionalProperties"])
+    options += _by_name(value)
     return [name for option in options for name in _references(option)]
+
+
+def _by_name(value: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what may stand under names that a user chooses; nothing if the keys are given."""
+    of_any = value.get("additionalProperties")
+    return [*value.get("patternProperties", {}).values(), *([of_any] if of_any is not None else [])]
 
 
 def _table(name: str, table: dict[str, Any]) -> Iterator[str]:

@@ -8,6 +8,7 @@ from cell_file import reference
 from gallery import gallery
 
 import vergence
+from vergence.cell import schema
 from vergence.places import built_in_cells
 
 SOURCE = Path(vergence.__file__).parent
@@ -46,6 +47,17 @@ def test_every_room_is_in_the_api(room):
 
 def test_every_key_of_a_cell_file_says_what_it_means():
     assert "`view_margin_px`" in "".join(reference())  # it raises where a comment is missing
+
+
+def test_every_table_of_a_cell_file_has_a_section_with_its_keys():
+    sections = "\n".join(reference()).split("\n## ")
+    rows = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)
+    shown = [set(rows.findall(text)) - {"kind"} for text in sections]
+    made_of = ("Table", "TaskTable")  # what others are made of
+    for name in schema.__all__:
+        if name.endswith("Table") and name not in made_of:
+            keys = set(getattr(schema, name).model_fields)
+            assert keys - {"kind"} in shown, name
 
 
 def test_the_gallery_has_every_cell_with_its_image():
