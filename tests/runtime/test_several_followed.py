@@ -73,7 +73,8 @@ def test_both_are_followed_in_images() -> None:
 
 
 def test_the_arm_follows_the_one_that_the_task_names() -> None:
-    wedge = {"position_m": [0.95, 0.0, 0.85]}
+    line = {"kind": "line", "velocity_m_s": [-0.03, 0.0, 0.0], "distance_m": 0.06}
+    wedge = {"position_m": [0.95, 0.0, 0.85], "motion": line}
     away = {"position_m": [1.17, -0.19, 0.85]}
     run = vg.run(
         "two_blocks",
@@ -84,8 +85,9 @@ def test_the_arm_follows_the_one_that_the_task_names() -> None:
     )
     assert run.outcome.succeeded
     assert run.summary["final_pose_error_m"] < 5e-3
-    true = run.cameras["hand"].T_world_target
-    assert np.linalg.norm(true[-1, :3, 3] - true[0, :3, 3]) > 0.1  # the wedge's motion
+    hand = run.cameras["hand"]
+    for T in (hand.T_world_target, hand.T_world_camera):
+        assert T[-1, :3, 3] - T[0, :3, 3] == pytest.approx([-0.06, 0.0, 0.0], abs=5e-3)
 
 
 def test_a_target_that_no_camera_sees_at_the_start_is_named() -> None:
