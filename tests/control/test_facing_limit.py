@@ -6,7 +6,7 @@ import pytest
 from vergence.arrays import FloatArray
 from vergence.cell import load_cell
 from vergence.control import ImageBased, Limits, Servo
-from vergence.control.limits import facing_row, pack_features
+from vergence.control.limits import facing_rows, flat_face, pack_features
 from vergence.features import Points
 from vergence.geometry import se3, so3_exp, transform_points
 from vergence.robot import Arm
@@ -36,7 +36,8 @@ def sine(arm: Arm, q: FloatArray, T_world_target: FloatArray) -> float:
 def test_the_row_is_the_derivative_of_the_sine_at_which_the_target_is_seen() -> None:
     arm, q = arm_and_start()
     T_world_target = arm.forward_kinematics(q) @ T_TILTED
-    C, d = facing_row(features_at(arm, q, T_world_target), arm.jacobian(q), 0.1, 2.0)
+    face = flat_face(features_at(arm, q, T_world_target))
+    C, d = facing_rows(face, arm.jacobian(q), 0.1, 2.0)
     h = 1e-6
     for i in range(arm.joint_count):
         step = h * np.eye(arm.joint_count)[i]
@@ -46,13 +47,11 @@ def test_the_row_is_the_derivative_of_the_sine_at_which_the_target_is_seen() -> 
 
 
 @pytest.mark.parametrize("depth", [np.array([0.6, 0.7, 0.6, 0.6]), np.zeros(4)])
-def test_features_that_are_not_flat_or_not_in_front_give_no_row(depth: FloatArray) -> None:
+def test_features_that_are_not_flat_or_not_in_front_have_no_face(depth: FloatArray) -> None:
     arm, q = arm_and_start()
     features = features_at(arm, q, arm.forward_kinematics(q) @ T_TILTED)
     features[:, 4] = depth
-    C, d = facing_row(features, arm.jacobian(q), 0.1, 2.0)
-    assert C.shape == (0, arm.joint_count)
-    assert len(d) == 0
+    assert flat_face(features).shape == (0, 6)
 
 
 def test_a_goal_beyond_the_edge_of_a_flat_target_is_not_followed_behind_it() -> None:

@@ -5,6 +5,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.limits_on_plan import PLAN_MARGIN_JOINT, PLAN_MARGIN_PX
+from vergence.assembly.target_faces import TargetFaces
 from vergence.cell.schema import TrackTable
 from vergence.control.depth.from_features import fixes_pose
 from vergence.estimation import CornerView, NoPose, fit_pose
@@ -108,14 +109,17 @@ def plan_approach(
         )
     arm = context.arm_to_camera(task.camera)
     T_world_target = arm.forward_kinematics(q) @ now
+    points_world = transform_points(T_world_target, features)
+    faces = TargetFaces.of(context, task.camera)
     problem = PlanningProblem(
         arm,
         context.cameras[task.camera],
         q,
         T_world_target @ se3_inverse(goal),
-        transform_points(T_world_target, features),
+        points_world,
         PLAN_MARGIN_PX,
         PLAN_MARGIN_JOINT,
+        surface=None if faces is None else faces.at(points_world),
         bodies=context.bodies,
     )
     found = OptimisedPlanner().plan(problem)

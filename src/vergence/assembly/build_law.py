@@ -13,6 +13,7 @@ from vergence.assembly.limits_on_plan import (
     limits_on_plan,
 )
 from vergence.assembly.motion_needed import require_motion
+from vergence.assembly.target_faces import TargetFaces
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable, TrackTable
 from vergence.control import (
@@ -129,6 +130,8 @@ def _servo(context: LawContext) -> Servo:
     _require_features_made_of_points(context)
     reaches = isinstance(cell.task, ReachTable)
     depth = _depth(context, names)
+    first = context.camera_name
+    faces = TargetFaces.of(context, first)
     depth_m = None if reaches else {name: context.depth_m(name, settings.depth_m) for name in names}
     return Servo(
         context.arm,
@@ -146,6 +149,7 @@ def _servo(context: LawContext) -> Servo:
             _FEWEST_OF_PATH if reaches else 1,
             {name: known for name in names if (known := context.known_features(name)) is not None},
             context.clearance,
+            {} if faces is None else {first: faces.faces},
         ),
     )
 
@@ -200,13 +204,16 @@ def _best_depth(context: LawContext, names: list[str]) -> Depth:
 def _pose_servo(context: LawContext) -> PoseServo:
     settings = context.cell.law
     constrained = isinstance(settings.solver, QuadraticProgram)
+    corners = context.target_corners() if constrained else None
+    faces = None if corners is None else TargetFaces.around(context, corners)
     return PoseServo(
         context.arm,
         mounting_of(context, context.camera_name),
         settings.objective,
         limits=_limits(context),
         solver=settings.solver,
-        corners=context.target_corners() if constrained else None,
+        corners=corners,
+        faces=None if faces is None else faces.faces,
         situation=Situation(
             context.inner_period_s,
             MotionSettings(settings.feed_forward, settings.prediction),

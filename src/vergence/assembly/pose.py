@@ -10,6 +10,7 @@ from vergence.arrays import FloatArray
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
 from vergence.assembly.tag import TagFinder
+from vergence.assembly.target_faces import shape_around
 from vergence.cell import Cell
 from vergence.cell.named_targets import naming_target, target_body
 from vergence.errors import InputError
@@ -114,6 +115,8 @@ def _followed(
     }
     if by_outline(model):  # no image: points inside it, which it does not hide, represent it
         shape = TargetShape.from_points(model.corners)
+    elif cell.target.features:
+        shape = shape_around(context, model.corners)
     else:
         shape = TargetShape.from_mesh(model.corners, model.vertices, model.triangles)
     target_filter: TargetFilter[Any] = table.filter

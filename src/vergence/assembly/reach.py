@@ -1,6 +1,7 @@
 """The task `reach`: to where an object without a model looks as desired, along a planned path."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from vergence.assembly.law_context import LawContext
 from vergence.assembly.own_parts import planned_path, started_tracker
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.target_faces import TargetFaces
 from vergence.camera.image_file import read_image_file
 from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
@@ -62,14 +64,17 @@ def reach_parts(
     view = estimate_two_view(pair.points_px, pair.desired_px, context.cameras[task.camera])
     if not isinstance(view, TwoView):
         return Outcome(OutcomeKind.INFEASIBLE, str(view), 0.0)
+    faces = TargetFaces.of(context, task.camera)
+    if faces is not None:
+        faces = faces.only(view.inliers)
     pair = pair.only(view.inliers)
     context = context.with_points({task.camera: pair.points_px})
     law = build_law(context)
-    plan = _plan(context, task, view, context.joints[task.arm])
+    plan = _plan(context, task, view, context.joints[task.arm], faces)
     if isinstance(plan, PlanFailure):
         return plan.outcome(0.0)
     trajectory = timed(context.cell, task, plan)
-    again = _plan_again(context, task, pair.desired_px)
+    again = _plan_again(context, task, pair.desired_px, faces)
     planner = Replanner(trajectory, again, driver.worker())
     duration = trajectory.duration + SETTLE_S
     if duration > (left := driver.time_left(context.cell.duration_s)):
@@ -78,7 +83,9 @@ def reach_parts(
     return Parts(driver, pair.perception, planner, law, context, duration)
 
 
-def _plan_again(context: LawContext, task: ReachTable, desired_px: FloatArray) -> PlanFromHere:
+def _plan_again(
+    context: LawContext, task: ReachTable, desired_px: FloatArray, faces: TargetFaces | None
+) -> PlanFromHere:
     """Return what plans to marks as desired, (N, 2), from where they are seen then."""
 
     def plan(points_px: FloatArray, q: FloatArray) -> Trajectory | str:
@@ -87,7 +94,7 @@ def _plan_again(context: LawContext, task: ReachTable, desired_px: FloatArray) -
             return str(view)
         if not view.inliers.all():
             return "not all marks agree with one motion of the camera"
-        found = _plan(context, task, view, q)
+        found = _plan(context, task, view, q, faces)
         if isinstance(found, PlanFailure):
             return str(found)
         return timed(context.cell, task, found)
@@ -102,11 +109,18 @@ def plan_reach(
     view = estimate_two_view(pair.points_px, pair.desired_px, context.cameras[task.camera])
     if not isinstance(view, TwoView):
         return view
-    return _plan(context, task, view, context.joints[task.arm])
+    faces = TargetFaces.of(context, task.camera)
+    if faces is not None:
+        faces = faces.only(view.inliers)
+    return _plan(context, task, view, context.joints[task.arm], faces)
 
 
 def _plan(
-    context: LawContext, task: ReachTable, view: TwoView, q: FloatArray
+    context: LawContext,
+    task: ReachTable,
+    view: TwoView,
+    q: FloatArray,
+    faces: TargetFaces | None,
 ) -> Path | PlanFailure:
     """Plan from joint positions q (n,) by two images, one of them taken there."""
     camera = context.cameras[task.camera]
@@ -123,6 +137,8 @@ def _plan(
         margin_px=task.margin_px,
         margin_joint=task.margin_joint,
     )
+    if faces is not None:
+        problem = replace(problem, surface=faces.at(problem.points_world))
     return planned_path(context, task.planner, problem)
 
 

@@ -17,6 +17,7 @@ from vergence.control.solvers import (
     describe,
 )
 from vergence.control.solvers.solver import NO_JOINTS
+from vergence.estimation.feature_faces import FeatureFaces
 from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
 
@@ -37,6 +38,7 @@ class PoseServo:
         limits: what is kept; those of `Limits` if None and the solver keeps limits.
         solver: the quadratic program if None.
         corners: of the target, (M, 3), m, which have to stay in view; None for none.
+        faces: that the corners lie on; None where not known.
         situation: what else is known; its period is the inner one.
     """
 
@@ -49,6 +51,7 @@ class PoseServo:
         limits: Limits | None = None,
         solver: Solver | None = None,
         corners: FloatArray | None = None,
+        faces: FeatureFaces | None = None,
         situation: Situation,
     ) -> None:
         self._arm, self._mounting, self._situation = arm, mounting, situation
@@ -62,7 +65,7 @@ class PoseServo:
         self._null_space = np.zeros(arm.joint_count)  # rates of redundant joints, gently begun
         self._view: TargetView | None = None
         if corners is not None and self._solver.keeps_limits:
-            self._view = TargetView(mounting, corners, *self._solver.view)
+            self._view = TargetView(mounting, corners, *self._solver.view, faces)
         count = len(self._solver.names)
         self._active, self._slack, self._solved = np.zeros(count), np.zeros(count), True
 
@@ -123,9 +126,10 @@ class PoseServo:
         self._null_space = np.zeros(self._arm.joint_count)
 
     def _solve(self, joints: JointState | Setpoint, twist: FloatArray) -> Solution:
-        features = NO_FEATURES
+        features, faces = NO_FEATURES, None
         if self._view is not None:
-            features = self._view.features(self._arm.forward_kinematics(joints.position))
+            T_world_tip = self._arm.forward_kinematics(joints.position)
+            features, faces = self._view.features(T_world_tip), self._view.faces(T_world_tip)
         problem = Problem(
             joints.position,
             joints.velocity,
@@ -135,6 +139,7 @@ class PoseServo:
             self._null_space_rates(joints.position),
             *NO_JOINTS,
             self._twist_map(joints.position),
+            faces=faces,
         )
         solution = self._solver.solve(problem)
         self._active = np.maximum(self._active, solution.active)

@@ -38,6 +38,7 @@ from vergence.control.solvers import (
 from vergence.control.solvers.solver import NO_JOINTS, Solution
 from vergence.control.term import Term
 from vergence.errors import Absent, InputError, nearest
+from vergence.estimation.feature_faces import FeatureFaces
 from vergence.features import Points
 from vergence.robot import Arm, Clearance
 from vergence.signals import (
@@ -66,6 +67,7 @@ class Situation(NamedTuple):
         features: in the target's frame, (M, 3), m, by camera, where they are known; "" for the only
             camera.
         clearance: gives the distances between what must not touch; None for nothing.
+        faces: of the same features, by camera, where a surface is known around them.
     """
 
     period_s: float = 1 / 30
@@ -76,6 +78,7 @@ class Situation(NamedTuple):
     fewest: int = 1
     features: Mapping[str, FloatArray] = MappingProxyType({})
     clearance: Clearance | None = None
+    faces: Mapping[str, FeatureFaces] = MappingProxyType({})
 
 
 class Servo:
@@ -120,6 +123,7 @@ class Servo:
                 depth_for(depth_m, name),
                 self._situation.motion,
                 self._situation.features.get(name),
+                self._situation.faces.get(name),
                 self._situation.period_s,
             )
             for name, mounting in mountings.items()
@@ -305,6 +309,7 @@ class Servo:
             _PLAN_WEIGHT if rates is not None and rates.any() else 0.0,
             float("nan") if first is None else first.depth_share,
             variance,
+            None if first is None else first.faces,
         )
         return command_of(self._solver.solve(problem), A, self._solver.names)
 

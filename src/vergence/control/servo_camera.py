@@ -6,14 +6,17 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera
+from vergence.control.aligned import aligned, lifted
 from vergence.control.image_motion import ImageMotion, MotionSettings
 from vergence.control.mounting import CameraMounting
 from vergence.control.objectives import CameraState
 from vergence.control.point_weights import point_weights, row_variance
 from vergence.errors import NOTHING, Absent, InputError
+from vergence.estimation.feature_faces import FeatureFaces, faces_in_view
 from vergence.features import Points
+from vergence.geometry import se3_inverse
 from vergence.robot import Arm
 from vergence.signals import ImagePoints, JointState, Observation, Reference
 
@@ -21,6 +24,7 @@ Cameras: TypeAlias = Camera | CameraMounting | Mapping[str, CameraMounting]
 NOTHING_SEEN = ImagePoints(
     "", 0.0, np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0, dtype=np.bool_), ()
 )
+_FEWEST_TURNED = 3  # features that tell how the target is turned
 _STALE_S = 0.3  # beside other cameras, what one saw longer ago no longer counts
 
 
@@ -33,6 +37,7 @@ class ServoCamera:
         depth_m: believed depth of the features, (M,) or (1,) for all; None where it is not known.
         motion: what is assumed of the features between exposure and now.
         features: in the target's frame, (M, 3), m, where they are known.
+        faces: that they lie on, where a surface is known around them.
         period_s: between two images.
     """
 
@@ -43,11 +48,13 @@ class ServoCamera:
         depth_m: FloatArray | None,
         motion: MotionSettings,
         features: FloatArray | None,
+        faces: FeatureFaces | None,
         period_s: float,
     ) -> None:
         self.mounting = mounting
         self.view = NOTHING_SEEN  # what it saw last
         self._arm, self._depth_m, self._period_s = arm, depth_m, period_s
+        self._features, self._faces = features, faces
         self._predicts = motion.prediction
         self._motion: ImageMotion | None = None
         if not motion.as_it_is:
@@ -129,6 +136,7 @@ class ServoCamera:
             depth_share=share,
             weights=weights,
             variance=variance,
+            faces=self._shown(found, lifted(points[found], depth[found]), desired, reference),
             **self._pose(joints.position),
         )
 
@@ -151,6 +159,31 @@ class ServoCamera:
             period_s=self._period_s,
             **self._pose(q),
         )
+
+    def _shown(
+        self, found: BoolArray, now: FloatArray, desired: FloatArray | None, reference: Reference
+    ) -> FloatArray | None:
+        """Return the faces that show the features found, here and as desired, (F, 6).
+
+        Args:
+            found: which they are, (M,).
+            now: where they are in the camera's frame, (K, 3), m.
+            desired: normalized coordinates, (K, 2).
+            reference: with their desired depth, if that is known.
+        """
+        if self._faces is None or self._features is None:
+            return None
+        features = self._features[found]
+        if len(features) < _FEWEST_TURNED:
+            return np.empty((0, 6))
+        there = reference.desired_depth_m if reference.depth_m is None else reference.depth_m
+        eyes = np.empty((0, 3))
+        if desired is not None and there is not None:
+            eyes = se3_inverse(aligned(features, lifted(desired, there[found])))[None, :3, 3].copy()
+        shown: FloatArray = faces_in_view(
+            aligned(features, now), self._faces.planes, self._faces.holds[found], eyes
+        )
+        return shown
 
     def _depth(self, reference: Reference, count: int) -> FloatArray:
         if reference.depth_m is not None:

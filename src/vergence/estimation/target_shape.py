@@ -1,5 +1,6 @@
 """The target as perception knows it: its features, and the surface that can hide them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
 
-TOUCHING = 1e-4  # of the target's size: a feature this near a face lies on it
+TOUCHING = 1e-3  # of the target's size: a feature this near a face lies on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ class TargetShape:
         triangles = corners[index]
         everything = np.vstack((features, triangles.reshape(-1, 3)))
         size = float(np.linalg.norm(np.ptp(everything, axis=0)))
-        around = [_normals_at(point, triangles, TOUCHING * size) for point in features]
+        around = _normals_around(features, triangles, TOUCHING * size)
         counts = np.array([len(normals) for normals in around])
         normals = np.zeros((len(features), max(1, counts.max()), 3))
         for m, found in enumerate(around):
@@ -78,24 +79,36 @@ class TargetShape:
         return cls.from_mesh(signs * half, signs * half, faces)
 
 
-def _normals_at(point: FloatArray, triangles: FloatArray, tolerance: float) -> list[FloatArray]:
-    """Return the distinct unit normals of the triangles that a point lies on."""
-    normals: list[FloatArray] = []
-    for triangle in triangles:
-        cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-        area = np.linalg.norm(cross)
-        if area == 0.0 or not _touches(point, triangle, cross / area, tolerance):
-            continue
-        normal = cross / area
-        if all(normal @ other < 1.0 - 1e-9 for other in normals):
-            normals.append(normal)
-    return normals
+def _normals_around(
+    points: FloatArray, triangles: FloatArray, tolerance: float
+) -> list[list[FloatArray]]:
+    """Return the distinct unit normals of the triangles that each point lies on."""
+    corner, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
+    cross = np.cross(edges[:, 0], edges[:, 1])
+    area = np.linalg.norm(cross, axis=1)
+    normals = cross / np.where(area > 0.0, area, 1.0)[:, None]
+    return [
+        _distinct(
+            normals[f]
+            for f in np.flatnonzero(
+                (area > 0.0) & (np.abs(((point - corner) * normals).sum(axis=1)) <= tolerance)
+            )
+            if _touches(point, triangles[f], normals[f], tolerance)
+        )
+        for point in points
+    ]
+
+
+def _distinct(normals: Iterable[FloatArray]) -> list[FloatArray]:
+    distinct: list[FloatArray] = []
+    for normal in normals:
+        if all(normal @ other < 1.0 - 1e-9 for other in distinct):
+            distinct.append(normal)
+    return distinct
 
 
 def _touches(point: FloatArray, triangle: FloatArray, normal: FloatArray, tolerance: float) -> bool:
-    """Return whether a point lies on a triangle, or no farther than the tolerance beside it."""
-    if abs(normal @ (point - triangle[0])) > tolerance:
-        return False
+    """Return whether a point in the plane of a triangle is on it, or so little beside it."""
     for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
         inward = np.cross(normal, b - a)
         if inward @ (point - a) < -tolerance * np.linalg.norm(inward):

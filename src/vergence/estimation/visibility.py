@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import in_image, is_one_to_one, pixel_of
-from vergence.estimation.target_shape import TargetShape
+from vergence.estimation.target_shape import TOUCHING, TargetShape
 from vergence.geometry import se3_inverse, transform_points
 
 StatusArray: TypeAlias = NDArray[np.uint8]  # a `ViewStatus` each
@@ -213,7 +213,7 @@ def predict_visibility(
             shape.normals,
             shape.face_counts,
             shape.triangles,
-            1e-3 * shape.size,
+            TOUCHING * shape.size,
             margin_px,
             least_cosine,
         )

@@ -8,7 +8,8 @@ import numpy as np
 from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.errors import InputError
-from vergence.geometry import flat_normal, se3_inverse, transform_points
+from vergence.estimation.feature_faces import FeatureFaces, face_sines, shared_faces
+from vergence.geometry import se3_inverse, transform_points
 from vergence.planning.visibility import NO_FACES, View, clearance_at, make_view
 from vergence.robot import Arm, Clearance
 from vergence.vision.two_view import TwoView
@@ -26,6 +27,7 @@ class PlanningProblem:
     margin_px: float = 10.0  # distance to keep from the border of the image
     margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
     margin_face_deg: float = 1.0  # least angle between a line of sight and a face of the object
+    surface: FeatureFaces | None = None  # around the points, in the world; None if not known
     bodies: Clearance | None = None  # distances of what must not touch; None for nothing
 
     def __post_init__(self) -> None:
@@ -93,33 +95,47 @@ class PlanningProblem:
 
     @property
     def faces(self) -> FloatArray:
-        """The face of a flat object that start and goal see, (1, 7), as `View` has it.
+        """The faces that show the points to start and goal, (F, 7), as `View` has them.
 
-        Less of the margin is kept where one of them has less. Points that are not flat have no
-        face here, (0, 7); nor has an object whose one side the start sees, and the goal the other.
+        Where an end sees one of them at less than twice the margin, half of that is kept. A flat
+        object of unknown surface has one, unless the start sees one side of it, and the goal the
+        other; other points have none unless their surface is known.
         """
-        normal = flat_normal(self.points_world)
-        if normal is None:
+        return self._kept(self._surface)
+
+    @property
+    def faces_needed(self) -> FloatArray:
+        """Those of the faces without which a point is not seen, (F, 7)."""
+        known = self._surface
+        return self._kept(known.only(known.sole))
+
+    def _kept(self, known: FeatureFaces) -> FloatArray:
+        if not len(known.planes):
             return NO_FACES
-        sines = self._face_sines(normal)
-        if sines.min() < 0.0:
-            normal, sines = -normal, -sines
-        if sines.min() <= 0.0:
-            return NO_FACES
-        least = min(float(np.sin(np.radians(self.margin_face_deg))), 0.5 * float(sines.min()))
-        return np.concatenate((self.points_world.mean(axis=0), normal, [least]))[None]
+        eyes = self._eyes
+        kept = known.planes[shared_faces(known.planes, known.holds, eyes)]
+        sines = np.min([face_sines(eye, kept) for eye in eyes], axis=0)
+        least = np.minimum(np.sin(np.radians(self.margin_face_deg)), 0.5 * sines)
+        return np.column_stack((kept, least))
 
     @property
     def sees_the_back(self) -> bool:
         """Whether start and goal see a flat object from opposite sides."""
-        normal = flat_normal(self.points_world)
-        return normal is not None and float(np.prod(self._face_sines(normal))) < 0.0
+        known = FeatureFaces.of_points(self.points_world)
+        if not len(known.planes):
+            return False
+        one, other = (face_sines(eye, known.planes)[0] for eye in self._eyes)
+        return bool(one * other < 0.0)
 
-    def _face_sines(self, normal: FloatArray) -> FloatArray:
-        """Return the sines at which start and goal see the plane of flat points, (2,)."""
-        eyes = (self.arm.forward_kinematics(self.q_start)[:3, 3], self.T_world_goal[:3, 3])
-        middle = self.points_world.mean(axis=0)
-        return np.array([normal @ (eye - middle) / np.linalg.norm(eye - middle) for eye in eyes])
+    @property
+    def _surface(self) -> FeatureFaces:
+        return FeatureFaces.of_points(self.points_world) if self.surface is None else self.surface
+
+    @property
+    def _eyes(self) -> FloatArray:
+        """Where the camera is at the start and at the goal, (2, 3)."""
+        start = self.arm.forward_kinematics(self.q_start)
+        return np.array([start[:3, 3], self.T_world_goal[:3, 3]])
 
     def view(self, margin_px: float | None = None) -> View:
         """Return what the camera must see, with the problem's margin or another."""

@@ -38,8 +38,8 @@ class Separation:
         if self._proved or not slides_then_turns(arm):
             return
         view = problem.view(margin_px)
-        # In front of the camera, and before the faces, is all that is asked.
-        faces = view.faces.copy()
+        # In front of the camera, and before faces that nothing replaces, is all that is asked.
+        faces = problem.faces_needed
         faces[:, 6] = 0.0
         view = view._replace(offsets=np.zeros(5), faces=faces)
         self._grid = WristCells(arm.chain, view, arm.q_min.copy(), arm.q_max.copy(), COARSE)

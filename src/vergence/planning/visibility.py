@@ -11,6 +11,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
+from vergence.estimation.feature_faces import face_sines
 from vergence.robot import Chain, chain_state, world_jacobian
 
 
@@ -73,14 +74,7 @@ def view_clearances(R: FloatArray, p: FloatArray, view: View) -> FloatArray:
 @njit(cache=True)
 def face_clearances(p: FloatArray, faces: FloatArray) -> FloatArray:
     """Return the sine at which each face is seen from p (3,), less its least one, (F,)."""
-    h = np.empty(len(faces))
-    for f in range(len(faces)):
-        along, norm = 0.0, 1e-24
-        for i in range(3):
-            d = p[i] - faces[f, i]
-            along += faces[f, 3 + i] * d
-            norm += d * d
-        h[f] = along / np.sqrt(norm) - faces[f, 6]
+    h: FloatArray = face_sines(p, faces) - faces[:, 6]
     return h
 
 

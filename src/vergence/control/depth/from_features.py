@@ -3,12 +3,13 @@
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
+from vergence.control.aligned import aligned, lifted
 from vergence.control.depth.depth import Depths, MeasuredPoints
 from vergence.control.depth.from_pose import depths_at
 from vergence.errors import InputError
 from vergence.estimation.pose_minima import descend, pose_minima
 from vergence.estimation.view import View
-from vergence.geometry import nearest_rotation, se3, se3_inverse
+from vergence.geometry import se3_inverse
 from vergence.parts import part
 
 _FEWEST = 4  # features: three fit up to four poses
@@ -110,13 +111,8 @@ def _seen(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> V
 
 def _from_depths(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> FloatArray:
     """Return the pose (4, 4) in the scene that brings features nearest to the believed depths."""
-    depth = exposure.believed_m[found]
-    seen = np.column_stack((exposure.points[found] * depth[:, None], depth))
-    points = features[found]
-    M = (seen - seen.mean(axis=0)).T @ (points - points.mean(axis=0))
-    R = nearest_rotation(np.ascontiguousarray(M))
-    T_camera_target = se3(R, seen.mean(axis=0) - R @ points.mean(axis=0))
-    pose: FloatArray = se3_inverse(exposure.T_camera_scene) @ T_camera_target
+    seen = lifted(exposure.points[found], exposure.believed_m[found])
+    pose: FloatArray = se3_inverse(exposure.T_camera_scene) @ aligned(features[found], seen)
     return np.ascontiguousarray(pose)
 
 

@@ -10,7 +10,7 @@ from vergence.control.limits._rows import (
     pack_features,
 )
 from vergence.control.limits.collision import braked, braking_rows, collision_rows
-from vergence.control.limits.facing import facing_row
+from vergence.control.limits.facing import facing_rows, flat_face
 from vergence.control.limits.limits import Limit, Limits
 from vergence.control.limits.occlusion import AXES, COLUMNS, HALF, MIDDLE, NO_SOLIDS, RADIUS
 from vergence.control.limits.target_view import TargetView
@@ -34,6 +34,7 @@ __all__ = [
     "braked",
     "braking_rows",
     "collision_rows",
-    "facing_row",
+    "facing_rows",
+    "flat_face",
     "pack_features",
 ]

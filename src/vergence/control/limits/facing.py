@@ -1,4 +1,4 @@
-"""The limit that keeps a camera in front of a flat target, as a row C q̇ ≥ d."""
+"""The limit that keeps a camera in front of faces of its target, as rows C q̇ ≥ d."""
 
 import numpy as np
 from numba import njit
@@ -9,24 +9,46 @@ from vergence.geometry import FLAT
 
 
 @njit(cache=True, error_model="numpy")
-def facing_row(
-    features: FloatArray, J_camera: FloatArray, least_sine: float, approach_rate: float
+def facing_rows(
+    faces: FloatArray, J_camera: FloatArray, least_sine: float, approach_rate: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the row that keeps the camera before the plane of the features, C (1, n) and d (1,).
+    """Return the rows that keep the camera in front of faces, C (F, n) and d (F,).
 
-    With the features' middle c and the plane's normal o towards the camera, both in its frame, the
-    plane is seen at the sine h = -o·c/‖c‖, and for a stationary target
-    ḣ = (o + h c/‖c‖)·v/‖c‖. The row is the barrier ḣ ≥ -γ (h - h_min). Features that are not flat,
-    as they are believed, give none: C (0, n) and d (0,).
+    With the middle c and outward normal o of a face, both in the camera's frame, it is seen at
+    the sine h = -o·c/‖c‖, and for a stationary target ḣ = (o + h c/‖c‖)·v/‖c‖. The row is the
+    barrier ḣ ≥ -γ (h - h_min).
 
     Args:
-        features: of `pack_features`, (M, 7).
+        faces: c and o of each, (F, 6).
         J_camera: (6, n).
         least_sine: h_min.
         approach_rate: γ, 1/s.
     """
-    M, n = len(features), J_camera.shape[1]
-    none = np.zeros((0, n)), np.zeros(0)
+    n = J_camera.shape[1]
+    C, d = np.zeros((len(faces), n)), np.empty(len(faces))
+    for f in range(len(faces)):
+        c, o = faces[f, :3], faces[f, 3:]
+        distance, h = np.sqrt(np.sum(c * c)), 0.0
+        for a in range(3):
+            h -= o[a] * c[a] / distance
+        for a in range(3):
+            slope = (o[a] + h * c[a] / distance) / distance
+            for i in range(n):
+                C[f, i] += slope * J_camera[a, i]
+        d[f] = -approach_rate * (h - least_sine)
+    return C, d
+
+
+@njit(cache=True, error_model="numpy")
+def flat_face(features: FloatArray) -> FloatArray:
+    """Return the side that a camera sees of features in a plane, c and o in its frame, (1, 6).
+
+    Features that are not flat, as they are believed, have none: (0, 6).
+
+    Args:
+        features: of `pack_features`, (M, 7).
+    """
+    M, none = len(features), np.zeros((0, 6))
     if M < 3:
         return none
     X, c = np.empty((M, 3)), np.zeros(3)
@@ -46,16 +68,9 @@ def facing_row(
     extent, axes = np.linalg.eigh(S)
     if extent[1] <= 1e-12 * extent[2] or extent[0] > FLAT * FLAT * extent[1]:
         return none
-    o, distance, h = np.empty(3), np.sqrt(np.sum(c * c)), 0.0
+    face = np.empty((1, 6))
+    face[0, :3] = c
+    towards = 1.0 if np.sum(axes[:, 0] * c) <= 0.0 else -1.0
     for a in range(3):
-        o[a] = axes[a, 0]
-        h -= o[a] * c[a] / distance
-    if h < 0.0:
-        o, h = -o, -h
-    C, d = np.zeros((1, n)), np.empty(1)
-    for a in range(3):
-        slope = (o[a] + h * c[a] / distance) / distance
-        for i in range(n):
-            C[0, i] += slope * J_camera[a, i]
-    d[0] = -approach_rate * (h - least_sine)
-    return C, d
+        face[0, 3 + a] = towards * axes[a, 0]
+    return face

@@ -46,7 +46,7 @@ class Limits:
     view_margin_px: float | None = knob(None, "px", least=0, upto=1e4)
     # Fraction of each joint's range to keep free; default 0.01, or half of that of a plan.
     joint_margin: float | None = knob(None, least=0, below=0.5)
-    # Smallest angle between a flat target and the line of sight; part of "view".
+    # Smallest angle between the line of sight and a face that shows features; part of "view".
     facing_deg: float = knob(1.0, "degrees", least=0, below=90)
     # Distance between lines of sight and obstacles.
     clearance_m: float = knob(0.02, "m", least=0, upto=10)

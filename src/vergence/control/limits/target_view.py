@@ -8,6 +8,7 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.control.mounting import CameraMounting
 from vergence.control.moving_pose import MovingPose, moved
+from vergence.estimation.feature_faces import FeatureFaces, faces_in_view
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import TargetState
 
@@ -25,17 +26,25 @@ class TargetView:
     Args:
         mounting: of the camera.
         corners: of the target, in its own frame, (M, 3), m.
+        faces: that they lie on, in the same frame; None where not known.
         low: lower bounds of the view, normalized coordinates, (2,).
         high: upper bounds, (2,).
     """
 
     def __init__(
-        self, mounting: CameraMounting, corners: FloatArray, low: FloatArray, high: FloatArray
+        self,
+        mounting: CameraMounting,
+        corners: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        faces: FeatureFaces | None = None,
     ) -> None:
         self._mounting, self._low, self._high = mounting, low, high
         self._corners = self._kept = frozen(corners, (None, 3), "corners")
         self._target = MovingPose(np.eye(4), np.zeros(6))
         self._covariance = np.zeros((6, 6))
+        self._faces = self._faces_kept = faces
+        self._eye_desired = np.zeros((1, 3))
 
     def see(self, target: TargetState, T_camera_target: FloatArray, now: float) -> None:
         """Take in a new estimate of the target.
@@ -50,13 +59,29 @@ class TargetView:
         seen = MovingPose(target.T_world_target, target.velocity)
         self._target = MovingPose(moved(seen, now - target.time), target.velocity)
         self._covariance = np.ascontiguousarray(target.covariance[:6, :6])
-        self._kept = self._corners[self._shown(T_camera_target)]
+        shown = self._shown(T_camera_target)
+        self._kept = self._corners[shown]
+        if self._faces is not None:
+            self._faces_kept = self._faces.only(shown)
+            self._eye_desired = se3_inverse(T_camera_target)[None, :3, 3].copy()
 
     def features(self, T_world_tip: FloatArray) -> FloatArray:
         """Return the corners as the camera sees them with its arm's tip there, (M, 7)."""
         T = self._mounting.T_camera_scene(T_world_tip)
         rows: FloatArray = pose_features(T, *self._target, self._kept, self._covariance)
         return rows
+
+    def faces(self, T_world_tip: FloatArray) -> FloatArray | None:
+        """Return the faces that show the corners now and as desired, in the camera's frame, (F, 6).
+
+        None where no faces are known.
+        """
+        known = self._faces_kept
+        if known is None:
+            return None
+        T = se3_compose(self._mounting.T_camera_scene(T_world_tip), self._target.T)
+        faces: FloatArray = faces_in_view(T, known.planes, known.holds, self._eye_desired)
+        return faces
 
     def advance(self, period_s: float) -> None:
         """Extrapolate the target by a time."""

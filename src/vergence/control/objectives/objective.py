@@ -53,6 +53,7 @@ class CameraState:
         depth_share: largest standard deviation of a depth, a share of it; NaN if unknown.
         weights: roots (M, 2, 2) of what the rows of each feature weigh; all alike if None.
         variance: of a row of a feature, weighted, by the noise of the image; normalized.
+        faces: that have to stay turned to the camera, see `Problem`; None where not known.
     """
 
     mounting: CameraMounting | None
@@ -74,6 +75,7 @@ class CameraState:
     depth_share: float = float("nan")
     weights: FloatArray | None = None
     variance: float = 0.0
+    faces: FloatArray | None = None
 
     @property
     def camera(self) -> Camera:

@@ -16,7 +16,8 @@ from vergence.control.limits import (
     braked,
     braking_rows,
     collision_rows,
-    facing_row,
+    facing_rows,
+    flat_face,
 )
 from vergence.control.solvers._constrained_rates import (
     Avoidance,
@@ -179,7 +180,7 @@ class BoundProgram:
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Return the rows C (r, n), d (r,) and kinds (r,) of what is not in `constraint_rows`.
 
-        They are those of a flat target, of pairs that must not collide, and of a user's limits.
+        They are those of the target's faces, of pairs that must not collide, and of the user.
         """
         arm, period, limits = self._setting.arm, self._setting.period_s, self._limits
         rows = [(*self._facing(problem), VIEW)]
@@ -207,12 +208,15 @@ class BoundProgram:
             yield braking_rows(stopped, rate, problem.velocity, a, self._setting.period_s)
 
     def _facing(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
-        features = problem.features if "view" in self._limits.order else problem.features[:0]
+        faces = flat_face(problem.features) if problem.faces is None else problem.faces
+        if "view" not in self._limits.order:
+            faces = faces[:0]
         J = self._setting.arm.jacobian(problem.q)
         J_camera = problem.A @ J if len(problem.A) else J
-        rate = self.settings.approach_rate
-        row: tuple[FloatArray, FloatArray] = facing_row(features, J_camera, self._least_sine, rate)
-        return row
+        rows: tuple[FloatArray, FloatArray] = facing_rows(
+            faces, J_camera, self._least_sine, self.settings.approach_rate
+        )
+        return rows
 
 
 def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:

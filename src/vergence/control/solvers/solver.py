@@ -31,6 +31,9 @@ class Problem(NamedTuple):
     null_space_weight: float = 0.0  # μ of ‖q̇ - q̇_null‖² at least
     depth_share: float = float("nan")  # largest deviation of a depth, a share; NaN if unknown
     variance: float = 0.0  # that noise gives the rows of which H and g are made
+    # Faces that show the features, their middles and outward normals in the camera's frame, (F, 6);
+    # None where no surface is known: features in a plane, as they are believed, have one.
+    faces: FloatArray | None = None
 
 
 class Solution(NamedTuple):

@@ -7,7 +7,7 @@ from vergence.vision.known_object.corner_extractor import (
 )
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement, EdgeMemory
 from vergence.vision.known_object.edge_tracker import EdgeTracker
-from vergence.vision.known_object.loading import load_object_model, object_model_of
+from vergence.vision.known_object.loading import load_object_model, object_model_of, surface_of
 from vergence.vision.known_object.modality import as_followed, has_corners, shown_by_edges
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette_tracker import (
@@ -33,4 +33,5 @@ __all__ = [
     "object_model_of",
     "require_image",
     "shown_by_edges",
+    "surface_of",
 ]

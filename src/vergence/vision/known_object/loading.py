@@ -57,13 +57,33 @@ def object_model_of(model: Any, body: str, sharp_rad: float = SHARP_RAD) -> Obje
     Raises:
         InputError: if there is no such body or nothing of it is drawn.
     """
+    vertices, triangles = _joined(model, body, _number(model, body))
+    return ObjectModel.from_mesh(body, vertices, triangles, sharp_rad)
+
+
+def surface_of(model: Any, body: str) -> tuple[FloatArray, IntArray] | None:
+    """Return what is drawn of a body of a compiled MuJoCo model, with all that hangs on it.
+
+    Returns:
+        Vertices (V, 3) in the body's frame, m, and triangles (F, 3) of them, counter-clockwise
+        seen from outside; None if nothing is drawn.
+
+    Raises:
+        InputError: if there is no such body.
+    """
+    number = _number(model, body)
+    if not any(True for _ in _parts(model, number)):
+        return None
+    return _joined(model, body, number)
+
+
+def _number(model: Any, body: str) -> int:
     import mujoco
 
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body))
     if number < 0:
         raise InputError("object model", "body", body, "the name of a body of the model")
-    vertices, triangles = _joined(model, body, number)
-    return ObjectModel.from_mesh(body, vertices, triangles, sharp_rad)
+    return number
 
 
 def _compile_mesh(file: Path) -> Any:
