@@ -28,7 +28,7 @@ def scene() -> Scene:
 def test_a_plan_brings_a_start_home_by_image_and_pose(scene: Scene) -> None:
     found = plan(scene, np.random.default_rng(0))
     assert isinstance(found.path, Path)
-    finish = follow(scene, found.path, np.random.default_rng(0))
+    finish = follow(scene, found.path, found.goal_px, np.random.default_rng(0))
     assert finish.end is End.REACHED
     assert finish.px < 1.0
     assert finish.m < 1e-3
@@ -41,11 +41,11 @@ def test_a_plan_that_passes_near_a_singularity_is_followed_to_its_end(
     far = draw(camera_arm("ur5"), STARTS_SEED, 10)
     found = plan(far, np.random.default_rng(10))
     assert isinstance(found.path, Path)
-    assert follow(far, found.path, np.random.default_rng(10)).end is End.REACHED
+    assert follow(far, found.path, found.goal_px, np.random.default_rng(10)).end is End.REACHED
     # A law that keeps its distance from singularities is held on the way.
     away = Limits(manipulability_share=0.2)
     monkeypatch.setattr(defaults_run, "limits_on_plan", lambda *_: away)
-    assert follow(far, found.path, np.random.default_rng(10)).end is not End.REACHED
+    assert follow(far, found.path, found.goal_px, np.random.default_rng(10)).end is not End.REACHED
 
 
 def test_what_the_user_states_holds_on_a_plan_too() -> None:

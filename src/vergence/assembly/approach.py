@@ -1,5 +1,7 @@
 """Planning when far: a path to desired points of known features, where goal and scale are known."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from vergence.arrays import FloatArray
@@ -8,8 +10,8 @@ from vergence.assembly.limits_on_plan import PLAN_MARGIN_JOINT, PLAN_MARGIN_PX
 from vergence.assembly.target_faces import TargetFaces
 from vergence.cell.schema import TrackTable
 from vergence.control.depth.from_features import fixes_pose
-from vergence.estimation import CornerView, NoPose, fit_pose
-from vergence.geometry import se3_inverse, transform_points
+from vergence.estimation import CornerView, NoPose, PoseFit, fit_pose
+from vergence.geometry import transform_points
 from vergence.planning import (
     FixedReference,
     Obstacle,
@@ -36,7 +38,7 @@ def desired_depth(
         return None
     features = context.known_features(task.camera)
     assert features is not None
-    depth: FloatArray = transform_points(goal, features)[:, 2].copy()
+    depth: FloatArray = transform_points(goal.T_world_target.copy(), features)[:, 2].copy()
     return depth
 
 
@@ -108,22 +110,22 @@ def plan_approach(
             Obstacle.START, f"the features {where} do not determine the target's pose"
         )
     arm = context.arm_to_camera(task.camera)
-    T_world_target = arm.forward_kinematics(q) @ now
-    points_world = transform_points(T_world_target, features)
-    faces = TargetFaces.of(context, task.camera)
-    problem = PlanningProblem(
+    problem = PlanningProblem.from_poses(
+        now,
+        goal,
+        features,
         arm,
         context.cameras[task.camera],
         q,
-        T_world_target @ se3_inverse(goal),
-        points_world,
-        PLAN_MARGIN_PX,
-        PLAN_MARGIN_JOINT,
-        surface=None if faces is None else faces.at(points_world),
+        margin_px=PLAN_MARGIN_PX,
+        margin_joint=PLAN_MARGIN_JOINT,
         bodies=context.bodies,
     )
+    faces = TargetFaces.of(context, task.camera)
+    if faces is not None:
+        problem = replace(problem, surface=faces.at(problem.points_world))
     found = OptimisedPlanner().plan(problem)
-    return Trajectory.of(found, _CAMERA_SPEED) if isinstance(found, Path) else found
+    return Trajectory.of(found, _CAMERA_SPEED, desired_px) if isinstance(found, Path) else found
 
 
 def _can_plan(context: LawContext, task: TrackTable) -> bool:
@@ -133,10 +135,8 @@ def _can_plan(context: LawContext, task: TrackTable) -> bool:
     return not context.is_fixed and task.tool is None and context.declared_stationary
 
 
-def _pose_in_camera(
-    context: LawContext, task: TrackTable, points_px: FloatArray
-) -> FloatArray | None:
-    """Return the pose of the target (4, 4) at which its features look so; None if there is none.
+def _pose_in_camera(context: LawContext, task: TrackTable, points_px: FloatArray) -> PoseFit | None:
+    """Return the pose of the target in the camera at which its features look so; None without one.
 
     Of several that fit equally, the likeliest.
     """
@@ -151,4 +151,4 @@ def _pose_in_camera(
         if not fit.alternatives:
             return None
         fit = fit.alternatives[0]
-    return np.array(fit.T_world_target)
+    return fit

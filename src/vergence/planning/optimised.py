@@ -19,8 +19,10 @@ from vergence.planning.tree import pull_into_view, shorten
 from vergence.planning.tree_search import TreeSearch
 from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
-from vergence.robot.inverse_kinematics import goal_configurations
+from vergence.robot.inverse_kinematics import goal_configurations, nearest_configuration
 
+_LIKELY = 3.0  # standard deviations within which a goal in reach may be the true one
+_TREE_GOALS = 24  # goal postures in which a tree may begin
 PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
 WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last
 MARGINS = (0.2, 0.0)  # shares of the margins that do where no path keeps them whole
@@ -61,12 +63,15 @@ class OptimisedPlanner:
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
         """Return the smoothest path found that keeps every constraint, or what stood in the way.
 
-        Where none keeps the margins, a part of them will do before there is no plan.
+        Where none keeps the margins, a part of them will do before there is no plan. A goal out of
+        reach by no more than what images leave open of it is replaced by the nearest pose in reach.
         """
         failure = _ends_refused(problem)
         if failure is not None:
             return failure
         goals = self._goals(problem)
+        if not len(goals) and (nearest := _nearest_in_reach(problem)) is not None:
+            problem, goals = nearest, self._goals(nearest)
         separation = Separation(problem)
         if not len(goals):
             failure = _unreachable(problem)
@@ -98,17 +103,18 @@ class OptimisedPlanner:
         return failure
 
     def _goals(self, problem: PlanningProblem) -> FloatArray:
-        """Return goal configurations without collisions, (G, n)."""
+        """Return goal configurations without collisions, nearest first, (G, n)."""
         bodies = problem.bodies
         return goal_configurations(
-            problem.arm, problem.T_world_goal, problem.q_start, 2 * self.branches,
+            problem.arm, problem.T_world_goal, problem.q_start, max(_TREE_GOALS, 2 * self.branches),
             None if bodies is None else lambda q: not collision_at(bodies, q),
         )  # fmt: skip
 
     def _direct(self, problem: PlanningProblem, goals: FloatArray) -> Path | None:
         """Return the best of what guesses come to, or of detours where bodies are in the way."""
         view = _view(problem)
-        for some in filter(len, (goals[: self.branches], goals[self.branches :])):
+        many = self.branches
+        for some in filter(len, (goals[:many], goals[many : 2 * many])):
             best = self._from_guesses(problem, view, some)
             best = best or self._from_detours(problem, view, some)
             if best is not None:
@@ -120,7 +126,7 @@ class OptimisedPlanner:
     ) -> Path | None:
         """Return what a search over the wrist finds, or else one by trees."""
         view = _view(problem)
-        guess = wrist_path(problem, view, goals, wrist_cells)
+        guess = wrist_path(problem, view, goals[: 2 * self.branches], wrist_cells)
         best = self._smoothest(problem, view, [guess]) if len(guess) else None
         best = best or self._from_tree(problem, view, trees)
         return None if best is None else self._path(problem, best)
@@ -323,6 +329,16 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
     if goal <= 0.0:
         return PlanFailure(Obstacle.VISIBILITY, "points are out of view at the goal")
     return None
+
+
+def _nearest_in_reach(problem: PlanningProblem) -> PlanningProblem | None:
+    """Return the problem with the pose in reach that is nearest to the goal, if that is likely."""
+    if problem.goal_deviation <= 0.0:
+        return None
+    q, missing = nearest_configuration(problem.arm, problem.T_world_goal, problem.q_start)
+    if missing > _LIKELY * problem.goal_deviation:
+        return None
+    return replace(problem, T_world_goal=problem.arm.forward_kinematics(q))
 
 
 def _unreachable(problem: PlanningProblem) -> PlanFailure:

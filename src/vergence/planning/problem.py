@@ -1,7 +1,7 @@
 """What a planner is asked."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from vergence.arrays import FloatArray, frozen
 from vergence.camera import Camera
 from vergence.errors import InputError
 from vergence.estimation.feature_faces import FeatureFaces, face_sines, shared_faces
+from vergence.estimation.recovery import PoseFit
 from vergence.geometry import se3_inverse, transform_points
 from vergence.planning.visibility import NO_FACES, View, clearance_at, make_view
 from vergence.robot import Arm, Clearance
@@ -28,6 +29,8 @@ class PlanningProblem:
     margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
     margin_face_deg: float = 1.0  # least angle between a line of sight and a face of the object
     surface: FeatureFaces | None = None  # around the points, in the world; None if not known
+    # Standard deviation of the goal, m and rad together: what images leave open of it.
+    goal_deviation: float = 0.0
     bodies: Clearance | None = None  # distances of what must not touch; None for nothing
 
     def __post_init__(self) -> None:
@@ -73,6 +76,38 @@ class PlanningProblem:
         points_star = np.ascontiguousarray(two_view.points_star(distance)[two_view.inliers])
         points_world = transform_points(T_world_goal, points_star)
         return cls(arm, camera, q_start, T_world_goal, points_world, margin_px, margin_joint)
+
+    @classmethod
+    def from_poses(
+        cls,
+        now: PoseFit,
+        goal: PoseFit,
+        features: FloatArray,
+        arm: Arm,
+        camera: Camera,
+        q_start: FloatArray,
+        **further: Any,
+    ) -> Self:
+        """Take the goal and the object from the poses of known features, now and as desired.
+
+        Args:
+            now: pose of the target in the camera at q_start.
+            goal: as it should be there.
+            features: in the target's frame, (N, 3), m.
+            arm: up to the camera.
+            camera: its intrinsics.
+            q_start: joint positions now, (n,).
+            further: fields of the problem.
+        """
+        T_world_target = arm.forward_kinematics(q_start) @ now.T_world_target
+        T_world_goal = T_world_target @ se3_inverse(goal.T_world_target.copy())
+        points = transform_points(T_world_target, features.copy())
+        lever = float(np.linalg.norm(goal.T_world_target[:3, 3]))
+        variance = sum(_worst_variance(fit.covariance, lever) for fit in (now, goal))
+        return cls(
+            arm, camera, q_start, T_world_goal, points,
+            goal_deviation=float(np.sqrt(variance)), **further,
+        )  # fmt: skip
 
     @property
     def T_goal_start(self) -> FloatArray:
@@ -156,3 +191,11 @@ class PlanningProblem:
     def clearance(self, q: FloatArray, margin_px: float | None = None) -> float:
         """Return the sine of the least angle to a side of the view or to a face at q (n,)."""
         return float(clearance_at(self.arm.chain, np.asarray(q), self.view(margin_px)))
+
+
+def _worst_variance(covariance: FloatArray, lever: float) -> float:
+    """Return the largest variance of a pose (6, 6) for a point a lever away, and of its angle."""
+    position, angle = (
+        float(np.linalg.eigvalsh(covariance[k : k + 3, k : k + 3])[-1]) for k in (0, 3)
+    )
+    return position + (1.0 + lever * lever) * angle

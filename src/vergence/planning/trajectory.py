@@ -28,14 +28,18 @@ class Trajectory:
     _image: "CubicSpline"  # of (N, 2) px
     _depth: "CubicSpline"  # of (N,) m
     _joints: "CubicSpline"  # of (n,)
+    desired_px: FloatArray | None = None  # (N, 2) after the end; what the path's end shows if None
 
     @classmethod
-    def of(cls, path: Path, camera_speed: float = 0.5) -> Self:
+    def of(
+        cls, path: Path, camera_speed: float = 0.5, desired_px: FloatArray | None = None
+    ) -> Self:
         """Time a path as fast as the arm's limits and the camera's speed allow.
 
         Args:
             path: from a planner.
             camera_speed: m/s; turning counts with the distance of the object as its lever.
+            desired_px: desired image after the end, (N, 2); what the end of the path shows if None.
         """
         from scipy.interpolate import CubicSpline
 
@@ -50,7 +54,8 @@ class Trajectory:
             MARGIN**2 * arm.acceleration_max,
         )  # fmt: skip
         shortest = _way(path) / camera_speed / (1.0 - law.ramp)
-        return cls(path, TimeLaw(max(law.duration, shortest), law.ramp), image, depth, joints)
+        timing = TimeLaw(max(law.duration, shortest), law.ramp)
+        return cls(path, timing, image, depth, joints, desired_px)
 
     @classmethod
     def in_steps(cls, path: Path, period_s: float) -> Self:
@@ -80,6 +85,8 @@ class Trajectory:
 
     def reference(self, time: float) -> Reference:
         """Return s*, ds*/dt and depths at a time since the start, s; afterwards the goal."""
+        if time > self.duration and self.desired_px is not None:
+            return Reference(time, self.desired_px, depth_m=self._depth(1.0))
         sigma, speed, _ = self.law.at(time)
         return Reference(
             time=time,

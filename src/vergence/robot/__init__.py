@@ -10,7 +10,7 @@ from vergence.robot.chain import (
     world_jacobian,
 )
 from vergence.robot.clearance import Clearance, NearPairs
-from vergence.robot.inverse_kinematics import goal_configurations
+from vergence.robot.inverse_kinematics import goal_configurations, nearest_configuration
 from vergence.robot.manipulability import (
     Manipulability,
     joint_limit_penalty,
@@ -41,6 +41,7 @@ __all__ = [
     "joint_limit_penalty",
     "manipulability",
     "manipulability_measure",
+    "nearest_configuration",
     "per_joint_limit_penalty",
     "transmissibility_measure",
     "unmeasured_directions",

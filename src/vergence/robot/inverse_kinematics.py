@@ -12,6 +12,7 @@ from vergence.robot import Arm, Chain, forward_kinematics, jacobian
 
 SEEDS = 48  # random starts of the search
 TOLERANCE = 1e-8  # of the pose, m and rad together
+_TURNS = (0.0, -2 * np.pi, 2 * np.pi)
 _SAME = 1e-4  # rad or m, between joint positions that are one solution
 
 
@@ -88,13 +89,32 @@ def goal_configurations(
     random = np.random.default_rng(0)
     seeds = np.vstack((near, random.uniform(low, high, (SEEDS, len(near)))))
     solutions = solve_from_seeds(arm.chain, seeds, np.ascontiguousarray(T), low, high)
-    turned = [shifted for q in solutions for shifted in _full_turns(arm, q, low, high)]
-    turned.sort(key=lambda q: float(np.abs((q - near) / arm.rate_max).max()))
-    fitting = islice((q for q in _once(turned) if allowed is None or allowed(q)), most)
+    turned = np.vstack([solutions, *(_full_turns(arm, q, low, high) for q in solutions)])
+    order = np.argsort(np.abs((turned - near) / arm.rate_max).max(axis=1), kind="stable")
+    fitting = islice((q for q in _once(turned[order]) if allowed is None or allowed(q)), most)
     return np.array(list(fitting)).reshape(-1, arm.joint_count)
 
 
-def _once(solutions: list[FloatArray]) -> Iterator[FloatArray]:
+def nearest_configuration(arm: Arm, T: FloatArray, near: FloatArray) -> tuple[FloatArray, float]:
+    """Return joint positions (n,) inside the limits that bring the tip nearest to a pose.
+
+    Args:
+        arm: any.
+        T: desired pose of the tip in the world, (4, 4).
+        near: joint positions (n,), one of the seeds of the search.
+
+    Returns:
+        The positions, and the norm of the twist (m, rad) that is missing.
+    """
+    low, high = finite_range(arm, near)
+    seeds = np.vstack((near, np.random.default_rng(0).uniform(low, high, (SEEDS, len(near)))))
+    T = np.ascontiguousarray(T)
+    ends = (solve_pose(arm.chain, seed, T, low, high, 40) for seed in seeds)
+    q, missing = min(ends, key=lambda end: end[1])
+    return q, float(missing)
+
+
+def _once(solutions: FloatArray) -> Iterator[FloatArray]:
     """Yield each solution once: turned by whole turns, two seeds' may be one."""
     seen: list[FloatArray] = []
     for q in solutions:
@@ -111,13 +131,10 @@ def finite_range(arm: Arm, near: FloatArray) -> tuple[FloatArray, FloatArray]:
     return low, high
 
 
-def _full_turns(arm: Arm, q: FloatArray, low: FloatArray, high: FloatArray) -> list[FloatArray]:
-    """Return q and q with single joints turned by whole turns inside the limits."""
-    result = [q]
-    for i in np.flatnonzero(~arm.sliding):
-        for turn in (-2 * np.pi, 2 * np.pi):
-            shifted = q.copy()
-            shifted[i] += turn
-            if low[i] <= shifted[i] <= high[i]:
-                result.append(shifted)
-    return result
+def _full_turns(arm: Arm, q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return q with its turning joints, any of them together, turned by whole turns, (K, n)."""
+    places = [
+        [at] if slides else [at + turn for turn in _TURNS if a <= at + turn <= b]
+        for at, slides, a, b in zip(q, arm.sliding, low, high, strict=True)
+    ]
+    return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(q))

@@ -94,7 +94,7 @@ def attempt(arm: Arm, seed: int, index: int) -> Tried:
     if found.cpu_s > PLAN_WORST_S:  # the first in a process loads its kernels: once more
         found = found._replace(cpu_s=plan(scene, randoms[-2], noise).cpu_s)
     if isinstance(found.path, CameraPath):
-        ours = follow(scene, found.path, randoms[-1], noise)
+        ours = follow(scene, found.path, found.goal_px, randoms[-1], noise)
     elif isinstance(found.path, PlanFailure) and found.path.proved:
         ours = served[0]._replace(end=End.NO_PLAN, reason=str(found.path))
     else:

@@ -55,7 +55,7 @@ GAIN, GAIN_OF_NEW = 1.0, 3.0  # 1/s: of a law without a plan, and as `new` write
 # Shares of the rate limits up to which an arm is at rest.
 _SLOW, _SLOW_WITH_NOISE = 4e-4, 4e-3
 _NOTICEABLE = 0.1  # 1/s: share of the error by which it falls
-CAMERA_SPEED, SETTLE_S = 0.25, 4.0  # m/s of a plan, and s after its end
+CAMERA_SPEED, SETTLE_S, REST_S = 0.25, 4.0, 1.0  # m/s of a plan, s after its end, s of rest
 
 DEPTHS: dict[str, Depth] = {
     "held": HeldDepth(),
@@ -308,36 +308,31 @@ class Planned(NamedTuple):
 
     path: Path | PlanFailure | NoPose
     cpu_s: float
+    goal_px: FloatArray  # (N, 2) the desired image that it was made with
 
 
 def plan(scene: Scene, random: np.random.Generator, noise_px: float = 0.0) -> Planned:
     """Plan from the images at start and goal, with the target's features known."""
     begin = process_time()
-    now = scene.seen_px(scene.arm.forward_kinematics(scene.q_start))
+    now, goal_px = (
+        px + noise_px * random.standard_normal(px.shape)
+        for px in (scene.seen_px(scene.arm.forward_kinematics(scene.q_start)), scene.goal_px)
+    )
     fits = [
-        fit_pose(
-            scene.marks,
-            [CornerView(scene.camera, np.eye(4), px + noise_px * random.standard_normal(px.shape))],
-            max(noise_px, 0.05),
-        )
-        for px in (now, scene.goal_px)
+        fit_pose(scene.marks, [CornerView(scene.camera, np.eye(4), px)], max(noise_px, 0.05))
+        for px in (now, goal_px)
     ]
     poses = []
     for fit in fits:
         if isinstance(fit, NoPose) and not fit.alternatives:
-            return Planned(fit, process_time() - begin)
+            return Planned(fit, process_time() - begin, goal_px)
         poses.append(fit.alternatives[0] if isinstance(fit, NoPose) else fit)
-    T_start, T_goal = (pose.T_world_target for pose in poses)
-    T_world_target = scene.arm.forward_kinematics(scene.q_start) @ T_start
-    problem = PlanningProblem(
-        scene.arm,
-        scene.camera,
-        scene.q_start,
-        T_world_target @ se3_inverse(T_goal.copy()),
-        transform_points(T_world_target, scene.marks.copy()),
+    now_fit, goal_fit = poses
+    problem = PlanningProblem.from_poses(
+        now_fit, goal_fit, scene.marks, scene.arm, scene.camera, scene.q_start
     )
     path = OptimisedPlanner().plan(problem)
-    return Planned(path, process_time() - begin)
+    return Planned(path, process_time() - begin, goal_px)
 
 
 def plan_again(
@@ -358,13 +353,19 @@ def plan_again(
         found = plan(here, random, noise_px)
         if not isinstance(found.path, Path):
             break
-        finish = follow(here, found.path, random, noise_px)
+        finish = follow(here, found.path, found.goal_px, random, noise_px)
     return finish
 
 
-def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: float = 0.0) -> Finish:
+def follow(
+    scene: Scene,
+    path: Path,
+    goal_px: FloatArray,
+    random: np.random.Generator,
+    noise_px: float = 0.0,
+) -> Finish:
     """Follow a path as `track` does in a cell that `new` writes, and settle at its end."""
-    trajectory = Trajectory.of(path, CAMERA_SPEED)
+    trajectory = Trajectory.of(path, CAMERA_SPEED, goal_px)
     limits = limits_on_plan(Limits(), PLAN_MARGIN_PX, PLAN_MARGIN_JOINT, 1.0 / RATE_HZ)
     law, free = (
         Servo(
@@ -381,7 +382,7 @@ def follow(scene: Scene, path: Path, random: np.random.Generator, noise_px: floa
         for kept, solver in ((limits, QuadraticProgram()), (None, PseudoInverse()))
     )
     longest = trajectory.duration + SETTLE_S
-    end = trajectory.duration
+    end = trajectory.duration + REST_S  # the desired image is not quite what the path's end shows
     return drive(
         scene, law, free, trajectory, random, noise_px, longest, end, goal_noise_px=noise_px
     )
