@@ -23,7 +23,7 @@ def ur5() -> Arm:
     return camera_arm("ur5")
 
 
-@pytest.mark.parametrize("seed", [12, 36, 135, 169])
+@pytest.mark.parametrize("seed", [12, 82, 126, 135])
 def test_a_path_keeps_to_the_front_of_known_faces(ur5: Arm, seed: int) -> None:
     scene = drawn(ur5, seed)
     blind, path = (OptimisedPlanner().plan(problem(scene, known)) for known in (False, True))
