@@ -1,11 +1,13 @@
 """What `vergence compare` and `vergence map` have in common: running, data, pages."""
 
 import csv
+import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vergence.app import markup
 from vergence.app.output import FAILURE, warn
@@ -46,6 +48,33 @@ class Running:
         )
 
 
+class Campaign(NamedTuple):
+    """What came of a campaign, and how fast."""
+
+    results: "tuple[TrialResult, ...]"
+    runs_per_cpu_s: float | None  # of all that was made here now; None if nothing was
+
+    @property
+    def made_in(self) -> dict[str, int]:
+        """How many runs were made in what: "kernel", "loop" or "physics"."""
+        return dict(Counter(made for result in self.results if (made := result.made_in)))
+
+    @property
+    def in_words(self) -> str:
+        """Say how fast the runs were made, and in what."""
+        made = ", ".join(f"{count} in {_MADE_IN[name]}" for name, count in self.made_in.items())
+        if self.runs_per_cpu_s is None:
+            return made
+        return f"{self.runs_per_cpu_s:.3g} runs per CPU second; {made}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the same as JSON values."""
+        return {"runs_per_cpu_s": self.runs_per_cpu_s, "made_in": self.made_in}
+
+
+_MADE_IN = {"kernel": "the batch kernel", "loop": "the loop", "physics": "simulated physics"}
+
+
 def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Running]":
     """Return what the options of a command mean: which cell, and how to run it.
 
@@ -80,18 +109,21 @@ def names_in(option: str, text: str) -> tuple[str, ...]:
     return given
 
 
-def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple[TrialResult, ...]":
+def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> Campaign:
     """Run a campaign with a progress bar; Ctrl-C keeps what is done."""
     from vergence.experiments import Executor, WorkersLostError, run_campaign
 
+    counts: list[int] = []  # of runs that are done: at first those of an earlier campaign
+    began_s = _cpu_s()
     with bar("{task.completed} of {task.total} runs") as progress:
         task = progress.add_task("runs", total=len(trials))
 
         def show(done: int, total: int) -> None:
+            counts.append(done)
             progress.update(task, completed=done, total=total, description="runs")
 
         try:
-            return run_campaign(
+            results = run_campaign(
                 source,
                 trials,
                 how.folder,
@@ -106,6 +138,14 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> "tuple
         except WorkersLostError as error:
             warn(f"{error}; repeat the command with --out {how.folder} to resume")
             raise SystemExit(FAILURE) from None
+    new, here = counts[-1] - counts[0], how.options.scheduler is None
+    return Campaign(results, new / (_cpu_s() - began_s) if new and here else None)
+
+
+def _cpu_s() -> float:
+    """Return the CPU time that this process and its workers have taken, s."""
+    own_user, own_system, workers_user, workers_system, _ = os.times()
+    return own_user + own_system + workers_user + workers_system
 
 
 _COLUMNS = (

@@ -41,7 +41,8 @@ def compare(options: "CompareOptions") -> int:
     laws = usual_laws(cell) if options.laws is None else names_in("--laws", options.laws)
     sampling = Sampling(names_in("--vary", options.vary), options.spread, options.speed)
     trials = start_trials(cell, laws, options.starts, options.seed, sampling)
-    found = Comparison(run(source, trials, how))
+    campaign = run(source, trials, how)
+    found = Comparison(campaign.results)
     data = write_table(how.folder / "compare.csv", found.runs)
     remark = _REMARK.format(
         drawn=", ".join(sampling.vary), features=how.features, motion=how.motion
@@ -51,10 +52,20 @@ def compare(options: "CompareOptions") -> int:
         drawn = {"starts": options.starts, "seed": options.seed, "tolerance_px": how.tolerance_px}
         rows = [_as_json(score) for score in found.scores]
         files = {"run": how.folder, "data": data, "report": report}
-        emit({"command": "compare", "cell": cell.name, **drawn, "laws": rows, **files})
+        emit(
+            {
+                "command": "compare",
+                "cell": cell.name,
+                **drawn,
+                "laws": rows,
+                **campaign.as_json(),
+                **files,
+            }
+        )
         return SUCCESS
     _tell(found)
     say(f"  converged: every feature within {how.tolerance_px:g} px at the end")
+    say(f"  speed   {campaign.in_words}")
     say(f"  report  {report}")
     say(f"  data    {data}")
     return SUCCESS

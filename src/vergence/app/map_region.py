@@ -46,17 +46,20 @@ def map_region(options: "MapOptions") -> int:
 
     source, how = prepare("map", options)
     cell = source.load()
-    results = run(source, _trials(cell, region), how)
+    campaign = run(source, _trials(cell, region), how)
+    results = campaign.results
     data = write_table(how.folder / "map.csv", results)
     report, image = _write_page(cell, region, results, how)
     found = scores(results)
     if options.as_json:
         answer = {"command": "map", "cell": cell.name, "over": region.over}
         files = {"run": how.folder, "data": data, "image": image, "report": report}
-        emit({**answer, "laws": [_as_json(score) for score in found], **files})
+        laws = [_as_json(score) for score in found]
+        emit({**answer, "laws": laws, **campaign.as_json(), **files})
         return SUCCESS
     for score in found:
         say(f"{cell.name}, law {score.law}: {_in_words(score)}")
+    say(f"  speed    {campaign.in_words}")
     say(f"  report   {report}")
     say(f"  image    {image}")
     say(f"  data     {data}")

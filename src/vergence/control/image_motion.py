@@ -61,7 +61,7 @@ class _Exposure(NamedTuple):
     """The last view."""
 
     time: float  # s
-    q: FloatArray  # (n,)
+    T_camera_scene: FloatArray  # (4, 4)
     points: FloatArray  # (M, 2) normalized coordinates
     depths: Depths
 
@@ -119,21 +119,22 @@ class ImageMotion:
             target: from a filter, where one runs.
         """
         self._remember(joints)
-        q_exposed = self._joints_at(view.time)
         points = self._mounting.camera.normalize(view.points_px)
         if self._last is not None and len(points) != len(self._last.points):
             self._last = None  # other features
             self._flow.clear()
             self._depth_source = self._bind()
         if self._last is None or view.time > self._last.time:
-            self._expose(view, points, depth, q_exposed, target)
+            self._expose(view, points, depth, target)
         assert self._last is not None
         exposed = self._last.depths
         if self._held:
             exposed = Depths(depth)
         if not self._prediction:
             return FeatureState(points, self._flow.at(0.0), *exposed)
-        now = self._seen_from(points, exposed.depth_m, q_exposed, joints.position)
+        q_exposed = self._joints_at(view.time)
+        there, here = self._T_camera_scene(q_exposed), self._T_camera_scene(joints.position)
+        now = reproject(se3_compose(here, se3_inverse(there)), points, exposed.depth_m)
         elapsed = joints.time - view.time
         ahead = now[:, :2] + self._flow.moved(elapsed)
         moved = np.where(np.isfinite(now[:, 2]), now[:, 2], exposed.depth_m)
@@ -145,16 +146,16 @@ class ImageMotion:
         view: ImagePoints,
         points: FloatArray,
         depth: FloatArray,
-        q: FloatArray,
         target: TargetState | None,
     ) -> None:
         """Take in a new view: its depths, and what the last one leaves unexplained as flow."""
+        T_camera_scene = self._T_camera_scene(self._joints_at(view.time))
         measured = MeasuredPoints(
             view.time,
             points,
             view.found,
             view.covariance_px / np.outer(*2 * [self._mounting.camera.focal_px]),
-            self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q)),
+            T_camera_scene,
             depth,
             target,
             view.depth_m,
@@ -166,21 +167,14 @@ class ImageMotion:
         else:
             last, elapsed = self._last, view.time - self._last.time
             before = depth if self._held else last.depths.depth_m
-            stationary = self._seen_from(last.points, before, last.q, q)
+            T_now_last = se3_compose(T_camera_scene, se3_inverse(last.T_camera_scene))
+            stationary = reproject(T_now_last, last.points, before)
             flow = (points - stationary[:, :2]) / elapsed
             self._flow.measure(flow, view.found, elapsed)
-        self._last = _Exposure(view.time, q, points, depths)
+        self._last = _Exposure(view.time, T_camera_scene, points, depths)
 
-    def _seen_from(
-        self, points: FloatArray, depth: FloatArray, q_from: FloatArray, q_to: FloatArray
-    ) -> FloatArray:
-        """Return stationary points (M, 3), seen at one configuration, as they look at another."""
-        there, here = (
-            self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q))
-            for q in (q_to, q_from)
-        )
-        seen: FloatArray = reproject(se3_compose(there, se3_inverse(here)), points, depth)
-        return seen
+    def _T_camera_scene(self, q: FloatArray) -> FloatArray:
+        return self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q))
 
     def _remember(self, joints: JointState) -> None:
         self._history.append((joints.time, joints.position))

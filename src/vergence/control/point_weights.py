@@ -7,30 +7,32 @@ from vergence.arrays import FloatArray
 _SURE_PX = 0.5  # standard deviation up to which a point counts (nearly) fully
 
 
-def point_weights(covariance_px: FloatArray) -> FloatArray:
+def point_weights(covariance_px: FloatArray) -> FloatArray | None:
     """Return roots R (M, 2, 2) of what rows of points weigh: Rᵀ R = σ² (σ² I + C)⁻¹, the best 1.
 
-    Points of equal covariance C weigh the same, 1, whatever it is. One that lies on an edge weighs
-    across it and not along it.
+    Points of equal covariance C weigh the same, 1, whatever it is: None for those that are equally
+    sure along all directions. One that lies on an edge weighs across it and not along it.
 
     Args:
         covariance_px: C, (M, 2, 2), px².
     """
-    if not len(covariance_px):
-        return np.zeros((0, 2, 2))
+    if not len(covariance_px) or (covariance_px == covariance_px[0, 0, 0] * np.eye(2)).all():
+        return None
     weight = np.linalg.inv(np.eye(2) + covariance_px / _SURE_PX**2)
     weight /= np.linalg.eigvalsh(weight).max()
     roots: FloatArray = np.linalg.cholesky(weight).transpose(0, 2, 1)
     return roots
 
 
-def row_variance(roots: FloatArray, covariance: FloatArray) -> float:
+def row_variance(roots: FloatArray | None, covariance: FloatArray) -> float:
     """Return the mean variance of weighted rows.
 
     Args:
-        roots: R of each point, (M, 2, 2).
+        roots: R of each point, (M, 2, 2); None where all weigh 1.
         covariance: of each point, (M, 2, 2).
     """
-    if not len(roots):
+    if not len(covariance):
         return 0.0
+    if roots is None:
+        return float(np.trace(covariance, axis1=1, axis2=2).mean() / 2.0)
     return float(np.einsum("mij,mjk,mik->m", roots, covariance, roots).mean() / 2.0)

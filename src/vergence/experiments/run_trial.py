@@ -1,6 +1,7 @@
 """Trials, in whatever process."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -80,11 +81,13 @@ def run_trial(
 
 
 def _in_physics(cell: Cell, trial: Trial, tolerance_px: float) -> TrialResult:
-    return _result(run_cell(cell, images=renders(cell)), trial, cell.task.camera, tolerance_px)
+    run = run_cell(cell, images=renders(cell))
+    return replace(_result(run, trial, cell.task.camera, tolerance_px), made_in="physics")
 
 
 def _in_loop(run: KinematicRun, trial: Trial, tolerance_px: float) -> TrialResult:
-    return _result(run.in_loop(), trial, CAMERA, tolerance_px)
+    result = _result(run.in_loop(), trial, CAMERA, tolerance_px)
+    return replace(result, made_in="loop")
 
 
 def _result(run: Run, trial: Trial, camera: str, tolerance_px: float) -> TrialResult:
@@ -107,7 +110,8 @@ def _of_batch(
         trace.camera_m,
         trace.target_m,
     )
-    return trial_result(trial, trace.outcome, tracks, camera, tolerance_px)
+    result = trial_result(trial, trace.outcome, tracks, camera, tolerance_px)
+    return replace(result, made_in="kernel")
 
 
 def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:

@@ -48,6 +48,7 @@ class TrialResult:
     end_m: tuple[float, ...]  # (3,) and at the end
     start_px: tuple[float, ...]  # (2,) the features' middle at the start
     end_px: tuple[float, ...]  # (2,) where they were seen last
+    made_in: str = ""  # "kernel", "loop" or "physics"; nothing for a run that was refused
 
     @property
     def outcome(self) -> str:

@@ -33,6 +33,14 @@ class _Axes(NamedTuple):
     joint_count: int  # of the joints that may be commanded
 
 
+class _Measured(NamedTuple):
+    """Pairs of shapes that may be near."""
+
+    pair: IntArray  # (K,)
+    ends: FloatArray  # (K, 6) their nearest points
+    distance: FloatArray  # (K,) m
+
+
 class CellClearance:
     """Distances between the convex hulls of an arm's shapes, and from them to those around.
 
@@ -65,12 +73,14 @@ class CellClearance:
         others = [name for name in model.arms if name != arm and "arms" in avoid]
         self._axes = {name: _axes(model, name) for name in (arm, *others)}
         self._states = states if others else None
+        self._q = _NONE  # of the arm, as it was placed last among things that do not move
+        self._measured: _Measured | None = None  # there
         self.reach = _reach(m, self._axes[arm], self.geoms)
 
     def twin(self) -> "CellClearance":
         """Return the same with a state of its own, for another thread."""
         other = copy(self)
-        other._data = copy(self._data)
+        other._data, other._q, other._measured = copy(self._data), _NONE, None
         return other
 
     def near(self, q: FloatArray) -> NearPairs:
@@ -119,25 +129,31 @@ class CellClearance:
 
     def _place(self, q: FloatArray) -> Mapping[str, JointState]:
         """Put the arms where they are; return the states of the others."""
+        if self._states is None and np.array_equal(q, self._q):
+            return {}
         states = self._others()
+        self._q, self._measured = np.array(q), None
         for name, state in states.items():
             self._model.write_position(self._data, name, state.position)
         self._model.write_position(self._data, self._arm, q)
         mujoco.mj_kinematics(self._model.model, self._data)
         return states
 
-    def _measure(self) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Return the pairs that may be near (K,), their nearest points (K, 6), and distances (K,).
+    def _measure(self) -> _Measured:
+        """Return how near the pairs are that may be near.
 
         Of one that is not, MuJoCo says `NEAR_M`, and both points are the origin.
         """
+        if self._measured is not None:
+            return self._measured
         m, data = self._model.model, self._data
         least = least_distances(self.geoms, data.geom_xpos, data.geom_xmat, self._radius)
         pair = np.flatnonzero(least < NEAR_M)
         ends, distance = np.empty((len(pair), 6)), np.empty(len(pair))
         for k, (a, b) in enumerate(self.geoms[pair].tolist()):
             distance[k] = mujoco.mj_geomDistance(m, data, a, b, NEAR_M, ends[k])
-        return pair, ends, distance
+        self._measured = _Measured(pair, ends, distance)
+        return self._measured
 
     def _gradient(
         self, arm: str, pair: IntArray, ends: FloatArray, distance: FloatArray

@@ -138,7 +138,10 @@ class KinematicDriver:
         in_front = depth > 1e-3
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = cell.camera.project(points[in_front])
-        visible = in_front & cell.camera.in_view(points)
+        # Only a lens bends what is far outside of the image back into it.
+        distorted = cell.camera.distorted
+        seen = cell.camera.in_view(points) if distorted else cell.camera.contains(points_px)
+        visible = in_front & seen
         if cell.sees is not None and visible.any():
             visible &= cell.sees(self._position, T_world_target)
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
