@@ -10,6 +10,7 @@ import numpy as np
 from harness import Block, Peer, measured, row
 from vergence.assembly import Parts, assemble_parts
 from vergence.cell import load_cell
+from vergence.experiments import CellSource, Sampling, run_trials, start_trials
 from vergence.experiments.batch import KinematicRun, run_batch
 from vergence.experiments.batch.closed_loop import closed_loops
 from vergence.experiments.batch.run_batch import empty_records, pack
@@ -48,6 +49,16 @@ def runs_a_second(run: KinematicRun) -> float:
     return RUNS / (time.perf_counter() - start)
 
 
+def runs_a_cpu_second(law: str) -> float:
+    """How many runs of 5 s a core makes of a cell under a law, from a cell to results."""
+    source = CellSource.changed("ur5", {"duration_s": 5.0})
+    trials = start_trials(source.load(), [law], 5, 0, Sampling(("starts",)))
+    run_trials(source, trials[:1], 2.0)
+    start = time.process_time()
+    run_trials(source, trials, 2.0)
+    return len(trials) / (time.process_time() - start)
+
+
 def block(whole_run: Callable[[], object]) -> Block:
     """A block whose calls are ticks, by the time this thread was at work."""
 
@@ -70,4 +81,8 @@ def run() -> list[dict[str, Any]]:
     return [
         row("batch: closed-loop tick, CPU time", kernel, loop, value_aim=2.5),
         measured("batch: runs of 25 s on all cores", runs_a_second(one), "runs/s"),
+        *(
+            measured(f"campaign: runs of 5 s, {law} law, a core", runs_a_cpu_second(law), "runs/s")
+            for law in ("image_based", "constrained")
+        ),
     ]

@@ -21,7 +21,7 @@ def run(options: "RunOptions") -> int:
     folder = run_folder(options.out, options.overwrite, cell.name)
     from vergence.runtime import Recorder
 
-    recorder = Recorder(folder, options.image_every)
+    recorder = Recorder(folder, options.image_every, options.image_quality)
     result = _recorded(cell, recorder, options.images, options.driver)
     if not options.as_json:
         _tell_outcome(result)  # at once: what has to be read later is written later

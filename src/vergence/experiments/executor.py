@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from math import ceil
 from typing import Any
 
 from vergence.cell import Cell
 from vergence.errors import InputError, VergenceError
-from vergence.experiments.kinematic import is_quick
-from vergence.experiments.run_trial import run_trials
+from vergence.experiments.kinematic import is_ideal, is_quick
+from vergence.experiments.run_trial import as_they_come, run_trials
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
 from vergence.optional_package import is_installed, optional_package
@@ -19,6 +20,8 @@ from vergence.optional_package import is_installed, optional_package
 _LOG = logging.getLogger(__name__)
 _CONNECT_S = 10
 _CHUNK = 256  # quick trials handed out at once: about a second of one core
+_SHARES = 8  # of a worker: tasks of ideal runs, so that all workers end at much the same time
+_MOST = 16  # ideal runs in a task
 _NO_PAGES: dict[str, list[str]] = {
     f"distributed.{role}.http.routes": [] for role in ("scheduler", "worker")
 }
@@ -58,18 +61,18 @@ class Executor:
             WorkersLostError: if every worker dies that is given the same trials.
         """
         count = self.workers or os.cpu_count() or 1
-        quick, slow = _by_pace(source, trials, physics)
+        quick, ideal, slow = _by_pace(source, trials, physics)
         if self.scheduler is None:
-            for some in quick:
-                yield from run_trials(source, some, tolerance_px, physics, count)
+            for some in _chunks(quick, _CHUNK):
+                yield from as_they_come(source, some, tolerance_px, physics, count)
             quick = []
-        tasks = [*quick, *slow]
+        size = min(_MOST, ceil(len(ideal) / (_SHARES * count)))
+        tasks = [*_chunks(quick, _CHUNK), *_chunks(ideal, size), *_chunks(slow, 1)]
         if self.scheduler is None and self.workers is None and not is_installed("distributed"):
             _LOG.info("one process runs all: pip install 'vergence[cluster]' for one a core")
             count = 1
         if self.scheduler is None and min(count, len(tasks)) <= 1:
-            for some in tasks:
-                yield from run_trials(source, some, tolerance_px, physics)
+            yield from as_they_come(source, [*ideal, *slow], tolerance_px, physics)
         else:
             yield from self._distribute(source, tasks, tolerance_px, physics, count)
 
@@ -142,19 +145,27 @@ def _distributed(executor: Executor) -> Any:
 
 def _by_pace(
     source: CellSource, trials: Sequence[Trial], physics: bool
-) -> tuple[list[tuple[Trial, ...]], list[tuple[Trial, ...]]]:
-    """Return trials for the batch kernel, by the chunk, and all others, one at a time."""
+) -> tuple[list[Trial], list[Trial], list[Trial]]:
+    """Return trials for the batch kernel, those whose arm is ideal, and those in physics."""
     cell = source.load()
     quick: list[Trial] = []
+    ideal: list[Trial] = []
     slow: list[Trial] = []
     for trial in trials:
-        (slow if physics or not _is_quick(cell, trial) else quick).append(trial)
-    chunks = [tuple(quick[i : i + _CHUNK]) for i in range(0, len(quick), _CHUNK)]
-    return chunks, [(trial,) for trial in slow]
+        changed = None if physics else _changed(cell, trial)
+        if changed is None or not is_ideal(changed):
+            slow.append(trial)
+        else:
+            (quick if is_quick(changed) else ideal).append(trial)
+    return quick, ideal, slow
 
 
-def _is_quick(cell: Cell, trial: Trial) -> bool:
+def _changed(cell: Cell, trial: Trial) -> Cell | None:
     try:
-        return is_quick(cell.replace(**trial.changes))
+        return cell.replace(**trial.changes)
     except InputError:  # becomes its result
-        return False
+        return None
+
+
+def _chunks(trials: Sequence[Trial], size: int) -> list[tuple[Trial, ...]]:
+    return [tuple(trials[i : i + size]) for i in range(0, len(trials), max(size, 1))]

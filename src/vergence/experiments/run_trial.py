@@ -1,6 +1,6 @@
 """Trials, in whatever process."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -28,7 +28,30 @@ def run_trials(
     physics: bool = False,
     threads: int | None = 1,
 ) -> list[TrialResult]:
-    """Run trials; the same arguments give the same results anywhere.
+    """Run trials; the same arguments give the same results anywhere, in the order of the trials.
+
+    Args:
+        source: of the cell.
+        trials: what to change in it, each time.
+        tolerance_px: up to which error of the farthest feature a run has converged.
+        physics: whether to simulate physics for every cell.
+        threads: cores for the batch kernel; every core if None.
+
+    Raises:
+        KeyboardInterrupt: if the user stopped it.
+    """
+    results = {r.key: r for r in as_they_come(source, trials, tolerance_px, physics, threads)}
+    return [results[trial.key] for trial in trials]
+
+
+def as_they_come(
+    source: CellSource,
+    trials: Sequence[Trial],
+    tolerance_px: float,
+    physics: bool = False,
+    threads: int | None = 1,
+) -> Iterator[TrialResult]:
+    """Run trials and yield each result when it is there; cells with the same models share a world.
 
     Features are exact projections, unless a camera's `imaging` says how bad its images are: then
     these are rendered, and the features are tracked in them.
@@ -49,28 +72,26 @@ def run_trials(
         KeyboardInterrupt: if the user stopped it.
     """
     cell, bench = source.load(), KinematicRuns()
-    results: dict[str, TrialResult] = {}
     waiting: list[tuple[Trial, KinematicRun]] = []
     for trial in trials:
         try:
             changed = cell.replace(**trial.changes)
             if physics or not is_ideal(changed):
-                results[trial.key] = _in_physics(changed, trial, tolerance_px)
+                yield _in_physics(changed, trial, tolerance_px)
                 continue
             run = bench.run_of(changed)
         except InputError as error:
-            results[trial.key] = _refused(trial, str(error))
+            yield _refused(trial, str(error))
             continue
         if covers(run):
             waiting.append((trial, run))
         else:
-            results[trial.key] = _in_loop(run, trial, tolerance_px)
+            yield _in_loop(run, trial, tolerance_px)
     traces = run_batch([run for _, run in waiting], threads)
     for (trial, run), trace in zip(waiting, traces, strict=True):
         again = _hidden(run, trace) or _touches(run, trace)
         made = _in_loop if again else partial(_of_batch, trace=trace)
-        results[trial.key] = made(run, trial=trial, tolerance_px=tolerance_px)
-    return [results[trial.key] for trial in trials]
+        yield made(run, trial=trial, tolerance_px=tolerance_px)
 
 
 def run_trial(

@@ -10,6 +10,7 @@ from vergence.app.options.shared import (
     CellName,
     Driver,
     ImageEvery,
+    ImageQuality,
     Images,
     Json,
     Out,
@@ -42,6 +43,7 @@ class RunOptions:
     seed: Seed = None
     images: Images = True
     image_every: ImageEvery = 2
+    image_quality: ImageQuality = 85
     settings: Settings = None
     out: Out = None
     overwrite: Overwrite = False

@@ -28,6 +28,9 @@ Images = Annotated[
 ImageEvery = Annotated[
     int, typer.Option(min=0, help="Record every n-th image of a camera; 0 records none.")
 ]
+ImageQuality = Annotated[
+    int, typer.Option(min=1, max=100, help="JPEG quality of the recorded images.")
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
