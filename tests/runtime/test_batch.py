@@ -79,7 +79,9 @@ def drawn_run(seed: int) -> KinematicRun:
         situation=Situation(1.0 / cell.rate_hz, MotionSettings(False, False)),
     )
     desired = truth.points_px + rng.normal(0, 30, 2)
-    return KinematicRun(cell, law, desired, 3.0, noise_px=float(rng.choice([0.0, 0.5])))
+    noise_px = float(rng.choice([0.0, 0.5]))
+    duration_s = 3.0 if seed % 2 else float(rng.uniform(2.9, 3.0))  # at an image, or between two
+    return KinematicRun(cell, law, desired, duration_s, noise_px=noise_px)
 
 
 def check_same(trace: BatchTrace, run: Run) -> None:

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from vergence.assembly.run_cell import run_cell
-from vergence.camera import image_times
+from vergence.camera import image_tick, image_times
 from vergence.cell import Cell
 from vergence.errors import InputError
 from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
@@ -154,7 +154,10 @@ def _touches(run: KinematicRun, trace: BatchTrace) -> bool:
     """Return whether the guard may have stopped the arm before it touched something."""
     cell = run.cell
     assert run.clearance is not None
-    return not stays_clear(run.clearance, cell.arm, trace.position, 1.0 / cell.rate_hz)
+    assert not cell.dropped, "no command of a campaign's run grows old"
+    ticks = [image_tick(k, cell.inner_rate_hz, cell.rate_hz) for k in range(len(trace.rates) + 1)]
+    dt = 1.0 / cell.inner_rate_hz
+    return not stays_clear(run.clearance, cell.arm, cell.start, dt, trace.rates, np.diff(ticks))
 
 
 def _refused(trial: Trial, reason: str) -> TrialResult:

@@ -1,32 +1,34 @@
-"""Whether a run of the batch kernel, which knows of no bodies, may have touched any."""
+"""Whether a run of the batch kernel, which knows of no bodies, keeps clear of them."""
 
-import numpy as np
-
-from vergence.arrays import FloatArray
-from vergence.control.clear_braking import SHARE
+from vergence.arrays import FloatArray, IntArray
+from vergence.control import ClearBraking, Guard
 from vergence.robot import Arm, Clearance
 
 
-def stays_clear(clearance: Clearance, arm: Arm, position: FloatArray, period_s: float) -> bool:
-    """Return whether the guard would have let every set-point pass, for sure.
-
-    Between two images a joint that moved by Δq has no rate above |Δq|/T + q̈_max T. By what it may
-    move at that, and then on braking, no distance changes by more than `Clearance.reach` says.
+def stays_clear(
+    clearance: Clearance,
+    arm: Arm,
+    start: FloatArray,
+    dt: float,
+    rates: FloatArray,
+    ticks: IntArray,
+) -> bool:
+    """Return whether the guard lets every set-point of a run pass, as it would in the loop.
 
     Args:
         clearance: what is to be kept apart.
         arm: with its limits.
-        position: joints at each image, (K, n).
-        period_s: T, between two images.
+        start: joint positions, (n,).
+        dt: inner period, s.
+        rates: that the law asked for from each image on, (K, n).
+        ticks: for how many inner periods, (K,).
     """
-    a, kept = arm.acceleration_max, SHARE * clearance.margin
-    moves = np.abs(np.diff(position, axis=0, append=position[-1:]))
-    fastest = np.minimum(moves / period_s + a * period_s, arm.rate_max)
-    ahead = fastest * period_s + fastest**2 / (2.0 * a)
-    q, room = None, np.empty(0)
-    for k in range(len(position)):
-        if q is None or (clearance.reach @ (np.abs(position[k] - q) + ahead[k]) >= room).any():
-            q, room = position[k], clearance.distances(position[k]) - kept
-            if (clearance.reach @ ahead[k] >= room).any():
+    guard = Guard(arm, start, dt, ClearBraking(arm, clearance, dt))
+    for asked, count in zip(rates, ticks.tolist(), strict=True):
+        if guard.steps(asked, count) is not None:
+            continue
+        for _ in range(count):
+            guard.step(asked)
+            if guard.hindrance:
                 return False
     return True

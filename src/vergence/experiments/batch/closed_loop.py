@@ -43,6 +43,7 @@ class LoopRecord(NamedTuple):
     """What is kept of a run, rows an image; with one axis more in front, of many runs."""
 
     position: FloatArray  # (K, n) of the joints
+    rates: FloatArray  # (K, n) asked for until the next image, before an old command decays
     camera_m: FloatArray  # (K, 3) place of the camera in the world
     points_px: FloatArray  # (K, M, 2) true; NaN behind the camera
     stuck: BoolArray  # (n,) joints that a limit held back all the last period
@@ -127,12 +128,13 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
         run.ends_s[3],
     )
     tick, last_image, last_seen = 0, 0.0, 0.0
+    end = int(np.floor(duration * inner_hz + 0.5))  # the tick nearest to the end
     for k in range(len(run.arrived)):
         time, seen = tick / inner_hz, k - run.latency[0]
-        if time >= duration:
+        if tick >= end:
             return COMPLETED, tick, seen, 0.0
         tip = tip_frame(chain, q)
-        record.position[k] = q
+        record.position[k], record.rates[k] = q, 0.0
         record.camera_m[k, 0], record.camera_m[k, 1], record.camera_m[k, 2] = tip[3]
         project(tip, run.T_world_target[k], run.features, run.camera, record.points_px[k])
         if seen >= 0 and run.arrived[seen]:
@@ -152,7 +154,9 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
                     return TARGET_LOST, tick, seen + 1, time - last_seen
         elif time - last_image > image_s:
             return IMAGE_LATE, tick, seen, time - last_image
-        steps = image_tick(k + 1, inner_hz, outer_hz) - tick
+        record.rates[k] = rates
+        due = image_tick(k + 1, inner_hz, outer_hz)
+        steps = min(due, end) - tick
         if last_image == time:
             guarded_steps(q, velocity, rates, run.limits, 1.0 / inner_hz, steps, record.stuck)
         else:
@@ -162,7 +166,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
                 share = command_share(age_s, 1.0 / outer_hz, decay_s)
                 faded_step(q, velocity, share * rates, run.limits, 1.0 / inner_hz, record.stuck)
         tick += steps
-        if record.stuck.any():
+        if tick == due and record.stuck.any():
             return STUCK, tick, seen + 1, 0.0
     return COMPLETED, tick, len(run.arrived) - run.latency[0], 0.0
 
@@ -188,6 +192,7 @@ def run_one(runs: LoopInputs, records: LoopRecord, r: int) -> None:
     )
     record = LoopRecord(
         records.position[r],
+        records.rates[r],
         records.camera_m[r],
         records.points_px[r],
         records.stuck[r],

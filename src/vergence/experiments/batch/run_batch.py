@@ -29,6 +29,7 @@ class BatchTrace:
 
     outcome: Outcome
     position: FloatArray  # (K, n) joints at each outer tick
+    rates: FloatArray  # (K, n) that the law asked for from then on
     times: FloatArray  # (F,) s, of the images that the law was shown
     points_px: FloatArray  # (F, M, 2) true places of the features in them; NaN behind the camera
     camera_m: FloatArray  # (F, 3) place of the camera in the world
@@ -85,6 +86,7 @@ def empty_records(inputs: LoopInputs) -> LoopRecord:
     """Return room for what is kept of runs."""
     (count, images), joints = inputs.arrived.shape, inputs.start.shape[1]
     return LoopRecord(
+        np.empty((count, images, joints)),
         np.empty((count, images, joints)),
         np.empty((count, images, 3)),
         np.empty(inputs.noise_px.shape),
@@ -165,6 +167,7 @@ def _trace(run: KinematicRun, inputs: LoopInputs, records: LoopRecord, r: int) -
     return BatchTrace(
         _outcome(run, records, r),
         records.position[r, : images + run.cell.latency_frames],
+        records.rates[r, : images + run.cell.latency_frames],
         _times(run, len(records.position[r]))[shown],
         records.points_px[r, shown],
         records.camera_m[r, shown],
