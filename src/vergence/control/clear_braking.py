@@ -45,7 +45,7 @@ class ClearBraking:
         return self._between(setpoint, pairs, (0, start), (last, end))
 
     def stays_clear(self, q: FloatArray, fastest: FloatArray, seconds: float) -> bool:
-        """Tell whether nothing can hinder set-points that start at q, for sure.
+        """Return whether nothing can hinder set-points that start at q, for sure.
 
         Args:
             q: joint positions, (n,).

@@ -205,7 +205,7 @@ class Braking(Protocol):
         ...
 
     def stays_clear(self, q: FloatArray, fastest: FloatArray, seconds: float) -> bool:
-        """Tell whether, for sure, no set-point is hindered that moves for so long from q (n,).
+        """Return whether, for sure, no set-point is hindered that moves for so long from q (n,).
 
         Args:
             q: joint positions, (n,).
@@ -301,7 +301,7 @@ class Guard:
         return self.setpoint
 
     def _stays_clear(self, count: int) -> bool:
-        """Tell whether the next steps need not be looked at one by one."""
+        """Return whether the next steps need not be looked at one by one."""
         if self._braking is None:
             return True
         q, (low, high, rate_max, _) = self._position, self._limits
