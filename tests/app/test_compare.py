@@ -91,7 +91,7 @@ def test_a_second_run_in_the_same_folder_continues_and_says_the_same(
     results = Path("c/results.jsonl").read_bytes()
     assert command(*COMPARE, "--out", "c") == 0
     # But for how fast it was, as nothing was run.
-    again = re.sub(r"[\d.]+ runs per CPU second; ", "", first)
+    again = re.sub(r"[\d.]+ runs per CPU second, set-up included; ", "", first)
     assert again != first
     assert capsys.readouterr().out == again
     assert Path("c/results.jsonl").read_bytes() == results

@@ -65,7 +65,7 @@ class Campaign(NamedTuple):
         made = ", ".join(f"{count} in {_MADE_IN[name]}" for name, count in self.made_in.items())
         if self.runs_per_cpu_s is None:
             return made
-        return f"{self.runs_per_cpu_s:.3g} runs per CPU second; {made}"
+        return f"{self.runs_per_cpu_s:.3g} runs per CPU second, set-up included; {made}"
 
     def as_json(self) -> dict[str, Any]:
         """Return the same as JSON values."""
