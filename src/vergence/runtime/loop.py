@@ -39,7 +39,8 @@ class Loop:
     Each inner tick reads a sample, checks it, and hands guarded set-points to the driver. An image
     is processed in the tick in which it arrives: perception, planner and law then give new joint
     rates. An `InnerLaw` is asked for rates at each inner tick, any other's are kept until the next
-    image is due. Without it the rates fade to zero.
+    image is due. Without it the rates fade to zero. On an `ExactDriver`, the ticks until something
+    can happen are taken at once, with the same result.
 
     Args:
         driver: the cell.
