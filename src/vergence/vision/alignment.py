@@ -23,6 +23,7 @@ STEPS = 12
 CONVERGED_PX = 0.06  # a step; what is left after it is a tenth
 NOISE_GREY = 16.0  # grey levels; scales the prior on the affine matrix, nothing else
 FORM_DEVIATION = 0.02  # how far the affine matrix strays from what is expected
+FORM_PRIOR = (NOISE_GREY / FORM_DEVIATION) ** 2
 
 
 def _root_weights() -> Patch:
@@ -105,9 +106,8 @@ def fill_template(
     squares = np.sum(J[6].astype(np.float64) ** 2)
     out.facts[0], out.facts[1], out.facts[2], out.facts[3] = offset_x, offset_y, mean, squares
     normal = J.astype(np.float64) @ J.astype(np.float64).T
-    prior = (NOISE_GREY / FORM_DEVIATION) ** 2
     for k in range(2, 6):
-        normal[k, k] += prior
+        normal[k, k] += FORM_PRIOR
     for k in range(UNKNOWNS):
         normal[k, k] += 1e-3  # keeps a patch without texture invertible
     out.inverse[FREE] = np.linalg.inv(normal)
@@ -182,7 +182,6 @@ def align(
         form: FREE, or RIGID to keep A as it is.
         work: the area, and memory.
     """
-    prior = (NOISE_GREY / FORM_DEVIATION) ** 2
     strayed, right, q = np.zeros(4), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
     gain, steps = 1.0, 0
     for step in range(STEPS):
@@ -191,7 +190,7 @@ def align(
         for k in range(UNKNOWNS):
             right[k] = product(template.jacobian[k], work.sample)
         for k in range(4):
-            right[2 + k] += prior * gain * strayed[k]
+            right[2 + k] += FORM_PRIOR * gain * strayed[k]
         for k in range(UNKNOWNS):
             total = 0.0
             for m in range(UNKNOWNS):

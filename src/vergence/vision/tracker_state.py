@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.vision.alignment import (
     AREA_PX,
+    FORM_DEVIATION,
+    FORM_PRIOR,
     FREE,
     PATCH_PX,
     RESAMPLING_SIZE,
@@ -50,7 +52,7 @@ LOST_CORRELATION = 0.75
 LOST_SHIFT_PX = 4.0  # search and alignment must agree within this
 SAME_PX = 2.0  # nearer than this places are one: the alignment leads to the same
 PROMISING = 0.3  # least correlation before an alignment that is worth one
-MOST_PLACES = 10  # where a point may be: by the search, as expected, as neighbours move, by twins
+MOST_PLACES = 12  # where a point may be: by the search, as expected, as neighbours move, by twins
 TWINS = 2  # nearest look-alikes of a point that are remembered
 TWIN_RANGE_PX = 16.0  # within which they are searched for in the first image
 TWIN_STEP_PX = 3.0  # and how densely: an alignment that starts so near finds its place
@@ -333,12 +335,15 @@ def settle_all(
         if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
             settle(image, start_x, start_y, k, state, places[count])
             count += places[count, VERDICT] == FOUND
-    for twin in twins_of(state, k):
+    for twin in twins_of(state, k):  # the place found may be the twin's, and the twin's its twin's
+        if twin[0] == twin[1] == 0.0:
+            continue
         away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
-        start_x, start_y = places[0, 0] + away[0], places[0, 1] + away[1]
-        if nearest(places[:count, :2], start_x, start_y) >= SAME_PX:
-            settle(image, start_x, start_y, k, state, places[count])
-            count += places[count, VERDICT] == FOUND
+        for sign in (1.0, -1.0):
+            start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
+            if nearest(places[:count, :2], start_x, start_y) >= SAME_PX:
+                settle(image, start_x, start_y, k, state, places[count])
+                count += places[count, VERDICT] == FOUND
     return count
 
 
@@ -413,7 +418,7 @@ def settle(
     out[VERDICT] = verdict
     if verdict == FOUND:
         out[0], out[1] = point_x, point_y
-        out[COVARIANCE] = place_covariance(state, k, key, A, found).reshape(4)
+        out[COVARIANCE] = place_covariance(state, k, key, before, A, found).reshape(4)
         out[COLUMNS:] = product2(A, key_affine).reshape(4)
 
 
@@ -429,17 +434,43 @@ def take_over(image: ImageArray, k: int, state: TrackerState, place: FloatArray)
 
 @njit(cache=True, inline="always")
 def place_covariance(
-    state: TrackerState, k: int, key: int, A: FloatArray, found: Alignment
+    state: TrackerState, k: int, key: int, before: FloatArray, A: FloatArray, found: Alignment
 ) -> FloatArray:
-    """Covariance of a found place: of this alignment, and of the key template's own place.
+    """Covariance of a found place: of this alignment, its prior, and the key template's own place.
 
-    A S Aᵀ + A C_key Aᵀ, with S the template's spread for the noise that the residual shows.
+    A S Aᵀ + A F Aᵀ + A C_key Aᵀ, with S the template's spread for the noise that the residual
+    shows, and F what the prior on the form, the affine matrix expected before, holds back.
     """
+    template = key_template_of(state, k, key)
     inner = key_covariance_of(state, k, key).copy()
-    inner += honest_spread(key_template_of(state, k, key).spread, found.residual / found.gain)
+    inner += honest_spread(template.spread, found.residual / found.gain)
+    inner += spread_by_form(template, product2(inverse2(before), A))
     out = product2(product2(A, inner), A.T)
     out[0, 0] += FLOOR_PX**2
     out[1, 1] += FLOOR_PX**2
+    return out
+
+
+@njit(cache=True, inline="always")
+def spread_by_form(template: AlignmentTemplate, changed: FloatArray) -> FloatArray:
+    """Covariance of a place, (2, 2) px², since its patch may have changed form more than found.
+
+    With the normal matrix N and the prior Λ, an alignment that expects the form of before misses
+    the place by N⁻¹ Λ a for a change a. Where the patch shows the change, this is nothing; a
+    mark in one of its corners hides a turn about the mark, which moves the point.
+
+    Args:
+        template: of the patch.
+        changed: how the affine matrix changed, as far as found, (2, 2).
+    """
+    apart = (changed[0, 0] - 1.0) ** 2 + (changed[1, 1] - 1.0) ** 2
+    square = FORM_DEVIATION**2 + 0.5 * (apart + changed[0, 1] ** 2 + changed[1, 0] ** 2)
+    missed, out = template.inverse[FREE, :2, 2:6], np.zeros((2, 2))
+    for row in range(2):
+        for column in range(2):
+            for k in range(4):
+                out[row, column] += missed[row, k] * missed[column, k]
+    out *= square * FORM_PRIOR**2
     return out
 
 
