@@ -36,3 +36,13 @@ def test_scenes_are_answered_the_same_way_for_the_same_seed(part: str) -> None:
         assert repr(answers[0]) == repr(answers[1])
         assert answers[0]
         assert all(a.kind.endswith(module.KINDS[number]) for a in answers[0])
+
+
+@pytest.mark.parametrize("number", [53, 141, 153, 229, 325, 645, 785])
+def test_points_whose_marks_hide_a_turn_or_have_twins_are_within_five_deviations(
+    number: int,
+) -> None:
+    random = np.random.default_rng([0, list(SCENES).index("points"), number])
+    answers = import_module("vergence.studies.honesty_points").try_scene(random, number)
+    assert len(answers) == 5
+    assert all(answer.deviations <= 5.0 for answer in answers if answer.explanations)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.vision.alignment import (
     AREA_PX,
-    FORM_DEVIATION,
     FORM_PRIOR,
     FREE,
     PATCH_PX,
@@ -336,8 +335,6 @@ def settle_all(
             settle(image, start_x, start_y, k, state, places[count])
             count += places[count, VERDICT] == FOUND
     for twin in twins_of(state, k):  # the place found may be the twin's, and the twin's its twin's
-        if twin[0] == twin[1] == 0.0:
-            continue
         away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
         for sign in (1.0, -1.0):
             start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
@@ -464,7 +461,7 @@ def spread_by_form(template: AlignmentTemplate, changed: FloatArray) -> FloatArr
         changed: how the affine matrix changed, as far as found, (2, 2).
     """
     apart = (changed[0, 0] - 1.0) ** 2 + (changed[1, 1] - 1.0) ** 2
-    square = FORM_DEVIATION**2 + 0.5 * (apart + changed[0, 1] ** 2 + changed[1, 0] ** 2)
+    square = 0.5 * (apart + changed[0, 1] ** 2 + changed[1, 0] ** 2)
     missed, out = template.inverse[FREE, :2, 2:6], np.zeros((2, 2))
     for row in range(2):
         for column in range(2):
