@@ -94,3 +94,13 @@ def test_a_target_that_no_camera_sees_at_the_start_is_named() -> None:
     with pytest.raises(InputError) as caught:
         vg.run("two_blocks", images=False, targets={"block": {"position_m": [9.0, 0.0, 0.0]}})
     assert caught.value.key == "targets.block"
+
+
+def test_features_lie_on_the_surface_of_the_target_that_has_them() -> None:
+    front = [[-0.08, -0.06, -0.05], [0.08, -0.06, -0.05], [0.015, -0.06, 0.0]]
+    top = [[-0.08, -0.06, 0.055], [-0.07, 0.06, 0.055], [-0.01, 0.0557143, 0.055]]
+    run = vg.run(
+        "two_blocks", images=False, duration_s=2.0, targets={"block": {"features": front + top}}
+    )
+    assert run.outcome.succeeded
+    assert run.summary["final_pose_error_m"] < 5e-3

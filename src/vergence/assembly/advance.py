@@ -9,8 +9,9 @@ from vergence.arrays import FloatArray
 from vergence.assembly.build_law import mounting_of
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.pose import follow_pose, target_shape
+from vergence.assembly.pose import follow_pose
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.target_geometry import target_shape
 from vergence.cell.schema import AdvanceTable
 from vergence.control.along_line import AlongLine
 from vergence.planning import PlanFailure

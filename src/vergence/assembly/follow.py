@@ -2,10 +2,12 @@
 
 from vergence.arrays import FloatArray
 from vergence.assembly.build_law import build_law
+from vergence.assembly.camera_poses import camera_poses
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.pose import camera_poses, follow_pose, target_shape
+from vergence.assembly.pose import follow_pose
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.target_geometry import target_shape
 from vergence.cell.schema import FollowTable, Placement
 from vergence.errors import InputError
 from vergence.geometry import se3_compose, se3_inverse

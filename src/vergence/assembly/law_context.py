@@ -172,7 +172,7 @@ class LawContext:
 
     def target_corners(self) -> FloatArray:
         """Return the points that represent the target in its frame, (K, 3), m."""
-        from vergence.assembly.pose import target_shape
+        from vergence.assembly.target_geometry import target_shape
 
         return target_shape(self.cell, self.model).corners
 

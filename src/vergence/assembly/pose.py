@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.assembly.camera_poses import camera_poses
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.measure import CornerWindows, with_noise, with_outliers
 from vergence.assembly.tag import TagFinder
 from vergence.assembly.target_faces import shape_around
+from vergence.assembly.target_geometry import target_shape
 from vergence.cell import Cell
-from vergence.cell.named_targets import naming_target, target_body
+from vergence.cell.named_targets import naming_target
 from vergence.errors import InputError
 from vergence.estimation import (
     Blocked,
@@ -41,23 +43,10 @@ from vergence.signals import Frame
 from vergence.simulation import ExactCorners
 
 if TYPE_CHECKING:
-    from vergence.simulation.cell_model import CellModel
     from vergence.vision.known_object import ObjectModel
 
 _LEAST_M, _LEAST_RAD = 1e-3, 2e-3  # no start is known better
 _START_VELOCITY = (0.1, 0.3)  # m/s and rad/s, standard deviations about rest
-
-
-def target_shape(cell: Cell, model: "CellModel") -> "ObjectModel":
-    """Return the target's geometry; its features are the file's, else what represents it."""
-    from vergence.vision.known_object import ObjectModel, as_followed, object_model_of
-
-    if cell.target.tag is not None:
-        name, tag = f"tag {cell.target.tag.id}", cell.target.tag
-        return ObjectModel.from_face(name, tag.corners)
-    if cell.target.features:
-        return ObjectModel.from_corners(str(cell.target.model), cell.target.features)
-    return as_followed(object_model_of(model.model, target_body(cell.target_name)))
 
 
 def follow_pose(
@@ -229,24 +218,6 @@ def _surroundings(context: LawContext) -> Surroundings:
         se3_compose(se3_inverse(tip_pose(context.joints)), start),
         tip_pose,
     )
-
-
-def camera_poses(context: LawContext) -> CameraPose:
-    """Return the function from a camera's name and joints at the exposure to T_world_camera."""
-    cameras = context.cell.cameras
-    fixed = {n: context.model.camera_pose(n) for n, t in cameras.items() if t.arm is None}
-    carried = {
-        n: (t.arm, context.arm_to_camera(n).chain) for n, t in cameras.items() if t.arm is not None
-    }
-
-    def pose(camera: str, joints: Joints) -> FloatArray:
-        if camera in fixed:
-            return fixed[camera]
-        arm, chain = carried[camera]
-        T_world_camera: FloatArray = forward_kinematics(chain, joints[arm])
-        return T_world_camera
-
-    return pose
 
 
 def _blocked_at(context: LawContext) -> Callable[[Frame], Blocked]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
+from vergence.assembly.camera_poses import camera_poses
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.started_driver import StartedDriver
 from vergence.cell import Cell
@@ -130,8 +131,6 @@ def located(context: LawContext, driver: StartedDriver) -> Located:
 
 def _first_pose(context: LawContext, driver: StartedDriver, finder: TagFinder) -> PoseFit | NoPose:
     """Return the pose of the target by the first images of all cameras."""
-    from vergence.assembly.pose import camera_poses
-
     tag, source = context.cell.target.tag, str(context.cell.path)
     assert tag is not None
     camera_pose, views = camera_poses(context), []

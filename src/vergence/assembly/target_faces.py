@@ -6,6 +6,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.assembly.law_context import LawContext
+from vergence.cell.named_targets import target_body
 from vergence.control.aligned import aligned
 from vergence.estimation import TargetShape
 from vergence.estimation.feature_faces import FeatureFaces
@@ -55,7 +56,7 @@ def shape_around(context: LawContext, points: FloatArray) -> TargetShape:
     """Return the target with points (M, 3) for features and what the cell draws for its surface."""
     from vergence.vision.known_object import surface_of
 
-    surface = surface_of(context.model.model, "target")
+    surface = surface_of(context.model.model, target_body(context.cell.target_name))
     if surface is None:
         return TargetShape.from_points(points)
     return TargetShape.from_mesh(points, *surface)

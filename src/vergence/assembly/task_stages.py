@@ -1,9 +1,9 @@
 """From the parts of a task to the stages that the loop runs it by."""
 
 from vergence.arrays import FloatArray
+from vergence.assembly.camera_poses import camera_poses
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.pose import camera_poses
 from vergence.cell import Cell
 from vergence.cell.schema import AdvanceTable, ReachTable, SwitchTable, Task, TrackTable
 from vergence.errors import InputError

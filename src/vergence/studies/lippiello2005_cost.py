@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.assembly.measure import CornerWindows
-from vergence.assembly.pose import target_shape
+from vergence.assembly.target_geometry import target_shape
 from vergence.cell import Cell
 from vergence.estimation import (
     Belief,

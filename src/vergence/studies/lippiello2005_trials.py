@@ -9,9 +9,10 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.assembly import run_cell
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.pose import follow_pose, target_shape
+from vergence.assembly.pose import follow_pose
 from vergence.assembly.run_cell import run_driver
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.target_geometry import target_shape
 from vergence.cell import Cell
 from vergence.geometry import se3_inverse
 from vergence.runtime import DriverWrapper, Run
