@@ -328,7 +328,9 @@ def test_an_output_may_be_a_service_and_what_it_refuses_ends_the_run() -> None:
 
 def test_an_output_that_nobody_listens_to_or_of_another_type_is_refused() -> None:
     with robot(outputs={"odd": "JointState"}) as made:
-        with pytest.raises(DriverSilent, match="nobody listens on /none, the topic of output lamp"):
+        with pytest.raises(
+            DriverSilent, match="no node listens on /none, the topic of output lamp"
+        ):
             made.open(outputs={"lamp": "/none"}, connect_s=8.0)
         with pytest.raises(
             DriverSilent, match="output odd, is of sensor_msgs/msg/JointState, not of"
