@@ -331,7 +331,7 @@ def test_copies_of_an_image_count_once() -> None:
     fit, twice = lens(seen), lens(seen + again)
     np.testing.assert_allclose(twice.deviations, fit.deviations, rtol=1e-9)
     assert [bad.name for bad in twice.bad] == [s.name for s in again]
-    assert "where 000.png shows it" in twice.bad[0].reason
+    assert "at the same place as in 000.png" in twice.bad[0].reason
     alone = fit_lens([seen[0]._replace(name=f"{n}.png") for n in range(20)], 640, 480)
     assert not alone
     assert "found in 1 different images without 19 copies" in str(alone)

@@ -53,7 +53,7 @@ def test_a_pose_is_told_between_any_two_frames_of_a_tree() -> None:
 def test_frames_that_are_not_connected_move_or_are_no_poses_are_told_by_name() -> None:
     rng = np.random.default_rng(4)
     frames, T = Frames(), drawn(rng)
-    assert frames.wrong("a", "b") == "TF does not connect a with b; nobody tells it anything"
+    assert frames.wrong("a", "b") == "TF does not connect a with b; it has received no transforms"
     frames.take(message("a", "b", T))
     frames.take(message("b", "head", T))
     frames.take(message("b", "nothing", T, scale=0.0))
