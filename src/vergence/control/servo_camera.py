@@ -1,6 +1,7 @@
 """One camera of a servo: where it is, what it saw last, and how its features move."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ from vergence.camera import Camera
 from vergence.control.aligned import aligned, lifted
 from vergence.control.image_motion import ImageMotion, MotionSettings
 from vergence.control.mounting import CameraMounting
-from vergence.control.objectives import CameraState
+from vergence.control.objectives import CameraState, state_of
 from vergence.control.point_weights import point_weights, row_variance
 from vergence.errors import NOTHING, Absent, InputError
 from vergence.estimation.feature_faces import FeatureFaces, faces_in_view
@@ -148,17 +149,9 @@ class ServoCamera:
             desired: as they should be.
             q: joint positions, (n,).
         """
-        return CameraState(
-            self.mounting,
-            features.points,
-            features.depth_m,
-            np.zeros_like(features.points),
-            desired.points,
-            desired_depth_m=desired.depth_m,
-            count=len(features.points),
-            period_s=self._period_s,
-            **self._pose(q),
-        )
+        known = state_of(features, desired)
+        own = {"mounting": self.mounting, "period_s": self._period_s, **self._pose(q)}
+        return replace(known, **own)
 
     def _shown(
         self, found: BoolArray, now: FloatArray, desired: FloatArray | None, reference: Reference
