@@ -63,7 +63,7 @@ def reference() -> Iterator[str]:
 
 
 _ROLES = (  # of parts, and where they stand in the file
-    ("objective", "law"), ("limits", "law.limits"), ("solver", "law.solver"),
+    ("objective", "law"), ("gain", "law.gain"), ("limits", "law.limits"), ("solver", "law.solver"),
     ("planner", "task.planner"), ("tracker", "task.tracker"), ("filter", "perception.filter"),
     ("task_end", "task.until"), ("motion", "target.motion"), ("arm_motion", "arms.NAME.motion"),
     ("driver", "driver"), ("camera_source", "driver.cameras.NAME"),

@@ -15,6 +15,7 @@ _ROOMS = {
     "camera.calibration": ("calibrate_lens", "calibrate_mounting"),
     "cell": ("Cell", "load_cell"),
     "control": (
+        "AdaptiveGain",
         "CameraState",
         "Guard",
         "ImageBased",

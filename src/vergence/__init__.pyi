@@ -8,6 +8,7 @@ from vergence.camera.calibration import calibrate_lens as calibrate_lens
 from vergence.camera.calibration import calibrate_mounting as calibrate_mounting
 from vergence.cell import Cell as Cell
 from vergence.cell import load_cell as load_cell
+from vergence.control import AdaptiveGain as AdaptiveGain
 from vergence.control import CameraState as CameraState
 from vergence.control import Guard as Guard
 from vergence.control import ImageBased as ImageBased

@@ -45,6 +45,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "point_pose": f"{_CONTROL}.objectives:PointPose",
         "posture": f"{_CONTROL}.objectives:Posture",
     },
+    "gain": {"adaptive": f"{_CONTROL}:AdaptiveGain"},
     "limit": {},
     "driver": {
         "franka": "vergence.drivers.franka:Franka",

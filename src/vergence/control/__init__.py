@@ -27,8 +27,10 @@ from vergence.control.mounting import CameraMounting
 from vergence.control.moving_pose import MovingPose, moved, pose_difference
 from vergence.control.objectives import (
     AXES,
+    AdaptiveGain,
     CameraState,
     CameraVelocity,
+    Gain,
     ImageBased,
     InteractionModel,
     JointQuadratic,
@@ -40,6 +42,7 @@ from vergence.control.objectives import (
     Quadratic,
     TrackingSetup,
     axis_mask,
+    gain_at,
     least_squares,
     optimal_tracking_tick,
     pack_setup,
@@ -61,6 +64,7 @@ from vergence.control.term import Term
 
 __all__ = [
     "AXES",
+    "AdaptiveGain",
     "Braking",
     "CameraMounting",
     "CameraState",
@@ -73,6 +77,7 @@ __all__ = [
     "DepthFromMotion",
     "DepthFromPose",
     "FeatureState",
+    "Gain",
     "Guard",
     "HeldDepth",
     "ImageBased",
@@ -108,6 +113,7 @@ __all__ = [
     "WeightedObjective",
     "axis_mask",
     "closing_rates",
+    "gain_at",
     "guarded_step",
     "guarded_steps",
     "least_squares",

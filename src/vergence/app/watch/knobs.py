@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args, get_origin
 from vergence.cell import Cell
 from vergence.control import PositionBased, QuadraticProgram, ServoSettings
 from vergence.errors import InputError
-from vergence.parts import kind_of, written
+from vergence.parts import is_part, kind_of, written
 from vergence.registry import kinds
 
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
@@ -69,6 +69,9 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
         if not extra.get("live", False):
             continue
         value = getattr(part, name)
+        if is_part(value):  # such as an adaptive gain, by its own numbers
+            yield from _of_part(f"{begin}{name}.", value)
+            continue
         knob: dict[str, Any] = {
             "key": begin + name,
             "label": _label(begin + name, extra.get("unit", "")),
@@ -93,9 +96,11 @@ def _label(key: str, unit: str) -> str:
 
 
 def _range(about: Any) -> dict[str, float]:
-    """Return the lowest and the highest value that a field takes."""
+    """Return the lowest and the highest value that a field takes as a number."""
     found = {}
-    for bound in about.metadata:
+    options = (getattr(option, "__metadata__", ()) for option in get_args(about.annotation))
+    inside = [bound for option in options for each in option for bound in each.metadata]
+    for bound in (*about.metadata, *inside):
         for name, end in (("gt", "low"), ("ge", "low"), ("lt", "high"), ("le", "high")):
             if (value := getattr(bound, name, None)) is not None:
                 found[end] = float(value)

@@ -11,6 +11,7 @@ from vergence.control.objectives._tracking import (
     unpack_tick,
 )
 from vergence.control.objectives.camera_velocity import CameraVelocity
+from vergence.control.objectives.gain import AdaptiveGain, Gain, gain_at
 from vergence.control.objectives.image_based import ImageBased, InteractionModel
 from vergence.control.objectives.objective import (
     CameraState,
@@ -32,8 +33,10 @@ from vergence.control.objectives.posture import Posture
 
 __all__ = [
     "AXES",
+    "AdaptiveGain",
     "CameraState",
     "CameraVelocity",
+    "Gain",
     "ImageBased",
     "InteractionModel",
     "JointQuadratic",
@@ -49,6 +52,7 @@ __all__ = [
     "TrackingSetup",
     "TrackingTick",
     "axis_mask",
+    "gain_at",
     "least_squares",
     "optimal_tracking_tick",
     "pack_setup",

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.control.objectives.gain import Gain, gain_at
 from vergence.control.objectives.objective import (
     CameraState,
     Quadratic,
@@ -27,7 +28,7 @@ class ImageBased:
     Points count by how well their places are known; any other feature is of all points alike.
     """
 
-    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
     interaction: InteractionModel = knob("mean")  # where L is evaluated
     # Feature computed from the image points.
     feature: type[Feature] = slot("feature", Points, by_class=True)
@@ -40,7 +41,9 @@ class ImageBased:
         assert desired is not None
         desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
         if self.feature is Points:
-            change = -self.gain * (state.points - desired) - state.flow
+            error = state.points - desired
+            gain = gain_at(self.gain, error)
+            change = -gain * error - state.flow
             if state.desired_velocity is not None:
                 change = change + state.desired_velocity
             L = self._interaction(
@@ -54,7 +57,9 @@ class ImageBased:
         else:
             now = self.feature(state.points, state.depth_m)
             goal = self.feature(desired, desired_depth)
-            rows = -self.gain * now.error(goal) - now.drift(state.flow)
+            error = now.error(goal)
+            gain = gain_at(self.gain, error)
+            rows = -gain * error - now.drift(state.flow)
             if state.desired_velocity is not None:
                 rows = rows + goal.drift(state.desired_velocity)
             L = np.ascontiguousarray(
@@ -63,7 +68,7 @@ class ImageBased:
         damping = np.full(6, self.damping)
         result: Quadratic = least_squares_kernel(L, rows, np.ones(len(L)), damping)
         if self.feature is Points:
-            return result._replace(variance=self.gain**2 * state.variance)
+            return result._replace(variance=gain**2 * state.variance)
         return result
 
     def twist(self, features: Points, desired: Points) -> FloatArray:

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from vergence.arrays import FloatArray
+from vergence.control.objectives.gain import Gain, gain_at
 from vergence.control.objectives.objective import CameraState, Quadratic
 from vergence.control.objectives.optimal_tracking import AXES, Axis, axis_mask
 from vergence.geometry import so3_log
@@ -21,7 +22,7 @@ class PointPose:
     it is the law of [Malis1999], "2½D".
     """
 
-    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
     # Camera axes that it controls; it leaves the others to other objectives.
     axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(AXES)
 
@@ -33,8 +34,9 @@ class PointPose:
         mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
         R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
         t = goal.mean(0) - R @ seen.mean(0)
-        v = -self.gain * np.concatenate((R.T @ t, so3_log(R)))
         controlled = axis_mask(self.axes)
+        error = np.concatenate((R.T @ t, so3_log(R)))
+        v = -gain_at(self.gain, error[controlled]) * error
         return Quadratic(np.diag(controlled.astype(np.float64)), np.where(controlled, v, 0.0))
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.control.objectives.gain import Gain, gain_at
 from vergence.control.objectives.objective import CameraState, JointQuadratic
 from vergence.errors import InputError
 from vergence.parts import knob, part
@@ -15,7 +16,7 @@ class Posture:
     With the pseudo-inverse it acts in the null space of the other objectives.
     """
 
-    gain: float = knob(1.0, "1/s", above=0, upto=100)  # λ
+    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
     # Desired joint positions, rad or m; the middle of each range if absent.
     position: tuple[float, ...] | None = knob(None)
     strength: float = knob(1e-4, above=0, upto=1e3)  # weight
@@ -25,7 +26,8 @@ class Posture:
         assert state.arm is not None
         assert state.q is not None
         n = state.arm.joint_count
-        rates = -self.gain * (state.q - self._desired(state))
+        error = state.q - self._desired(state)
+        rates = -gain_at(self.gain, error) * error
         return JointQuadratic(self.strength * np.eye(n), self.strength * rates)
 
     def _desired(self, state: CameraState) -> FloatArray:

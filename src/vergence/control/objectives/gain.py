@@ -1,0 +1,63 @@
+"""The gain of an objective: one number, or one that falls with the size of the error."""
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from vergence.arrays import FloatArray
+from vergence.errors import InputError
+from vergence.parts import knob, part
+
+_MOST = 100.0  # 1/s
+
+
+@part("gain", "adaptive")
+class AdaptiveGain:
+    """High near the goal, low far from it: λ(x) = (near - far) exp(-slope x / (near - far)) + far.
+
+    x is the largest component of the error without its sign, in the units of the feature:
+    normalized coordinates for points, m and rad for a pose. With near = far it is constant.
+    The same function, with the same x, as ViSP's `vpAdaptiveGain`.
+    """
+
+    near: float = knob(unit="1/s", above=0, upto=_MOST)  # λ at the goal
+    far: float = knob(unit="1/s", above=0, upto=_MOST)  # λ far from it; at most `near`
+    # How fast λ falls with x at the goal.
+    slope: float = knob(unit="1/s per unit of the error", above=0, upto=1e6)
+
+    def __post_init__(self) -> None:
+        if self.far > self.near:
+            allowed = f"at most near, {self.near:g}: a gain that is lower far from the goal"
+            raise InputError("AdaptiveGain", "far", self.far, allowed)
+
+    def at(self, error: FloatArray) -> float:
+        """Return λ, 1/s, for an error of any shape."""
+        if self.near == self.far or not error.size:
+            return self.near
+        range_ = self.near - self.far
+        x = float(np.abs(error).max())
+        return range_ * math.exp(-self.slope * x / range_) + self.far
+
+
+def _number_or_table(given: Any) -> Any:
+    """Return the adaptive gain of a table, with messages of its own; a number as it is."""
+    if isinstance(given, Mapping):
+        return AdaptiveGain(**given)
+    if not isinstance(given, Real | AdaptiveGain):
+        raise InputError("", "", given, "a number, or a table of near, far and slope")
+    return given
+
+
+# What an objective takes as its gain, 1/s.
+Gain: TypeAlias = Annotated[
+    Annotated[float, Field(gt=0, le=_MOST)] | AdaptiveGain, BeforeValidator(_number_or_table)
+]
+
+
+def gain_at(gain: Gain, error: FloatArray) -> float:
+    """Return λ, 1/s, of a constant or adaptive gain for an error of any shape."""
+    return gain.at(error) if isinstance(gain, AdaptiveGain) else gain
