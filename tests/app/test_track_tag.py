@@ -84,7 +84,7 @@ def test_what_is_seen_instead_is_told() -> None:
         (["--tag", "apriltag_36h11:7:0"], "size_m: given 0.0; allowed: at least 0.001"),
         (["--tag", "apriltag_36h11:7:0.05", "--model", "a.obj"], "nothing together with --tag"),
         (["--model", "a.obj"], "--start: missing"),
-        ([], "--model with --start, or --tag"),
+        ([], "--model with --start, --tag, or --curve"),
     ],
 )
 def test_bad_options_are_named(

@@ -214,10 +214,11 @@ def reproduce(
 
 @app.command(
     epilog="Example: vergence track footage/ --model box.obj --fx 548 --start 0.02,0.1,0.5,0,180,0"
+    "    or vergence track footage/ --curve ellipse:160,120"
 )
 @takes(TrackOptions)
 def track(options: TrackOptions) -> int:
-    """Track a known object in recorded images: poses, covariances, an overlay film."""
+    """Track an object, a tag or curves in recorded images: values, covariances, an overlay film."""
     from vergence.app.track import track as command
 
     return command(options)

@@ -1,5 +1,6 @@
 """Visual features: what is seen, and how it moves when the camera does."""
 
+from vergence.features._moments import moments_of_polygon
 from vergence.features.centre import Centre
 from vergence.features.ellipse import Ellipse
 from vergence.features.feature import Feature
@@ -37,4 +38,5 @@ __all__ = [
     "VanishingPoint",
     "interaction_matrix_points",
     "inverse_depth_plane",
+    "moments_of_polygon",
 ]

@@ -20,7 +20,7 @@ class Modality(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
-    """Which footage, which object, and how it is followed."""
+    """Which footage, what is followed in it, and how."""
 
     images: Annotated[str, typer.Argument(help="A folder of images, a video, or a ROS 2 bag.")]
     model: Annotated[str | None, typer.Option(help="The object: an OBJ, STL or MJCF file.")] = None
@@ -30,6 +30,15 @@ class TrackOptions:
             metavar="DICTIONARY:ID:SIZE",
             help="Instead of --model: a marker, such as apriltag_36h11:7:0.05, its side in metres; "
             "it needs no --start.",
+        ),
+    ] = None
+    curve: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND:U,V,…",
+            help="Instead of --model: a curve in the first image, in pixels; may be repeated. "
+            "ellipse: one point inside, or five or more on it; line: two points on it; region: one "
+            "point inside; mark: one point. It needs no camera.",
         ),
     ] = None
     start: Annotated[
@@ -66,16 +75,25 @@ class TrackOptions:
         float, typer.Option(help="Metres per unit of the model file: 0.001 for millimetres.")
     ] = 1.0
     contrast: Annotated[
-        float, typer.Option(help="Smallest step in grey levels that counts as an edge.")
-    ] = 5.0
+        float | None,
+        typer.Option(
+            help="Smallest step in grey levels that counts as an edge. Default: 5, or 15 for a "
+            "curve."
+        ),
+    ] = None
     jolt: Annotated[
-        float, typer.Option(help="Unpredicted motion to allow for, in pixels per image.")
-    ] = 3.0
+        float | None,
+        typer.Option(
+            help="Unpredicted motion to allow for, in pixels per image. Default: 3, or 20 for a "
+            "curve."
+        ),
+    ] = None
     share: Annotated[
         float | None,
         typer.Option(
             help="Fraction of the edges, or of the outline, that must be found for an image to "
-            "count. Default: 0.5 of edges, 0.35 of an outline."
+            "count; of an ellipse, that must be in view. Default: 0.5 of edges, 0.35 of an "
+            "outline, 0.4 of an ellipse."
         ),
     ] = None
     by: Annotated[
@@ -86,7 +104,8 @@ class TrackOptions:
         ),
     ] = Modality.AUTO
     overlay: Annotated[
-        bool, typer.Option("--overlay/--no-overlay", help="Write a film with the object drawn in.")
+        bool,
+        typer.Option("--overlay/--no-overlay", help="Write a film with what is found drawn in."),
     ] = True
     out: Out = None
     as_json: Json = False

@@ -1,4 +1,4 @@
-"""`vergence track`: a known object in footage of one camera."""
+"""`vergence track`: an object, a tag or curves in footage of one camera."""
 
 from vergence.app.tracking.points import track_points
 from vergence.estimation.object_follower import FollowRule, ObjectFollower, Sighting, Step

@@ -1,36 +1,39 @@
 """The camera that took the footage."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from vergence.camera import Camera, camera_of
+from vergence.app.options.track import TrackOptions
+from vergence.app.tracking.footage import FootageFrame
+from vergence.camera import Camera, camera_of, read_camera
 from vergence.errors import NOTHING, InputError
 
 
-def camera_of_options(
-    values: Mapping[str, float | None], distortion: str | None, width: int, height: int
-) -> Camera:
-    """Make the camera that options describe; --fy is --fx and the centre the middle by default.
+def camera_of_options(options: TrackOptions, first: FootageFrame) -> Camera:
+    """Return the camera that options describe; --fy is --fx and the centre the middle by default.
 
     Args:
-        values: fx, fy, cx, cy, px.
-        distortion: k1,k2,p1,p2,k3, or fewer of them.
-        width: of the images.
-        height: of the images.
+        options: with a camera file, or intrinsics in pixels.
+        first: image of the footage.
 
     Raises:
-        InputError: if --fx is missing, or a value does not suit the image.
+        InputError: if neither or both are given, or a value does not suit the image.
     """
-    source = "vergence track"
-    if values["fx"] is None:
+    height, width = first.image.shape
+    given = {key: getattr(options, key) for key in ("fx", "fy", "cx", "cy", "distortion")}
+    if options.camera is not None:
+        for key, value in given.items():
+            if value is not None:
+                raise InputError("track", f"--{key}", value, "either --camera or intrinsics")
+        return read_camera(options.camera, width, height)
+    source, fx = "vergence track", options.fx
+    if fx is None:
         raise InputError(source, "--fx", NOTHING, "a focal length in pixels, or --camera FILE")
-    fx = values["fx"]
     table: dict[str, Any] = {
         "fx": fx,
-        "fy": fx if values["fy"] is None else values["fy"],
-        "cx": (width - 1) / 2 if values["cx"] is None else values["cx"],
-        "cy": (height - 1) / 2 if values["cy"] is None else values["cy"],
+        "fy": fx if options.fy is None else options.fy,
+        "cx": (width - 1) / 2 if options.cx is None else options.cx,
+        "cy": (height - 1) / 2 if options.cy is None else options.cy,
     }
-    if distortion is not None:
-        table["distortion"] = distortion.replace(",", " ").split()
+    if options.distortion is not None:
+        table["distortion"] = options.distortion.replace(",", " ").split()
     return camera_of(table, width, height, source, "--")

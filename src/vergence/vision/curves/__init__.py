@@ -6,8 +6,10 @@ from vergence.vision.curves.line_tracker import LineTracker
 from vergence.vision.curves.line_tracking import LineTracking
 from vergence.vision.curves.region_tracker import RegionTracker
 from vergence.vision.curves.region_tracking import RegionTracking
+from vergence.vision.curves.values import CurveValues
 
 __all__ = [
+    "CurveValues",
     "EllipseTracker",
     "EllipseTracking",
     "LineTracker",

@@ -9,6 +9,7 @@ from vergence.errors import InputError
 from vergence.geometry import EllipseShape, ellipse_through, unit_vectors
 from vergence.vision.curves.moving_edges import Steps, fit_steps, search_edges, straightened
 from vergence.vision.curves.patch import patch_at
+from vergence.vision.curves.values import CurveValues, ellipse_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 
@@ -77,6 +78,11 @@ class EllipseTracker:
     def shape(self) -> EllipseShape:
         """The ellipse where it was last found, px."""
         return self._last.shape
+
+    @property
+    def values(self) -> CurveValues:
+        """Its centre, semi-axes and angle, see `ellipse_values`."""
+        return ellipse_values(self._last.shape, self._last.covariance)
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Find the ellipse in a new image.

@@ -7,6 +7,7 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
 from vergence.vision.curves.moving_edges import BORDER_PX, FLOOR_PX, fit_steps, search_edges
+from vergence.vision.curves.values import CurveValues, line_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks
 
@@ -93,6 +94,11 @@ class LineTracker:
     def points_px(self) -> FloatArray:
         """The points that represent the lines where they were last found, (2 L, 2)."""
         return np.concatenate([fit.line.points(self._size) for fit in self._last])
+
+    @property
+    def values(self) -> tuple[CurveValues, ...]:
+        """ρ and θ of each line where it was last found, see `line_values`."""
+        return tuple(line_values(*fit.line, fit.covariance) for fit in self._last)
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Find the lines in a new image.

@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray, ImageArray
 
 _FIRST_HALF_PX = 24.0
 _LEAST_CONTRAST = 20.0  # grey values between the patch and what is around it
-_NEAR_PX = 3.0  # of a place beside the patch
+NEAR_PX = 3.0  # of a place beside the patch
 
 
 class Patch(NamedTuple):
@@ -23,9 +23,13 @@ class Patch(NamedTuple):
 
 
 def patch_at(
-    image: ImageArray, place_px: FloatArray, half_px: float = 0.0, light: bool | None = None
+    image: ImageArray,
+    place_px: FloatArray,
+    half_px: float = 0.0,
+    light: bool | None = None,
+    near_px: float = NEAR_PX,
 ) -> Patch | str:
-    """Return the patch that a place lies in, or why there is none.
+    """Return the patch that a place lies in, or the nearest one, or why there is none.
 
     The grey levels of a window are split in two by Otsu's threshold, halfway between the means of
     both sides; the window grows until its border does not cut the patch.
@@ -36,6 +40,7 @@ def patch_at(
         half_px: half the size of the first window.
         light: whether the patch is lighter than what is around it; if None, as the place is. If it
             is known, the place may lie in a hole of the patch.
+        near_px: how far beside the patch the place may lie.
     """
     height, width = image.shape
     u, v = place_px
@@ -46,7 +51,7 @@ def patch_at(
         left, right = max(int(u - half), 0), min(int(u + half) + 1, width)
         top, bottom = max(int(v - half), 0), min(int(v + half) + 1, height)
         whole = right - left == width and bottom - top == height
-        found = _in_window(image[top:bottom, left:right], place_px - (left, top), light)
+        found = _in_window(image[top:bottom, left:right], place_px - (left, top), light, near_px)
         if isinstance(found, str):
             if whole:
                 return found
@@ -63,7 +68,9 @@ def patch_at(
         half *= 2.0
 
 
-def _in_window(window: ImageArray, place: FloatArray, light: bool | None) -> Patch | str:
+def _in_window(
+    window: ImageArray, place: FloatArray, light: bool | None, near_px: float
+) -> Patch | str:
     import cv2
     from contourpy import FillType, contour_generator
 
@@ -84,19 +91,25 @@ def _in_window(window: ImageArray, place: FloatArray, light: bool | None) -> Pat
     contours = contour_generator(z=grey, fill_type=FillType.OuterOffset)
     filled: Any = contours.filled(sign * level, np.inf)
     patches, ends = filled
+    nearest, curves = near_px, None
     for points, offsets in zip(patches, ends, strict=True):
-        curves = [points[a : b - 1] for a, b in pairwise(offsets)]
-        if _reaches(curves[:1] if given else curves, place):
-            return Patch(curves[0], tuple(curves[1:]), light, above - below, False)
-    return "no patch there"
+        each = [points[a : b - 1] for a, b in pairwise(offsets)]
+        away = _distance(each[:1] if given else each, place)
+        if away < nearest:
+            nearest, curves = away, each
+    if curves is None:
+        return "no patch there"
+    return Patch(curves[0], tuple(curves[1:]), light, above - below, False)
 
 
-def _reaches(curves: list[FloatArray], place: FloatArray) -> bool:
-    """Return whether a place lies in a patch, or within a few pixels of it."""
+def _distance(curves: list[FloatArray], place: FloatArray) -> float:
+    """Return how far a place is from a patch, px; 0 if it lies in it."""
     import cv2
 
     first, *holes = [curve.astype(np.float32)[:, None] for curve in curves]
     at = (float(place[0]), float(place[1]))
-    if len(first) < 3 or cv2.pointPolygonTest(first, at, True) < -_NEAR_PX:
-        return False
-    return all(len(hole) < 3 or cv2.pointPolygonTest(hole, at, True) < _NEAR_PX for hole in holes)
+    if len(first) < 3:
+        return float("inf")
+    outside = [-cv2.pointPolygonTest(first, at, True)]
+    outside += [cv2.pointPolygonTest(hole, at, True) for hole in holes if len(hole) >= 3]
+    return max(0.0, *outside)

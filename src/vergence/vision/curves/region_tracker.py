@@ -6,8 +6,9 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.errors import InputError
-from vergence.vision.curves.patch import Patch, patch_at
+from vergence.vision.curves.patch import NEAR_PX, Patch, patch_at
 from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rings_of, signed_area
+from vergence.vision.curves.values import CurveValues, region_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 
@@ -16,6 +17,7 @@ _LEAST_AREA_PX = 60.0
 _LEAST_HOLE = 0.01  # share of the region's area from which a hole counts
 _CHANGE = 1.6  # of the area from one image to the next, at most
 _PLACE_PX = 0.2  # standard deviation that one place on an outline is taken to have at least
+_AGAIN_PX = 30.0  # how far from its last place a region that was lost is searched for
 _WINDOW = 1.3  # of the region's half size, for the first window around it
 
 
@@ -60,6 +62,11 @@ class RegionTracker:
         """The points that represent the region where it was last found, (M, 2)."""
         return self._last.points_px.copy()
 
+    @property
+    def values(self) -> CurveValues:
+        """Its area, centre and orientation, see `region_values`."""
+        return region_values(self._last.points_px, self._last.covariance_px)
+
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Find the region in a new image.
 
@@ -71,7 +78,7 @@ class RegionTracker:
         last = self._last.points_px
         expected = last + self._shift if predicted_px is None else np.asarray(predicted_px)
         grey, reason = grey_image(image)
-        found = reason if grey is None else self._same(grey, expected)
+        found = reason if grey is None else self._follow(grey, expected)
         if isinstance(found, str):
             self._shift = np.zeros(2)
             return nothing_found(last, found, joined=_joined(last))
@@ -86,10 +93,25 @@ class RegionTracker:
             joined=_joined(points),
         )
 
-    def _same(self, grey: ImageArray, expected: FloatArray) -> Region | str:
-        """Return the region where it is expected, or why it is not the one of the last image."""
-        half = _WINDOW * float(np.ptp(expected, axis=0).max()) / 2.0
-        found = self._at(grey, inside_of(rings_of(expected)), half, self._last.light)
+    def _follow(self, grey: ImageArray, expected: FloatArray) -> Region | str:
+        """Return the region where it is expected, or else next to where it was last found."""
+        found = self._same(grey, expected, 0.0)
+        if isinstance(found, str):
+            again = self._same(grey, self._last.points_px, _AGAIN_PX)
+            found = found if isinstance(again, str) else again
+        return found
+
+    def _same(self, grey: ImageArray, expected: FloatArray, away_px: float) -> Region | str:
+        """Return the region that lies next to a place, or why it is not that of the last image.
+
+        Args:
+            grey: the image.
+            expected: points that represent it there, (M, 2).
+            away_px: how far from the middle of them it may begin.
+        """
+        half = _WINDOW * float(np.ptp(expected, axis=0).max()) / 2.0 + away_px
+        place = inside_of(rings_of(expected))
+        found = self._at(grey, place, half, self._last.light, away_px)
         if isinstance(found, str):
             return found
         change = found.area_px / self._last.area_px
@@ -100,9 +122,14 @@ class RegionTracker:
         return found
 
     def _at(
-        self, grey: ImageArray, place_px: FloatArray, half_px: float, light: bool | None = None
+        self,
+        grey: ImageArray,
+        place_px: FloatArray,
+        half_px: float,
+        light: bool | None = None,
+        away_px: float = 0.0,
     ) -> Region | str:
-        patch = patch_at(grey, place_px, half_px, light)
+        patch = patch_at(grey, place_px, half_px, light, max(away_px, NEAR_PX))
         if isinstance(patch, str):
             return patch
         if patch.cut:

@@ -27,6 +27,16 @@ class MarkTracker:
         self.track(image, self._points)
         self._before = self._points.copy()
 
+    @property
+    def points_px(self) -> FloatArray:
+        """The marks where they were last found, (M, 2)."""
+        return self._points.copy()
+
+    @property
+    def radius_px(self) -> FloatArray:
+        """Radius of a circle of each mark's area, (M,)."""
+        return self._radius.copy()
+
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Measure the marks in a new image.
 
