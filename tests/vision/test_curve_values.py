@@ -6,7 +6,7 @@ from curve_images import drawn, ellipse_at, ellipse_image
 from vergence.features import moments_of_polygon
 from vergence.geometry import EllipseShape
 from vergence.vision.curves import EllipseTracker, LineTracker, RegionTracker
-from vergence.vision.curves.values import (
+from vergence.vision.curves.curve_values import (
     HALF_TURN_UNKNOWN_RAD,
     ellipse_values,
     line_values,

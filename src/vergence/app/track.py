@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from vergence.app.options import TrackOptions
     from vergence.app.tracking.footage import Footage, FootageFrame
     from vergence.app.tracking.overlay_files import OverlayFiles
-    from vergence.app.tracking.subject import Start, Subject
+    from vergence.app.tracking.track_subject import Start, Subject
     from vergence.arrays import ImageArray
 
 _CAMERA = frozenset(("camera", "fx", "fy", "cx", "cy", "distortion"))

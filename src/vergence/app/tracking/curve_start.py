@@ -11,7 +11,7 @@ from vergence.app.tracking.curve_follower import CurveFollower
 from vergence.app.tracking.curve_kinds import KINDS, CurveKind
 from vergence.app.tracking.curve_subject import CurveSubject
 from vergence.app.tracking.footage import Footage, FootageFrame
-from vergence.app.tracking.subject import Start
+from vergence.app.tracking.track_subject import Start
 from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vergence.app.tracking.curve_drawing import draw_curves
 from vergence.app.tracking.curve_files import CurveFiles, curve_record
 from vergence.app.tracking.curve_follower import CurveFollower, CurveStep
-from vergence.app.tracking.subject import Result
+from vergence.app.tracking.track_subject import Result
 from vergence.arrays import ImageArray
 from vergence.signals import Outcome, OutcomeKind
 

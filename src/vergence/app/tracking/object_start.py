@@ -10,7 +10,7 @@ from vergence.app.tracking.footage import Footage, FootageFrame
 from vergence.app.tracking.intrinsics import camera_of_options
 from vergence.app.tracking.pose_subject import PoseSubject
 from vergence.app.tracking.start import starting_poses
-from vergence.app.tracking.subject import Start
+from vergence.app.tracking.track_subject import Start
 from vergence.errors import NOTHING, InputError
 from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import (

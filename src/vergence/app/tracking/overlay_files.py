@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from vergence.app.tracking.film import Film
 from vergence.app.tracking.footage import Footage
-from vergence.app.tracking.subject import Subject
+from vergence.app.tracking.track_subject import Subject
 from vergence.arrays import ImageArray
 
 _KEY_FRAMES = 6  # spread over the footage

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vergence.app.tracking.drawing import draw_step
 from vergence.app.tracking.results import PoseFiles, pose_record
-from vergence.app.tracking.subject import Result
 from vergence.app.tracking.tag_follower import TagFollower
+from vergence.app.tracking.track_subject import Result
 from vergence.arrays import ImageArray
 from vergence.camera import Camera
 from vergence.estimation.hypothesis_follower import HypothesisFollower

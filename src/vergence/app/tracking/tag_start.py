@@ -6,8 +6,8 @@ from vergence.app.options.track import TrackOptions
 from vergence.app.tracking.footage import Footage, FootageFrame
 from vergence.app.tracking.intrinsics import camera_of_options
 from vergence.app.tracking.pose_subject import PoseSubject
-from vergence.app.tracking.subject import Start
 from vergence.app.tracking.tag_follower import TagFollower, tag_of_option
+from vergence.app.tracking.track_subject import Start
 from vergence.cell.schema import TagTable
 
 

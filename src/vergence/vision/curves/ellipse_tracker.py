@@ -7,9 +7,9 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.errors import InputError
 from vergence.geometry import EllipseShape, ellipse_through, unit_vectors
+from vergence.vision.curves.curve_values import CurveValues, ellipse_values
 from vergence.vision.curves.moving_edges import Steps, fit_steps, search_edges, straightened
 from vergence.vision.curves.patch import patch_at
-from vergence.vision.curves.values import CurveValues, ellipse_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
+from vergence.vision.curves.curve_values import CurveValues, line_values
 from vergence.vision.curves.moving_edges import BORDER_PX, FLOOR_PX, fit_steps, search_edges
-from vergence.vision.curves.values import CurveValues, line_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.errors import InputError
+from vergence.vision.curves.curve_values import CurveValues, region_values
 from vergence.vision.curves.patch import NEAR_PX, Patch, patch_at
 from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rings_of, signed_area
-from vergence.vision.curves.values import CurveValues, region_values
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, nothing_found
 
