@@ -76,7 +76,7 @@ def own_object() -> None:
             file.write_text(text)
         footage = re.search(r"```python\n(.*?)```", page, re.DOTALL)[1]
         subprocess.run([sys.executable, "-c", footage], cwd=folder, check=True)
-        track = re.search(r"vergence (track .*)", page)[1].split()
+        track = re.search(r"vergence (track \S+ --model .*)", page)[1].split()
         subprocess.run([VERGENCE, *track], cwd=folder, check=True)
         shutil.copy(Path(folder, "tracked", "frame-000014.jpg"), DOCS / "images/own-object.jpg")
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence.app.overlay import Marks, draw
-from vergence.signals import SearchWindows
+from vergence.signals import CLOSES, CONTINUES, SearchWindows
 
 NOWHERE = np.full((1, 2), np.nan)
 GREY = np.full((80, 100), 128, dtype=np.uint8)
@@ -121,3 +121,15 @@ def test_points_that_stand_for_a_curve_are_drawn_as_that_curve() -> None:
     assert pairs[60, 50].any()
     assert not pairs[40, 30].any()
     assert (draw(GREY, [replace(curve, found=np.zeros(4, dtype=bool))]) == 128).all()
+
+
+def test_two_closed_curves_are_drawn_apart() -> None:
+    corners = np.array([[20.0, 20.0], [40.0, 20.0], [40.0, 60.0], [20.0, 60.0]])
+    both, every = np.concatenate((corners, corners + (40.0, 0.0))), np.ones(8, dtype=bool)
+    nowhere = np.full((8, 2), np.nan)
+    joined = np.array([CONTINUES, CONTINUES, CONTINUES, CLOSES] * 2)
+    curves = Marks(both, every, every, SearchWindows(nowhere, nowhere), nowhere, nowhere, joined)
+    drawn = draw(GREY, [curves]) != 128
+    assert drawn[40, 20].any()
+    assert drawn[40, 60].any()
+    assert not drawn[15:65, 45:55].any()

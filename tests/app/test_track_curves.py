@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from real_images import IMAGES, PACKAGE
 from vergence.app.main import main
 
 sys.path.append(str(Path(__file__).parents[1] / "vision"))
@@ -144,6 +145,25 @@ def test_a_curve_that_is_not_there_at_the_end_is_lost(
     assert "target lost" in told
     assert "ellipse 1 last seen at 0.20 s: not an ellipse" in told
     assert "region 2: found in 8 of 8 images" in told
+
+
+@pytest.mark.parametrize(
+    ("sequence", "curves", "count"),
+    [
+        ("ellipse-1", ("ellipse:180,130",), 50),  # which turns and is partly out of the image
+        ("line", ("line:120,10,310,245",), 33),
+        ("mire-2", ("ellipse:160,213", "mark:86,179", "mark:216,167", "region:92,266"), 501),
+    ],
+)
+def test_curves_in_real_images_are_followed_to_the_end(
+    track: Track, capsys: pytest.CaptureFixture[str], sequence: str, curves: tuple[str, ...],
+    count: int,
+) -> None:  # fmt: skip
+    assert (IMAGES / sequence).is_dir(), f"install {PACKAGE}"
+    words = [word for curve in curves for word in ("--curve", curve)]
+    assert track(*words, "--json", "--no-overlay", images=IMAGES / sequence) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["frames"], answer["seen"]) == (count, count)
 
 
 @pytest.mark.parametrize(

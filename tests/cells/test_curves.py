@@ -5,6 +5,7 @@ import pytest
 
 import vergence as vg
 from vergence.errors import InputError
+from vergence.signals import curves_of
 
 
 def test_a_cup_is_brought_to_the_middle_by_its_ellipse() -> None:
@@ -49,6 +50,36 @@ def test_a_click_inside_is_enough() -> None:
 def test_a_curve_that_is_not_there_is_refused_before_anything_moves(change, message) -> None:
     with pytest.raises(InputError, match=message):
         vg.run("ellipse", duration_s=0.3, **change)
+
+
+def test_two_cups_fix_all_six_directions_of_the_camera() -> None:
+    run = vg.run("cups", duration_s=6.0)
+    assert run.outcome.kind == "completed"
+    trace = run.cameras["wrist"]
+    assert trace.points_px.shape[1] == 32
+    assert trace.found.all()
+    assert [curve.closed for curve in curves_of(trace.joined[-1])] == [True, True]
+    for cup in (slice(0, 16), slice(16, 32)):
+        assert np.nanmax(trace.error_px[0, cup]) > 100.0
+        assert np.nanmax(trace.error_px[-1, cup]) < 0.5
+    assert np.nanmax(trace.drift_px) < 1.0  # against the true ellipses
+    exact = vg.run("cups", duration_s=6.0, images=False).cameras["wrist"]
+    difference = trace.T_world_camera[-1] - exact.T_world_camera[-1]
+    assert np.abs(difference[:3, 3]).max() < 2e-3
+    assert np.abs(difference[:3, :3]).max() < 5e-3
+
+
+def test_a_click_inside_each_cup_is_enough() -> None:
+    clicks = [[430, 225], [471, 67]]
+    change = {"points_px": clicks, "desired": "initial"}
+    run = vg.run("cups", duration_s=0.3, task=change, target={"features": None})
+    trace = run.cameras["wrist"]
+    assert trace.found.all()
+    middles = trace.points_px[0].reshape(2, 16, 2).mean(axis=1)
+    np.testing.assert_allclose(middles, clicks, atol=8.0)
+    change["points_px"] = [[430, 225], [432, 226]]
+    with pytest.raises(InputError, match="ellipse 1 and 2 are the same"):
+        vg.run("cups", duration_s=0.3, task=change, target={"features": None})
 
 
 def test_a_strip_is_followed_along_its_edges() -> None:

@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.runtime.results import CameraTrace
 from vergence.signals import SearchWindows, curves_of
 
@@ -39,7 +39,7 @@ class Marks:
     windows: SearchWindows  # around the predicted places
     desired_px: FloatArray  # (M, 2)
     true_px: FloatArray  # (M, 2)
-    joined: BoolArray  # (M,) see `ImagePoints`: points of curves
+    joined: IntArray  # (M,) see `ImagePoints`: points of curves
 
     @classmethod
     def at(cls, trace: CameraTrace, time: float) -> Self:

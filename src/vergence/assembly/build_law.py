@@ -123,7 +123,7 @@ def require_suitable(cell: Cell) -> None:
 def _servo(context: LawContext) -> Servo:
     cell, settings = context.cell, context.cell.law
     names = [context.camera_name]
-    names += [name for term in settings.terms if (name := term.camera) and name not in names]
+    names += [name for term in context.terms if (name := term.camera) and name not in names]
     for name in names:
         if name not in cell.cameras:
             raise InputError("law", "objectives", name, ", ".join(cell.cameras))
@@ -136,7 +136,7 @@ def _servo(context: LawContext) -> Servo:
     return Servo(
         context.arm,
         {name: mounting_of(context, name) for name in names},
-        settings.terms,
+        context.terms,
         limits=_limits(context),
         solver=settings.solver,
         depth_m=depth_m,
@@ -157,7 +157,7 @@ def _servo(context: LawContext) -> Servo:
 def _require_features_made_of_points(context: LawContext) -> None:
     """Refuse a visual feature that the points in the first image do not make."""
     cell = context.cell
-    for term in cell.law.terms:
+    for term in context.terms:
         name = term.camera or context.camera_name
         if not isinstance(term.objective, ImageBased) or name not in context.points_px:
             continue

@@ -29,7 +29,7 @@ def free_directions(context: LawContext) -> str:
     distance = max(context.distance_m, _LEAST)
     features = Points(context.camera().normalize(seen), np.full(len(seen), distance))
     state, H = state_of(features, features), np.zeros((6, 6))
-    for term in law.objectives:
+    for term in context.terms:
         objective = term.objective
         if term.camera not in ("", name):
             return ""

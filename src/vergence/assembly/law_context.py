@@ -10,9 +10,11 @@ from vergence.arrays import FloatArray
 from vergence.assembly.started_driver import StartedDriver
 from vergence.camera import Camera
 from vergence.cell import Cell
+from vergence.control import ImageBased
+from vergence.control.term import Term
 from vergence.errors import Absent, InputError
 from vergence.estimation import FollowedPose
-from vergence.features import inverse_depth_plane
+from vergence.features import inverse_depth_plane, of_each
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.parts import kind_of
 from vergence.robot import Arm, Clearance
@@ -207,9 +209,29 @@ class LawContext:
 
     @property
     def curve(self) -> CurveTracking | None:
-        """What follows a curve rather than points, if the task does."""
+        """What follows curves rather than points, if the task does."""
         tracker = getattr(self.cell.task, "tracker", None)
         return tracker if isinstance(tracker, CurveTracking) else None
+
+    @property
+    def terms(self) -> list[Term]:
+        """The objectives of the law, with weights and cameras.
+
+        A feature of one curve is that of each of them, stacked, where the task follows several.
+        """
+        terms: list[Term] = self.cell.law.terms
+        if self.curve is None or self.curve.count == 1:
+            return terms
+        return [self._of_each_curve(term, self.curve.count) for term in terms]
+
+    def _of_each_curve(self, term: Term, count: int) -> Term:
+        objective, points_px = term.objective, self.points_px.get(term.camera or self.camera_name)
+        if points_px is None or not isinstance(objective, ImageBased):
+            return term
+        if not objective.feature.of_curve:
+            return term
+        feature = of_each(objective.feature, len(points_px) // count)
+        return term._replace(objective=replace(objective, feature=feature))
 
     def known_features(self, camera: str) -> FloatArray | None:
         """Return the features that the cell states for a camera, (M, 3), m; None if it has none.
@@ -225,20 +247,28 @@ class LawContext:
         return None if known is None else np.array(known)
 
     def _depth_of_curve(self, camera: str) -> FloatArray:
-        """Return the depth of the points that represent a curve, (M,), m, by the placements.
+        """Return the depth of the points that represent curves, (M,), m, by the placements.
 
-        They lie on the plane of the features, or of the target's surface inside the curve.
+        Those of each lie on the plane of its features, or of the target's surface inside it.
         """
-        lens, points_px = self.cameras[camera], self.points_px[camera]
+        assert self.curve is not None
+        curves = np.split(self.points_px[camera], self.curve.count)
         points = self.features_in_camera(camera)
         if not self._has_features(camera):
-            inside = self.with_points({camera: 0.9 * points_px + 0.1 * points_px.mean(axis=0)})
-            points = inside.features_in_camera(camera)
+            inside = [0.9 * curve + 0.1 * curve.mean(axis=0) for curve in curves]
+            points = self.with_points({camera: np.concatenate(inside)}).features_in_camera(camera)
+        elif len(points) % len(curves):
+            return np.full(len(self.points_px[camera]), np.nan)
+        pairs = zip(np.split(points, len(curves)), curves, strict=True)
+        return np.concatenate([self._depth_on_plane(camera, *pair) for pair in pairs])
+
+    def _depth_on_plane(self, camera: str, points: FloatArray, points_px: FloatArray) -> FloatArray:
+        """Return the depth of points in the image (K, 2) on the plane through others (N, 3), m."""
         points = points[points[:, 2] > 0.0]  # false for NaN too
         if not len(points):
             return np.full(len(points_px), np.nan)
         A, B, C = inverse_depth_plane(points[:, :2] / points[:, 2:], points[:, 2])
-        x, y = lens.normalize(points_px).T
+        x, y = self.cameras[camera].normalize(points_px).T
         depth: FloatArray = 1.0 / (A * x + B * y + C)
         return depth
 

@@ -9,6 +9,7 @@ from vergence.features.lines import Lines
 from vergence.features.log_depth import LogDepth
 from vergence.features.luminance import Luminance
 from vergence.features.moments import Moments, RegionMoments
+from vergence.features.of_each import of_each
 from vergence.features.orientation import Orientation
 from vergence.features.plane import inverse_depth_plane
 from vergence.features.points import Points
@@ -39,4 +40,5 @@ __all__ = [
     "interaction_matrix_points",
     "inverse_depth_plane",
     "moments_of_polygon",
+    "of_each",
 ]

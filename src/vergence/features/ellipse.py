@@ -20,6 +20,8 @@ class Ellipse(Feature):
     a sphere L is exact too: it moves over the sphere along lines of sight, which no image shows.
     """
 
+    of_curve = True
+
     def value(self) -> FloatArray:
         """Return s, (5,)."""
         (x, y), n = self._shape()

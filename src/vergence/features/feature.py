@@ -1,7 +1,7 @@
 """What every visual feature has."""
 
 from abc import ABC, abstractmethod
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +21,15 @@ class Feature(ABC):
         depth_m: of each point along the optical axis, (M,), or one number for all.
 
     Attributes:
+        of_curve: whether it describes one curve; of several curves it is that of each, stacked.
         points: (M, 2).
         depth_m: (M,).
 
     Raises:
         InputError: if a depth is not above zero, or if so many points do not make this feature.
     """
+
+    of_curve: ClassVar[bool] = False
 
     def __init__(self, points: ArrayLike, depth_m: ArrayLike = 1.0) -> None:
         self.points = frozen(points, (None, 2), "points")

@@ -49,6 +49,7 @@ class Moments(Feature):
 class RegionMoments(Moments):
     """`Moments` of the inside of a polygon; the points are its corners, in order; a is its area."""
 
+    of_curve = True
     _name = "region_moments"
 
     def _moments(self) -> CentralMoments:

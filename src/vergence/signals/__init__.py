@@ -4,6 +4,9 @@ from vergence.signals.command import JointCommand
 from vergence.signals.frame import Frame, FrameTruth
 from vergence.signals.joints import JointState, Sample, Setpoint
 from vergence.signals.observation import (
+    CLOSES,
+    CONTINUES,
+    ENDS,
     Curve,
     ImagePoints,
     Observation,
@@ -16,6 +19,9 @@ from vergence.signals.reference import Reference
 from vergence.signals.robot_state import RobotMode, RobotState
 
 __all__ = [
+    "CLOSES",
+    "CONTINUES",
+    "ENDS",
     "Curve",
     "Frame",
     "FrameTruth",

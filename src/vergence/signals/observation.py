@@ -16,6 +16,10 @@ class SearchWindows(NamedTuple):
     half_px: FloatArray  # (M, 2) half the width and height
 
 
+# Of a point of a measurement: no curve goes on from it; one goes on to the next point; one closes.
+ENDS, CONTINUES, CLOSES = 0, 1, 2
+
+
 class Curve(NamedTuple):
     """Points of a measurement that make a curve."""
 
@@ -23,11 +27,15 @@ class Curve(NamedTuple):
     closed: bool
 
 
-def curves_of(joined: BoolArray) -> tuple[Curve, ...]:
-    """Return the curves of a measurement, from its `joined` (M,); marks alone are none."""
+def curves_of(joined: IntArray | BoolArray) -> tuple[Curve, ...]:
+    """Return the curves of a measurement, from its `joined` (M,); marks alone are none.
+
+    A curve that goes on from the last point closes, as in recordings of before there were several
+    closed curves.
+    """
     numbers = np.arange(len(joined))
-    parts = np.split(numbers, numbers[~joined] + 1)
-    return tuple(Curve(part, bool(joined[part[-1]])) for part in parts if len(part) > 1)
+    parts = np.split(numbers, numbers[joined != CONTINUES] + 1)
+    return tuple(Curve(part, bool(joined[part[-1]] != ENDS)) for part in parts if len(part) > 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +53,8 @@ class ImagePoints:
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
     windows: SearchWindows | None = None  # None if all points are searched for everywhere
-    # (M,) whether the curve continues to the next point; after a last one that is joined it closes.
-    # None if no point belongs to a curve.
-    joined: BoolArray | None = None
+    # (M,) `ENDS`, `CONTINUES` or `CLOSES`; None if no point belongs to a curve.
+    joined: IntArray | None = None
     # (M,) m, measured by a depth camera, and its standard deviation; NaN where unknown.
     depth_m: FloatArray | None = None
     depth_deviation_m: FloatArray | None = None

@@ -66,7 +66,7 @@ class Subject:
         T_world_target, features = self._seen_by(camera)
         truth = self._truth_of(camera, T_world_target, _Points(features, self._inside), blind)
         if self._curve is not None:
-            truth = _truth_of_curve(truth, self._curve, self._world.cameras[camera])
+            truth = _truth_of_curves(truth, self._curve, self._world.cameras[camera])
         others = {
             name: self._truth_of(camera, self._world.target_pose(name), points, blind)
             for name, points in self._others.items()
@@ -112,24 +112,37 @@ class Subject:
         return self._world.tool_pose(), np.array(tool.features)
 
 
-def _truth_of_curve(truth: FrameTruth, curve: CurveTracking, camera: Camera) -> FrameTruth:
-    """Return the truth of the points that represent a curve, from points on it."""
+def _truth_of_curves(truth: FrameTruth, curves: CurveTracking, camera: Camera) -> FrameTruth:
+    """Return the truth of the points that represent curves, from as many points on each."""
     before: BoolArray = np.isfinite(truth.points_px[:, 0])
     nothing = replace(truth, visible=np.zeros(len(before), dtype=np.bool_))
     if not len(before) or not before.all():
         return nothing
     try:
-        points_px = curve.points_on(truth.points_px, (camera.width, camera.height))
+        points_px = curves.points_on(truth.points_px, (camera.width, camera.height))
     except InputError:  # a circle on edge, a line seen end on
         return nothing
-    between = np.linalg.norm(points_px[:, None] - truth.points_px[None], axis=2)
-    A, B, C = inverse_depth_plane(camera.normalize(truth.points_px), truth.depth_m)
-    x, y = camera.normalize(points_px).T
-    depth_m = 1.0 / (A * x + B * y + C)
-    nearest = between.argmin(axis=1)
+    count = curves.count
     in_sight = truth.visible | ~camera.contains(truth.points_px)
-    visible = in_sight[nearest] & camera.contains(points_px)
-    return replace(truth, points_px=points_px, depth_m=depth_m, visible=visible)
+    depth_m, visible = [], []
+    for on_it, depth, seen, places in zip(
+        np.split(truth.points_px, count),
+        np.split(truth.depth_m, count),
+        np.split(in_sight, count),
+        np.split(points_px, count),
+        strict=True,
+    ):
+        A, B, C = inverse_depth_plane(camera.normalize(on_it), depth)
+        x, y = camera.normalize(places).T
+        depth_m.append(1.0 / (A * x + B * y + C))
+        nearest = np.linalg.norm(places[:, None] - on_it[None], axis=2).argmin(axis=1)
+        visible.append(seen[nearest] & camera.contains(places))
+    return replace(
+        truth,
+        points_px=points_px,
+        depth_m=np.concatenate(depth_m),
+        visible=np.concatenate(visible),
+    )
 
 
 def _grid(width: int, height: int, count: int) -> FloatArray:

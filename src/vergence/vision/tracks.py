@@ -4,8 +4,8 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.signals import SearchWindows
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
+from vergence.signals import CLOSES, CONTINUES, SearchWindows
 
 
 class Tracks(NamedTuple):
@@ -19,7 +19,7 @@ class Tracks(NamedTuple):
     residuals: FloatArray | None = None
     correlations: FloatArray | None = None  # (M,) with the template, -1 … 1; likewise
     windows: SearchWindows | None = None  # where the points were searched for
-    joined: BoolArray | None = None  # (M,) see `ImagePoints`; None if every point is a mark alone
+    joined: IntArray | None = None  # (M,) see `ImagePoints`; None if every point is a mark alone
 
     def __bool__(self) -> bool:
         """Whether every point was found."""
@@ -30,7 +30,7 @@ def nothing_found(
     points_px: FloatArray,
     reason: str,
     deviation_px: float = 100.0,
-    joined: BoolArray | None = None,
+    joined: IntArray | None = None,
 ) -> Tracks:
     """Answer that no point was found, all for one reason.
 
@@ -50,6 +50,13 @@ def nothing_found(
         np.full(count, np.nan),
         joined=joined,
     )
+
+
+def closed(count: int) -> IntArray:
+    """Return what joins so many points to one closed curve, (count,)."""
+    joined = np.full(count, CONTINUES)
+    joined[-1:] = CLOSES
+    return joined
 
 
 class PointTracker(Protocol):
@@ -81,15 +88,20 @@ class PointTracking(Protocol):
 
 @runtime_checkable
 class CurveTracking(PointTracking, Protocol):
-    """A part that follows a curve by points that represent it, and are no marks on the object."""
+    """A part that follows curves by points that represent them, and are no marks on the object."""
+
+    @property
+    def count(self) -> int:
+        """How many curves there are, each of as many points; lines are one."""
+        ...
 
     def points_on(self, points_px: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """Return the points that represent the curve through others, (M, 2).
+        """Return the points that represent the curves through others, (M, 2).
 
-        They follow from the curve alone and change smoothly with it.
+        They follow from the curves alone and change smoothly with them.
 
         Args:
-            points_px: of the curve, anywhere on it, (K, 2).
+            points_px: of the curves, anywhere on them, as many of each in turn, (K, 2).
             size: width and height of the image, px.
 
         Raises:

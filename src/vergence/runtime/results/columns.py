@@ -10,7 +10,7 @@ Row: TypeAlias = Mapping[str, Any]  # values of some columns, by name; the other
 Table = TypeVar("Table")
 
 _FIRST = 16  # rows to begin with
-_BLANKS: Mapping[type, Any] = {float: np.nan, bool: False, tuple: (), dict: {}}
+_BLANKS: Mapping[type, Any] = {float: np.nan, bool: False, int: 0, tuple: (), dict: {}}
 
 
 def column(*shape: int | str, kind: type = float) -> Any:
@@ -18,7 +18,7 @@ def column(*shape: int | str, kind: type = float) -> Any:
 
     Args:
         shape: of one row's value: numbers, "n" for the joints, "M" for points, however many.
-        kind: float (NaN where not known), bool (false), tuple or dict (empty).
+        kind: float (NaN where not known), bool (false), int (0), tuple or dict (empty).
     """
     return field(metadata={"shape": shape, "kind": kind})
 

@@ -58,7 +58,7 @@ class CameraTrace(Trace):
     asked: BoolArray = column("M", kind=bool)  # (K, M) whether it was searched for
     window_center_px: FloatArray = column("M", 2)  # (K, M, 2) predicted places; NaN without window
     window_half_px: FloatArray = column("M", 2)  # (K, M, 2) half the sizes of the windows
-    joined: BoolArray = column("M", kind=bool)  # (K, M) see `ImagePoints`: points of curves
+    joined: IntArray = column("M", kind=int)  # (K, M) see `ImagePoints`: points of curves
     desired_px: FloatArray = column("M", 2)  # (K, M, 2)
     desired_by_pose: BoolArray = column(kind=bool)  # (K,) whether they follow from a desired pose
     T_camera_target_desired: FloatArray = column(4, 4)  # (K, 4, 4) where the task desires a pose

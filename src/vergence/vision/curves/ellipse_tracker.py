@@ -11,7 +11,7 @@ from vergence.vision.curves.curve_values import CurveValues, ellipse_values
 from vergence.vision.curves.moving_edges import Steps, fit_steps, search_edges, straightened
 from vergence.vision.curves.patch import patch_at
 from vergence.vision.image import grey_image
-from vergence.vision.tracks import Tracks, nothing_found
+from vergence.vision.tracks import Tracks, closed, nothing_found
 
 POINTS = 16  # that represent the ellipse
 _APART_PX = 4.0  # along the ellipse, between places where edges are searched
@@ -22,7 +22,7 @@ _CHANGE = 1.6  # of a semi-axis from one image to the next, at most
 _LEAST_AGREEING = 0.5  # share of its places in view across which the edge is found
 _ROUNDS = 3  # of search and fit, each with a third of the last one's reach
 _LAST_REACH_PX = 4
-_JOINED = np.ones(POINTS, dtype=np.bool_)
+_JOINED = closed(POINTS)
 
 
 class EllipseFit(NamedTuple):

@@ -6,6 +6,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
+from vergence.signals import CONTINUES, ENDS
 from vergence.vision.curves.curve_values import CurveValues, line_values
 from vergence.vision.curves.moving_edges import BORDER_PX, FLOOR_PX, fit_steps, search_edges
 from vergence.vision.image import grey_image
@@ -134,7 +135,7 @@ class LineTracker:
             np.concatenate(covariances),
             np.array([not why for why in reasons]),
             tuple(reasons),
-            joined=np.tile([True, False], len(expected)),
+            joined=np.tile([CONTINUES, ENDS], len(expected)),
         )
 
     def _ahead(self, now: Line, before: Line) -> Line:

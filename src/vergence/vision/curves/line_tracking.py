@@ -1,5 +1,7 @@
 """Straight lines as what a cell follows."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
@@ -10,6 +12,8 @@ from vergence.vision.curves.line_tracker import LineTracker, lines_through
 @part("tracker", "lines")
 class LineTracking:
     """Follows straight edges, each given by two points on it; see `LineTracker`."""
+
+    count: ClassVar[int] = 1  # of the sets of points: lines go by pairs
 
     # Largest motion of a line between two images.
     reach_px: float = knob(20.0, "px", least=4, upto=200)

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.arrays import FloatArray, ImageArray
 from vergence.errors import InputError
 from vergence.vision.curves.curve_values import CurveValues, region_values
 from vergence.vision.curves.patch import NEAR_PX, Patch, patch_at
 from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rings_of, signed_area
 from vergence.vision.image import grey_image
-from vergence.vision.tracks import Tracks, nothing_found
+from vergence.vision.tracks import Tracks, closed, nothing_found
 
 OUTLINE_POINTS, HOLE_POINTS = 48, 16  # that represent the outline, and for each hole
 _LEAST_AREA_PX = 60.0
@@ -81,7 +81,7 @@ class RegionTracker:
         found = reason if grey is None else self._follow(grey, expected)
         if isinstance(found, str):
             self._shift = np.zeros(2)
-            return nothing_found(last, found, joined=_joined(last))
+            return nothing_found(last, found, joined=closed(len(last)))
         self._shift = found.points_px.mean(axis=0) - last.mean(axis=0)
         self._last = found
         points = found.points_px
@@ -90,7 +90,7 @@ class RegionTracker:
             found.covariance_px,
             np.ones(len(points), dtype=np.bool_),
             ("",) * len(points),
-            joined=_joined(points),
+            joined=closed(len(points)),
         )
 
     def _follow(self, grey: ImageArray, expected: FloatArray) -> Region | str:
@@ -150,10 +150,6 @@ def _counted(patch: Patch, area: float) -> list[FloatArray]:
     areas = [abs(signed_area(hole)) for hole in patch.holes_px]
     order = np.argsort(areas)[::-1]
     return [patch.holes_px[j] for j in order if areas[j] > _LEAST_HOLE * area]
-
-
-def _joined(points: FloatArray) -> BoolArray:
-    return np.ones(len(points), dtype=np.bool_)
 
 
 def _covariance(grey: ImageArray, points: FloatArray) -> FloatArray:
