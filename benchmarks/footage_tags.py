@@ -1,7 +1,7 @@
 """Twelve AprilTags in a real photograph, spoilt by blur, motion and darkness.
 
 The reference of a corner is the mean of what ViSP says of the photograph as it is (a file beside
-it) and what we say; they differ by 0.09 px. ViSP and OpenCV's AprilTag refinement count pixels
+it) and what we say; they differ by 0.21 px. ViSP and OpenCV's AprilTag refinement count pixels
 from the corner of the first, half a pixel from our convention; that is taken off. Right is a
 tag whose corners are all within 3 px.
 """

@@ -13,6 +13,7 @@ from vergence.vision.marks import (
     circle_centre_bias,
     measure_round_marks,
 )
+from vergence.vision.marks.tag_corners import refined_corners
 
 CAMERA = Camera(320, 240, 400.0, 400.0, 159.5, 119.5)
 FINE = 8
@@ -147,6 +148,40 @@ def test_a_marker_in_the_dark_is_found(light: float) -> None:
     marks = MarkerDetector("apriltag_36h11").detect(np.clip(np.rint(dark), 0, 255).astype(np.uint8))
     assert marks.ids.tolist() == [23]
     np.testing.assert_allclose(marks.corners_px[0], QUAD, atol=0.6)
+
+
+@pytest.mark.parametrize(("focus_px", "most_px"), [(0.0, 0.03), (2.0, 0.12), (3.0, 0.25)])
+@pytest.mark.parametrize("gamma", [1.0, 2.2])
+def test_blur_does_not_draw_corners_to_what_lies_next_to_them(
+    focus_px: float, most_px: float, gamma: float
+) -> None:
+    """Blur reaches the cells next to the border, and a camera's gamma widens what is white."""
+    light = 0.05 + 0.8 * marker_image(7, QUAD) / 255.0
+    blurred = cv2.GaussianBlur(light, (0, 0), focus_px) if focus_px else light
+    seen = 255.0 * blurred ** (1.0 / gamma) + np.random.default_rng(0).normal(0, 1.0, light.shape)
+    image = np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+    marks = MarkerDetector("apriltag_36h11").detect(image)
+    assert marks.ids.tolist() == [7]
+    off = marks.corners_px[0] - QUAD
+    assert np.linalg.norm(off, axis=1).max() < most_px
+    squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(marks.covariance_px[0]), off)
+    assert squares.max() < 9.0
+
+
+def test_a_marker_that_is_partly_covered_keeps_its_corners() -> None:
+    image = marker_image(7, QUAD)
+    image[95:115, 150:158] = 255
+    marks = MarkerDetector("apriltag_36h11").detect(image)
+    assert marks.ids.tolist() == [7]
+    assert np.linalg.norm(marks.corners_px[0] - QUAD, axis=1).max() < 0.1
+
+
+def test_corners_that_the_marker_does_not_fit_are_uncertain_by_half_a_cell() -> None:
+    cells = np.pad(np.eye(6), 1)
+    noise = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
+    corners, covariance = refined_corners(noise, QUAD, cells, 0.05)
+    np.testing.assert_array_equal(corners, QUAD)
+    assert np.sqrt(covariance[:, 0, 0]).min() > 5.0
 
 
 def test_a_marker_far_out_of_focus_is_found_once_and_says_how_uncertain_its_corners_are() -> None:

@@ -13,7 +13,7 @@ from vergence.vision.marks.tag_corners import refined_corners
 
 _CELL_MARGIN = 0.3  # of a cell, next to its neighbours, that blur spoils and is not read
 
-_BLURRED_PX = 0.3  # standard deviation of corners, from which on an image is sharpened, too
+_BLURRED_PX = 0.13  # standard deviation of corners, from which on an image is sharpened, too
 _FOCUS_PX, _STEEPER = 3.0, 4.0  # what is sharpened, and how much
 
 DICTIONARIES = {name: family.opencv for name, family in TAG_FAMILIES.items()}
@@ -81,9 +81,15 @@ class MarkerDetector:
     def _refined(self, image: ImageArray, marks: CodedMarks) -> CodedMarks:
         for k in range(len(marks.ids)):
             marks.corners_px[k], marks.covariance_px[k] = refined_corners(
-                image, marks.corners_px[k], self.noise_px
+                image, marks.corners_px[k], self._cells(int(marks.ids[k])), self.noise_px
             )
         return marks
+
+    def _cells(self, number: int) -> FloatArray:
+        """Return a marker with its border, a pixel a cell: 0 for black, 1 for white, (n, n)."""
+        known = self._detector.getDictionary()
+        drawing = known.generateImageMarker(number, known.markerSize + 2)
+        return np.asarray(drawing, np.float64) / 255.0
 
     def _with_blurred(self, image: ImageArray, marks: CodedMarks) -> CodedMarks:
         """Return the markers, and those that are found when the image is sharpened."""
