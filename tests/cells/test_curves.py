@@ -1,10 +1,14 @@
 """Cells that servo on curves, through rendered images alone."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import vergence as vg
 from vergence.errors import InputError
+from vergence.places import CELLS
 from vergence.signals import curves_of
 
 
@@ -80,6 +84,24 @@ def test_a_click_inside_each_cup_is_enough() -> None:
     change["points_px"] = [[430, 225], [432, 226]]
     with pytest.raises(InputError, match="ellipse 1 and 2 are the same"):
         vg.run("cups", duration_s=0.3, task=change, target={"features": None})
+
+
+def test_a_plate_over_one_cup_loses_that_cup_alone(tmp_path: Path) -> None:
+    """Without limits: with them, the arm would keep the plate out of the way."""
+    cell = shutil.copytree(CELLS / "cups", tmp_path / "cups")
+    plate = '<geom type="box" size="0.012 0.012 0.001" pos="0.347 -0.037 0.243"/></worldbody>'
+    table = (cell / "table.xml").read_text()
+    (cell / "table.xml").write_text(table.replace("</worldbody>", plate))
+    law = {"kind": "image_based", "feature": "ellipse", "gain": 2.0, "solver": "pseudo_inverse"}
+    run = vg.run(str(cell), duration_s=4.0, law=law)
+    assert run.outcome.kind == "completed"
+    trace = run.cameras["wrist"]
+    assert trace.found[:, :16].all()
+    assert np.nanmax(trace.error_px[-1, :16]) < 1.0
+    lost = ~trace.found[:, 16]
+    assert 10 < lost.sum() < len(lost) - 10
+    reasons = {trace.reasons[row][16] for row in np.flatnonzero(lost)}
+    assert all(reason.startswith("not an ellipse: ") for reason in reasons)
 
 
 def test_a_strip_is_followed_along_its_edges() -> None:
