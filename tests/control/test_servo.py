@@ -261,7 +261,7 @@ def test_points_that_make_no_feature_lose_the_target_with_a_reason():
     command = commanded(servo, end_on, points)
     assert command.fault is not None
     assert command.fault[0] is OutcomeKind.TARGET_LOST
-    assert command.fault[1] == "lines: two ends at one place; needs ends that differ"
+    assert command.fault[1] == "lines: two ends of a segment that coincide; needs distinct ends"
     assert not command.velocity.any()
 
 

@@ -1,4 +1,4 @@
-"""Visual features: what is seen, and how it moves when the camera does."""
+"""Visual features: their values, and how they change when the camera moves."""
 
 from vergence.features._moments import moments_of_polygon
 from vergence.features.centre import Centre

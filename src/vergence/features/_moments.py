@@ -1,4 +1,4 @@
-"""Moments of points and of polygons, and what is made of them [Tahri2005]."""
+"""Moments of points and of polygons, and the features derived from them [Tahri2005]."""
 
 from math import comb
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError
 
 _ORDER = 3
-# Of the integrals over a polygon: p, q, and the powers of the corner at the end of a side.
+# Terms of the integrals over a polygon: p, q, and the powers of a side's end point.
 _P, _Q, _K, _J = np.array(
     [
         (p, q, k, j)
@@ -34,18 +34,18 @@ def _factors() -> FloatArray:
 
 
 _FACTORS = _factors()
-_ROUND = 1e-9  # share of the spread up to which two extents are one: no orientation
+_ROUND = 1e-9  # relative to the spread: closer extents are equal, so orientation is undefined
 
 
 class CentralMoments(NamedTuple):
-    """Moments of a set up to the third order, about its centre.
+    """Moments up to third order about the centre of a set of points or of a polygon.
 
     Attributes:
         centre: (2,).
-        size: what scales with the square of the distance: a polygon's area, or the sum of
-            squared distances of points from their centre.
+        size: grows with the square of the image size: a polygon's area, or the sum of squared
+            distances of the points from their centre.
         mu: μ_pq, (4, 4); zero where p + q > 3.
-        dense: whether they are those of the inside of a polygon, and not of points.
+        dense: true for the interior of a polygon, false for discrete points.
     """
 
     centre: FloatArray
@@ -58,42 +58,42 @@ def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
     """Return the moments of discrete points, (M, 2).
 
     Raises:
-        InputError: if they coincide.
+        InputError: if all points coincide.
     """
     centre = points.mean(axis=0)
     powers = (points - centre)[:, :, None] ** np.arange(_ORDER + 1)
     mu = _up_to_order(np.einsum("mp,mq->pq", powers[:, 0], powers[:, 1]))
     size = float(mu[2, 0] + mu[0, 2])
     if not size > 0.0:
-        raise InputError(name, "points", "points at one place", "points that differ")
+        raise InputError(name, "points", "points that all coincide", "distinct points")
     return CentralMoments(centre, size, mu, dense=False)
 
 
 def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
-    """Return the moments of the inside of a polygon, from its corners in order, (M, 2).
+    """Return the moments of the interior of a polygon, from its corners in order, (M, 2).
 
-    Integrals over the inside are sums over the sides, by Green's theorem [Steger1996].
+    Integrals over the interior are sums over the sides, by Green's theorem [Steger1996].
 
     Raises:
-        InputError: if it has no area, or crosses itself so that it has no extent.
+        InputError: if the polygon has no area, or crosses itself so that its second moments vanish.
     """
     about = corners.mean(axis=0)
     raw = _polygon_integrals(corners - about)
     if not abs(raw[0, 0]) > 0.0 or len(corners) < 3:
-        raise InputError(name, "points", "corners without an area between", "corners of a polygon")
+        raise InputError(name, "points", "corners that enclose no area", "corners of a polygon")
     middle = np.array([raw[1, 0], raw[0, 1]]) / raw[0, 0]
     mu = _polygon_integrals(corners - about - middle)
-    mu *= np.sign(raw[0, 0])  # corners may come either way round
+    mu *= np.sign(raw[0, 0])  # corners may be in either order
     if not (mu[2, 0] > 0.0 and mu[2, 0] * mu[0, 2] > mu[1, 1] ** 2):
         raise InputError(name, "points", "a polygon that crosses itself", "corners in order")
     return CentralMoments(about + middle, float(mu[0, 0]), mu, dense=True)
 
 
 def orientation(name: str, mu: FloatArray) -> float:
-    """Return the direction α of the longest extent, rad within (-π/2, π/2].
+    """Return the direction α of the longest extent, rad in (-π/2, π/2].
 
     Raises:
-        InputError: if all extents are the same.
+        InputError: if the extent is the same in all directions.
     """
     across, along = 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
     if np.hypot(across, along) <= _ROUND * (mu[2, 0] + mu[0, 2]):
@@ -104,8 +104,8 @@ def orientation(name: str, mu: FloatArray) -> float:
 def tilt_invariants(moments: CentralMoments) -> FloatArray:
     """Return s_x and s_y, (2,), [Tahri2005].
 
-    They do not change with shifts, size and turns in the image; turns of the camera about its x
-    and y axes change them.
+    They are invariant to translation, scale and rotation in the image; they change when the camera
+    rotates about its x or y axis.
     """
     mu = moments.mu
     c1, s1 = mu[2, 0] - mu[0, 2], 2.0 * mu[1, 1]
@@ -119,7 +119,7 @@ def tilt_invariants(moments: CentralMoments) -> FloatArray:
 
 
 def _polygon_integrals(corners: FloatArray) -> FloatArray:
-    """Return ∫ x^p y^q over the inside of a polygon, signed by its sense, (4, 4)."""
+    """Return ∫ x^p y^q over the interior of a polygon, signed by its orientation, (4, 4)."""
     before = np.concatenate((corners[-1:], corners[:-1]))
     twice = before[:, 0] * corners[:, 1] - corners[:, 0] * before[:, 1]
     now = corners[:, :, None] ** np.arange(_ORDER + 1)

@@ -1,4 +1,4 @@
-"""Points that are taken in pairs, as the ends of segments."""
+"""Points taken in pairs, as the ends of segments."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from vergence.errors import InputError
 
 
 def ends(name: str, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the first and the second points of pairs, each (M/2, 2).
+    """Return the first and the second points of the pairs, each (M/2, 2).
 
     Raises:
-        InputError: if a point is left over, or the points of a pair coincide.
+        InputError: if the number of points is odd, or the points of a pair coincide.
     """
     if len(points) % 2 or not len(points):
-        raise InputError(name, "points", f"{len(points)} points", "an even number: pairs of ends")
+        raise InputError(name, "points", f"{len(points)} points", "an even number, two per segment")
     first, second = points[0::2], points[1::2]
     if not np.linalg.norm(second - first, axis=1).all():
-        raise InputError(name, "points", "two ends at one place", "ends that differ")
+        raise InputError(name, "points", "two ends of a segment that coincide", "distinct ends")
     return first, second

@@ -1,4 +1,4 @@
-"""The centre of a set of points."""
+"""The centroid of a set of points."""
 
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
@@ -8,7 +8,7 @@ from vergence.parts import as_part
 
 @as_part("feature", "centre")
 class Centre(Feature):
-    """Centre of gravity of the points: s = (x_g, y_g)."""
+    """Centroid of the points: s = (x_g, y_g)."""
 
     def value(self) -> FloatArray:
         """Return s, (2,)."""
@@ -16,7 +16,7 @@ class Centre(Feature):
         return centre
 
     def interaction(self) -> FloatArray:
-        """Return L (2, 6), the mean of the points' own."""
+        """Return L (2, 6), the mean of the interaction matrices of the points."""
         rows = interaction_matrix_points(self.points, self.depth_m)
         L: FloatArray = rows.reshape(-1, 2, 6).mean(axis=0)
         return L

@@ -15,9 +15,9 @@ from vergence.parts import as_part
 class Ellipse(Feature):
     """Centre and second moments of an ellipse: s = (x_g, y_g, n20, n11, n02) [Chaumette2004].
 
-    The points lie anywhere on the ellipse; which points of it they are does not matter. Their
-    depths are those of the circle's plane, or of the sphere's visible outline. For the outline of
-    a sphere L is exact too: it moves over the sphere along lines of sight, which no image shows.
+    The points may lie anywhere on the ellipse. Their depths are those of the circle's plane, or of
+    the sphere's visible outline. For a sphere, L is exact as well: its outline moves over the
+    sphere along lines of sight, which does not change the image.
     """
 
     of_curve = True
@@ -30,9 +30,9 @@ class Ellipse(Feature):
     def interaction(self) -> FloatArray:
         """Return L (5, 6): that of [Chaumette2004] for ellipses, in matrix form.
 
-        On a plane every twist moves image points by a quadratic field. With G its gradient at the
-        centre and p (cᵀ p) its quadratic part, the centre moves by the field there and 4 n c, and
-        n by G n + n Gᵀ; third moments of an ellipse are zero.
+        For points on a plane, every twist induces a quadratic image motion field. With G its
+        gradient at the centre and p (cᵀ p) its quadratic part, the centre moves by the field there
+        plus 4 n c, and n by G n + n Gᵀ; the third moments of an ellipse are zero.
         """
         centre, n = self._shape()
         plane = inverse_depth_plane(self.points, self.depth_m)
@@ -48,7 +48,7 @@ class Ellipse(Feature):
     def _shape(self) -> EllipseShape:
         shape = ellipse_through(self.points)
         if shape is None:
-            given = f"{len(self.points)} points on no ellipse"
+            given = f"{len(self.points)} points that no ellipse fits"
             raise InputError("ellipse", "points", given, "five or more points around an ellipse")
         return shape
 
@@ -56,12 +56,12 @@ class Ellipse(Feature):
 def _fields(
     centre: FloatArray, slope: FloatArray, near: float
 ) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Return gradient G (2, 2) and quadratic part c (2,) of each unit twist's field.
+    """Return gradient G (2, 2) and quadratic part c (2,) of the motion field of each unit twist.
 
     Args:
         centre: (x, y), where the gradient is taken.
-        slope: (A, B) of the plane, 1/m.
-        near: 1/Z of the plane there, 1/m.
+        slope: (A, B) of the plane 1/Z = A x + B y + C, 1/m.
+        near: 1/Z of the plane at the centre, 1/m.
     """
     x, y = centre
     zero = np.zeros(2)

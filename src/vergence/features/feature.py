@@ -1,4 +1,4 @@
-"""What every visual feature has."""
+"""The base class of visual features."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
@@ -10,15 +10,15 @@ from vergence.arrays import FloatArray, frozen
 from vergence.errors import InputError
 from vergence.features.interaction import depth_interaction, interaction_matrix_points
 
-_STEP_S = 1e-6  # of central differences; rates are those of unit twists, about 1 1/s
+_STEP_S = 1e-6  # for central differences; unit twists change features at about 1 1/s
 
 
 class Feature(ABC):
-    """A visual feature of image points: its value, and how that moves when the camera does.
+    """A visual feature made of image points: its value, and how it changes when the camera moves.
 
     Args:
-        points: normalized coordinates of the points that it is made of, (M, 2).
-        depth_m: of each point along the optical axis, (M,), or one number for all.
+        points: normalized coordinates of the points, (M, 2).
+        depth_m: depth of each point along the optical axis, (M,), or one number for all.
 
     Attributes:
         of_curve: whether it describes one curve; of several curves it is that of each, stacked.
@@ -26,7 +26,7 @@ class Feature(ABC):
         depth_m: (M,).
 
     Raises:
-        InputError: if a depth is not above zero, or if so many points do not make this feature.
+        InputError: if a depth is not positive, or the number of points does not suit the feature.
     """
 
     of_curve: ClassVar[bool] = False
@@ -37,7 +37,7 @@ class Feature(ABC):
         self.depth_m = frozen(np.full(len(self.points), depth) if depth.ndim == 0 else depth,
                               (len(self.points),), "depth_m")  # fmt: skip
         if not (self.depth_m > 0).all():
-            raise InputError(type(self).__name__, "depth_m", depth_m, "depths above zero")
+            raise InputError(type(self).__name__, "depth_m", depth_m, "positive depths")
 
     @abstractmethod
     def value(self) -> FloatArray:
@@ -46,8 +46,8 @@ class Feature(ABC):
     def interaction(self) -> FloatArray:
         """Return L (k, 6) with ṡ = L v_camera for a stationary target.
 
-        Column i is the central difference of s while the points and their depths move as the unit
-        twist i moves them. A feature with a formula of its own may return that instead.
+        Column i is the central difference of s as points and depths move under unit twist i. A
+        subclass may override this with a closed form.
         """
         flows = interaction_matrix_points(self.points, self.depth_m).T
         rates = depth_interaction(self.points, self.depth_m).T
@@ -58,25 +58,25 @@ class Feature(ABC):
         return np.column_stack(columns)
 
     def error(self, desired: Self) -> FloatArray:
-        """Return e = s - s_star, (k,); a feature of angles wraps them here."""
+        """Return e = s - s_star, (k,); features that contain angles wrap them here."""
         difference: FloatArray = self.value() - desired.value()
         return difference
 
     def outline(self) -> FloatArray:
-        """Return the points that have to stay in view, (M, 2)."""
+        """Return the points that must stay in view, (M, 2)."""
         return self.points
 
     def drift(self, flow: FloatArray, step_s: float = 1e-4) -> FloatArray:
-        """Return ∂s/∂t by the target's own motion, (k,), by a central difference.
+        """Return ∂s/∂t caused by the target's own motion, (k,), by a central difference.
 
         Args:
-            flow: of the points, by the target's own motion, (M, 2), 1/s.
-            step_s: of the difference, s.
+            flow: image velocity of the points caused by the target's own motion, (M, 2), 1/s.
+            step_s: step of the difference, s.
         """
         return self._change(flow, np.zeros(len(self.points)), step_s)
 
     def _change(self, flow: FloatArray, depth_rate: FloatArray, step_s: float) -> FloatArray:
-        """Return ṡ (k,) for rates of points (M, 2) and depths (M,), by a central difference."""
+        """Return ṡ (k,) for rates of the points (M, 2) and depths (M,), by a central difference."""
         before, after = (
             type(self)(self.points + h * flow, self.depth_m + h * depth_rate)
             for h in (-step_s, step_s)

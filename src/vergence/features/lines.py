@@ -14,8 +14,8 @@ from vergence.parts import as_part
 class Lines(Feature):
     """Lines x cos θ + y sin θ = ρ through pairs of points: s = (ρ1, θ1, …) [Espiau1992].
 
-    θ is the direction of the normal to the right of the way from the first point to the second: no
-    line is mistaken for itself turned by half a turn.
+    θ is the direction of the normal that points to the right of the direction from the first point
+    to the second, so a line differs from itself turned by half a turn.
     """
 
     def value(self) -> FloatArray:
@@ -34,11 +34,11 @@ class Lines(Feature):
         return difference
 
     def interaction(self) -> FloatArray:
-        """Return L (M, 6), by what the two points of each line do.
+        """Return L (M, 6), from the motion of the two points of each line.
 
-        With n the normal, ℓ the distance of the points and ẋ their motion,
-        θ̇ = nᵀ (ẋ1 - ẋ2) / ℓ and ρ̇ = nᵀ ẋ1 + θ̇ mᵀ x1, where m = dn/dθ. On a line in space this is
-        the matrix of [Espiau1992].
+        With n the normal, ℓ the distance between the points and ẋ their motion,
+        θ̇ = nᵀ (ẋ1 - ẋ2) / ℓ and ρ̇ = nᵀ ẋ1 + θ̇ mᵀ x1, where m = dn/dθ. For a line in space this
+        equals the matrix of [Espiau1992].
         """
         first, second = ends("lines", self.points)
         way = second - first

@@ -1,4 +1,4 @@
-"""The distance of a target along the optical axis."""
+"""The depth of a target along the optical axis."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from vergence.parts import as_part
 class LogDepth(Feature):
     """Logarithm of the points' mean depth: s - s_star = ln(Z / Z_star) [Malis1999].
 
-    Beside an image point and the rotation it makes the law of [Malis1999], "2½D".
+    Combined with an image point and the rotation it gives the law of [Malis1999], "2½D".
     """
 
     def value(self) -> FloatArray:
@@ -20,7 +20,7 @@ class LogDepth(Feature):
         return np.log([self.depth_m.mean()])
 
     def interaction(self) -> FloatArray:
-        """Return L (1, 6), the mean of the depths' own over the mean depth."""
+        """Return L (1, 6), the mean interaction matrix of the depths divided by the mean depth."""
         rows = depth_interaction(self.points, self.depth_m)
         L: FloatArray = rows.mean(axis=0, keepdims=True) / self.depth_m.mean()
         return L

@@ -1,4 +1,4 @@
-"""Moments of a set of points, or of the inside of a polygon, as a feature of six values."""
+"""Moments of a set of points, or of the interior of a polygon, as a feature of six values."""
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from vergence.parts import as_part
 class Moments(Feature):
     """Centre, size, tilt and orientation of points on a plane: s = (x_n, y_n, a_n, s_x, s_y, α).
 
-    The normalised set of [Tahri2005]: with a the sum of squared distances from the centre,
-    a_n = 1/√a, and x_n, y_n are the centre times a_n: for a target seen from the front they move
-    with the camera's three translations, each with one. s_x and s_y are the invariants that turns
-    about x and y change, α turns about the optical axis. The points may come in any order.
+    The normalised set of [Tahri2005]. With a the sum of squared distances from the centre,
+    a_n = 1/√a, and x_n, y_n are the centre times a_n: for a target parallel to the image plane,
+    each changes with one of the camera's three translations. s_x and s_y change with rotations
+    about the x and y axes, α with rotation about the optical axis. The points may be in any order.
     """
 
     def value(self) -> FloatArray:
@@ -47,7 +47,7 @@ class Moments(Feature):
 
 @as_part("feature", "region_moments")
 class RegionMoments(Moments):
-    """`Moments` of the inside of a polygon; the points are its corners, in order; a is its area."""
+    """`Moments` of the interior of a polygon; the points are its corners in order, a its area."""
 
     of_curve = True
     _name = "region_moments"

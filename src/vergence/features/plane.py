@@ -1,4 +1,4 @@
-"""The plane that points lie on, as their depths tell it."""
+"""The plane that points lie on, from their depths."""
 
 import numpy as np
 
@@ -6,11 +6,12 @@ from vergence.arrays import FloatArray
 
 
 def inverse_depth_plane(points: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """Return (A, B, C), 1/m, with 1/Z = A x + B y + C on the plane of points.
+    """Return (A, B, C), 1/m, such that 1/Z = A x + B y + C on the plane of the points.
 
     Args:
         points: normalized coordinates, (M, 2).
-        depth_m: Z of each, (M,). Of points on a line the plane that changes least is returned.
+        depth_m: Z of each, (M,). For collinear points, the plane with the smallest slope is
+            returned.
     """
     centre = points.mean(axis=0)
     inverse = 1.0 / depth_m

@@ -1,4 +1,4 @@
-"""Points in space, in the camera's frame."""
+"""Points in space, in the camera frame."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from vergence.parts import as_part
 
 @as_part("feature", "points_3d")
 class Points3d(Feature):
-    """Positions of the points in the camera's frame, metres: s = (X1, Y1, Z1, X2, …).
+    """Positions of the points in the camera frame, metres: s = (X1, Y1, Z1, X2, …).
 
-    They are as good as the depths they are made of. The target moves on a straight line in space.
+    They are as accurate as the depths. The target moves in a straight line in space.
     """
 
     def value(self) -> FloatArray:

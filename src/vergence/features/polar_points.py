@@ -14,8 +14,8 @@ from vergence.parts import as_part
 class PolarPoints(Feature):
     """Distance ρ and direction θ of each point: s = (ρ1, θ1, ρ2, θ2, …).
 
-    A turn about the optical axis changes θ alone, so that it does not take the camera backwards
-    as it does with Cartesian coordinates. θ is not known at the middle of the image.
+    Rotation about the optical axis changes θ alone, so a large one does not drive the camera
+    backwards as it does with Cartesian coordinates. θ is undefined at the image centre.
     """
 
     def value(self) -> FloatArray:
@@ -24,11 +24,11 @@ class PolarPoints(Feature):
         return np.column_stack((np.hypot(x, y), np.arctan2(y, x))).ravel()
 
     def interaction(self) -> FloatArray:
-        """Return L (2M, 6): the points' own rows, along and across the ray from the middle."""
+        """Return L (2M, 6): the rows of the points, along and across the ray from the centre."""
         L = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
         rho = np.hypot(*self.points.T)
         if not rho.all():
-            raise InputError("polar_points", "points", "one at the middle", "points beside it")
+            raise InputError("polar_points", "points", "one at the centre", "points off it")
         c, s = self.points.T / rho
         along = c[:, None] * L[:, 0] + s[:, None] * L[:, 1]
         across = (c[:, None] * L[:, 1] - s[:, None] * L[:, 0]) / rho[:, None]

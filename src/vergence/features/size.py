@@ -10,9 +10,9 @@ from vergence.parts import as_part
 
 @as_part("feature", "size")
 class Size(Feature):
-    """s = 1/√a, a the sum of squared distances from the centre: proportional to the distance.
+    """s = 1/√a, with a the sum of squared distances from the centre: proportional to the distance.
 
-    [Tahri2005]; a target that faces the camera needs nothing else along the optical axis.
+    [Tahri2005]; for a target that faces the camera, it suffices to control the distance.
     """
 
     def value(self) -> FloatArray:

@@ -11,7 +11,7 @@ from vergence.parts import as_part
 class SphericalPoints(Feature):
     """Directions of the lines of sight, as unit vectors: s = (u1, u2, …).
 
-    A turn of the camera rotates them as it is, wherever in the image they are.
+    Under a camera rotation they all rotate in the same way, wherever they are in the image.
     """
 
     def value(self) -> FloatArray:

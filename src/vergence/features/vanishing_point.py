@@ -1,4 +1,4 @@
-"""Where the images of parallel lines meet."""
+"""The vanishing point of parallel lines."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from vergence.parts import as_part
 
 @as_part("feature", "vanishing_point")
 class VanishingPoint(Feature):
-    """The direction of two parallel lines, as the unit vector of the ray to where they meet.
+    """Vanishing point of two parallel lines, as a unit vector along the ray to it.
 
-    Four points: two on the first line, two on the second, in the same sense. Only turns of the
-    camera move it. The unit vector is defined also where the lines' images are parallel.
+    Takes four points: two on the first line, two on the second, in the same direction. It changes
+    only with camera rotation, and is defined even where the images of the lines are parallel.
     """
 
     def value(self) -> FloatArray:
-        """Return the unit vector, (3,), with the sense from first to second points."""
+        """Return the unit vector, (3,), in the direction from first to second points."""
         if len(self.points) != 4:
             given = f"{len(self.points)} points"
             raise InputError("vanishing_point", "points", given, "four: two on each of two lines")

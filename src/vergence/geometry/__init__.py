@@ -1,7 +1,7 @@
 """Rotations and rigid motions: exponentials, logarithms, their Jacobians, changes of frame.
 
-Functions take float64 arrays and validate nothing; all but `flat_normal` and those of ellipses are
-numba kernels, which other kernels may call.
+Functions take float64 arrays and do not validate them. All except `flat_normal` and the ellipse
+functions are numba kernels, which other kernels may call.
 """
 
 from vergence.geometry.ellipse import EllipseShape, ellipse_through, unit_vectors

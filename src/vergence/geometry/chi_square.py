@@ -1,4 +1,4 @@
-"""Quantiles of χ², for tests of whether noise explains what is left."""
+"""Quantiles of χ², for tests of whether noise alone explains a residual."""
 
 from math import inf, sqrt
 
@@ -8,10 +8,10 @@ NORMAL_QUANTILE = 3.09  # one in a thousand
 
 
 def chi_square_quantile(freedom: float, normal_quantile: float = NORMAL_QUANTILE) -> float:
-    """Return the quantile of χ² that a standard normal variable has at `normal_quantile`.
+    """Return the quantile of χ² that has the probability of `normal_quantile` of a standard normal.
 
-    n (1 - 2/(9n) + z √(2/(9n)))³, good to 3 % from two degrees of freedom on (Wilson, Hilferty);
-    0 without any freedom.
+    n (1 - 2/(9n) + z √(2/(9n)))³, accurate to 3 % for two or more degrees of freedom (Wilson and
+    Hilferty); 0 if there are no degrees of freedom.
     """
     if freedom <= 0.0:
         return 0.0
@@ -20,15 +20,15 @@ def chi_square_quantile(freedom: float, normal_quantile: float = NORMAL_QUANTILE
 
 
 def normal_deviate_of_ratio(ratio: float, freedom: float, freedom_below: float = inf) -> float:
-    """Return the standard normal variable that is as unlikely as a ratio of mean squares, F.
+    """Return the standard normal deviate that is as improbable as a ratio F of mean squares.
 
-    ((1 - 2/(9n')) F^⅓ - (1 - 2/(9n))) / √(2/(9n') F^⅔ + 2/(9n)) [Paulson 1942]; without an end to
-    n' it is Wilson's and Hilferty's for χ²/n.
+    ((1 - 2/(9n')) F^⅓ - (1 - 2/(9n))) / √(2/(9n') F^⅔ + 2/(9n)) [Paulson 1942]; for infinite n'
+    this is the approximation of Wilson and Hilferty for χ²/n.
 
     Args:
-        ratio: F, of two estimates of one variance.
-        freedom: n, degrees of freedom of the upper one.
-        freedom_below: n', of the lower one; infinite if that variance is known.
+        ratio: F, the ratio of two estimates of the same variance.
+        freedom: n, degrees of freedom of the numerator.
+        freedom_below: n', degrees of freedom of the denominator; infinite if it is known.
     """
     root = float(np.cbrt(ratio))
     above, below = 2.0 / (9.0 * freedom), 2.0 / (9.0 * freedom_below)

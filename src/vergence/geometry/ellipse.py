@@ -1,4 +1,4 @@
-"""Ellipses in a plane: from points on them, and points on them."""
+"""Ellipses in a plane: fitting one to points, and sampling points on one."""
 
 from typing import NamedTuple
 
@@ -8,12 +8,12 @@ from vergence.arrays import FloatArray
 
 
 class EllipseShape(NamedTuple):
-    """An ellipse, by the moments of its inside.
+    """An ellipse, represented by the moments of its interior.
 
     Attributes:
         centre: (2,).
-        second: normalised second central moments [[n20, n11], [n11, n02]], (2, 2): a quarter of
-            the squared semi-axes along its axes.
+        second: normalised second central moments [[n20, n11], [n11, n02]], (2, 2). Their
+            eigenvalues are a quarter of the squared semi-axes.
     """
 
     centre: FloatArray
@@ -21,36 +21,36 @@ class EllipseShape(NamedTuple):
 
     @property
     def root(self) -> FloatArray:
-        """The symmetric S with S u on the ellipse, less its centre, for every unit vector u."""
+        """The symmetric S (2, 2) for which the centre plus S u is on the ellipse if |u| = 1."""
         values, axes = np.linalg.eigh(4.0 * self.second)
         root: FloatArray = (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
         return root
 
     @property
     def semi_axes(self) -> tuple[float, float]:
-        """The longer and the shorter one."""
+        """The semi-major and the semi-minor axis."""
         small, large = np.sqrt(np.maximum(np.linalg.eigvalsh(4.0 * self.second), 0.0)).tolist()
         return large, small
 
     def points(self, count: int) -> FloatArray:
-        """Return points on it, (count, 2), that change smoothly with it, also where it is round.
+        """Return points on it, (count, 2), that vary smoothly with it, even near a circle.
 
-        They are the centre plus S u for unit vectors u at equal angles.
+        They are the centre plus S u for unit vectors u at equally spaced angles.
         """
         return self.centre + unit_vectors(count) @ self.root
 
 
 def unit_vectors(count: int) -> FloatArray:
-    """Return unit vectors at equal angles, (count, 2), the first along x."""
+    """Return unit vectors at equally spaced angles, (count, 2), the first along x."""
     angle = 2.0 * np.pi * np.arange(count) / count
     return np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 def ellipse_through(points: FloatArray) -> EllipseShape | None:
-    """Return the ellipse that fits points (M, 2) best, None if no ellipse does.
+    """Return the ellipse that best fits points (M, 2), None if the best conic is not an ellipse.
 
-    The conic about the points' mean whose equation pᵀ M p + bᵀ p = 1 they fulfil with the least
-    squares; for points on an ellipse it is that one.
+    Fits the conic pᵀ M p + bᵀ p = 1, with p relative to the mean of the points, by linear least
+    squares; exact if the points lie on an ellipse.
     """
     if len(points) < 5:
         return None

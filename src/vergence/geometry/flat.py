@@ -1,17 +1,17 @@
-"""Flat sets of points: the plane they lie in, and the side that a camera sees."""
+"""Coplanar points: the plane they lie in, and the side of it that a camera sees."""
 
 import numpy as np
 
 from vergence.arrays import FloatArray
 
-FLAT = 0.01  # of the smaller extent: points as close as this to a plane are flat
+FLAT = 0.01  # fraction of the smaller extent: points within this distance of a plane are flat
 
 
 def flat_normal(points: FloatArray) -> FloatArray | None:
     """Return the unit normal (3,) of the plane that points (N, 3) lie in.
 
     Returns:
-        None if they do not: they are not flat, lie on a line, or are fewer than three.
+        The normal, or None if the points are not flat, lie on a line, or are fewer than three.
     """
     if len(points) < 3:
         return None

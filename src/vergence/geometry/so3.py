@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.geometry.quaternion import matrix_to_quaternion
 
-# Below this squared angle the closed forms lose digits and four terms of their series do not.
+# Below this squared angle the closed forms lose digits; four terms of their series do not.
 SMALL_ANGLE_SQUARED = 1e-2
 
 

@@ -1,7 +1,7 @@
-"""Rotations and rigid motions for users: they accept lists and name a wrong shape.
+"""Rotations and rigid motions for users: they accept lists and report a wrong shape by name.
 
-Each function is the kernel of that name in `vergence.geometry`, which validates nothing, behind a
-check.
+Each function checks its arguments and calls the kernel of the same name in `vergence.geometry`,
+which does not validate them.
 """
 
 from collections.abc import Callable
@@ -17,14 +17,14 @@ from vergence.arrays import FloatArray, as_floats
 
 
 def _checked(kernel: Any, *shapes: tuple[int | None, ...]) -> Callable[..., Any]:
-    """Return a kernel behind a check of its arguments: float64, in C order, of these shapes."""
+    """Return a kernel wrapped in a check of its arguments: float64, C order, these shapes."""
     takes = signature(kernel.py_func)
 
     @wraps(kernel.py_func)
     def function(*args: Any, **kwargs: Any) -> Any:
         given = takes.bind(*args, **kwargs).arguments.items()
         pairs = zip(given, shapes, strict=True)
-        # Copies, which are writeable whatever was given: each kernel is compiled for one type.
+        # Copies are writeable whatever was given; each kernel is compiled for one array type only.
         arrays = [np.array(as_floats(value, shape, name)) for (name, value), shape in pairs]
         return kernel(*(array if array.ndim else float(array) for array in arrays))
 
@@ -55,7 +55,7 @@ transform_points = _checked(kernels.transform_points, _POSE, (None, 3))
 
 
 def flat_normal(points: ArrayLike) -> FloatArray | None:
-    """Return the unit normal (3,) of the plane that points (N, 3) lie in; None if they do not."""
+    """Return the unit normal (3,) of the plane of points (N, 3); None if they are not coplanar."""
     normal: FloatArray | None = kernels.flat_normal(as_floats(points, (None, 3), "points"))
     return normal
 
