@@ -156,7 +156,7 @@ def test_as_many_rate_limits_as_joints() -> None:
     arm = Arm.from_mujoco(model, "eye", rate_max=2.0, acceleration_max=np.arange(1.0, 5.0))
     np.testing.assert_array_equal(arm.rate_max, 2.0)
     np.testing.assert_array_equal(arm.acceleration_max, [1.0, 2.0, 3.0, 4.0])
-    with pytest.raises(InputError, match="one, or 4"):
+    with pytest.raises(InputError, match="one value, or 4"):
         Arm.from_mujoco(model, "eye", rate_max=np.ones(3))
 
 

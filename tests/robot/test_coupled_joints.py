@@ -131,7 +131,7 @@ def test_a_leader_goes_as_far_as_the_first_of_its_axes_may() -> None:
         ('<weld body1="b3"/>', "weld constraint.*closes a loop"),
         (
             '<joint joint1="j2" joint2="j1" polycoef="9 1 0 0 0"/>',
-            "j1, which it follows, no room",
+            "j1, which it follows, no range",
         ),
     ],
 )

@@ -158,7 +158,7 @@ def test_the_velocity_limits_are_the_files(tmp_path: Path) -> None:
 def test_a_velocity_limit_of_zero_is_taken_for_none_in_words(tmp_path: Path, caplog) -> None:
     arm = arm_of(robot(tmp_path, joint(1, LIMIT.replace("1.0", "0"))))
     assert arm.rate_max[0] == pytest.approx(np.pi)
-    assert "velocity limits of 0 are taken for none: joint1" in caplog.text
+    assert "velocity limits of 0 are ignored: joint1" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -176,8 +176,8 @@ def test_a_velocity_limit_of_zero_is_taken_for_none_in_words(tmp_path: Path, cap
         (joint(3, axis="0 0"), "axis of joint joint3: xyz: given 0 0; allowed: 3 numbers"),
         (joint(3).replace('"link2"', '"link9"'), "parent of joint joint3: given link9"),
         (joint(3).replace('child link="link3"', 'child link="link2"'), "link link2: given two"),
-        (joint(1).replace('"link0"', '"link6"'), "joints in a circle, through link link"),
-        (joint(4).replace('"link3"', '"link6"'), "joints in a circle, through link link4"),
+        (joint(1).replace('"link0"', '"link6"'), "joints that form a loop through link link"),
+        (joint(4).replace('"link3"', '"link6"'), "joints that form a loop through link link4"),
     ],
 )
 def test_what_no_arm_can_have_is_refused(tmp_path: Path, changed: str, complaint: str) -> None:
@@ -208,7 +208,7 @@ def test_degrees_and_millimetres_are_noticed(tmp_path: Path, caplog) -> None:
     [
         ("<robot>", "allowed: XML"),
         ("", "allowed: XML"),
-        ("<mujoco/>", "<robot>, as a URDF begins"),
+        ("<mujoco/>", "<robot>, the root element of a URDF"),
         ("<robot/>", "links: none"),
         ('<!DOCTYPE r [<!ENTITY a "b">]><robot>&a;</robot>', "entities"),
         ("<robot>" + "<a>" * 300 + "</a>" * 300 + "</robot>", "256 levels"),

@@ -1,4 +1,4 @@
-"""Robots: an arm as a controller sees it."""
+"""Robots: the arm model that controllers use."""
 
 from vergence.robot.arm import Arm
 from vergence.robot.chain import (

@@ -1,4 +1,4 @@
-"""An arm as a controller sees it."""
+"""An arm as controllers see it: kinematics and limits."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,22 +14,22 @@ from vergence.robot.chain import Chain, forward_kinematics, jacobian
 if TYPE_CHECKING:
     import mujoco
 
-# Where neither the model nor the user says: rad/s, m/s, rad/s², m/s².
+# Defaults where neither the model nor the user gives a limit: rad/s, m/s, rad/s², m/s².
 RATE, SLIDING_RATE, ACCELERATION, SLIDING_ACCELERATION = np.pi, 0.5, 4 * np.pi, 2.0
-_ROUNDING = 1e-3  # of a limit written in degrees
+_ROUNDING = 1e-3  # relative tolerance for a limit that was written in degrees
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
     """Joints from the world to a tip (a camera or a tool), with their limits."""
 
-    names: tuple[str, ...]  # of the joints that may be commanded, from the base outwards
-    chain: Chain  # its axes, m ≥ n: a joint that others follow moves several
+    names: tuple[str, ...]  # of the joints that can be commanded, from the base outwards
+    chain: Chain  # its axes, m ≥ n: a joint that others follow moves several axes
     q_min: FloatArray  # (n,) rad or m, -inf where there is no limit
     q_max: FloatArray  # (n,)
     rate_max: FloatArray  # (n,) rad/s or m/s
     acceleration_max: FloatArray  # (n,) rad/s² or m/s²
-    axis_names: tuple[str, ...] = ()  # (m,) of the chain's axes; `names` if empty
+    axis_names: tuple[str, ...] = ()  # (m,) names of the chain's axes; `names` if empty
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -43,18 +43,19 @@ class Arm:
                 )
         for name in ("rate_max", "acceleration_max"):
             if not (getattr(self, name) > 0).all():
-                raise InputError("arm", name, getattr(self, name), "numbers above zero")
+                raise InputError("arm", name, getattr(self, name), "positive numbers")
 
     @classmethod
     def from_urdf(cls, path: str | Path, tip: str) -> Self:
-        """Read the joints that carry a link off a URDF, with their limits.
+        """Read the joints that carry a link, with their limits, from a URDF.
 
         Args:
-            path: of the file, expanded if it was an xacro.
+            path: the file; an xacro must be expanded first.
             tip: name of the link at the end of the chain, such as "tool0".
 
         Raises:
-            InputError: if there is no such file or link, or it says what cannot be honoured.
+            InputError: if the file or the link does not exist, or the file asks for something that
+                is not supported.
         """
         from vergence.robot.urdf import read_urdf
 
@@ -63,11 +64,11 @@ class Arm:
         return cls.from_mujoco(read_urdf(Path(path), tip).compile(), tip, kind="body")
 
     def with_tip(self, T_tip_new: ArrayLike) -> Self:
-        """Return the arm up to another tip that is fixed to its own, such as a mounted camera.
+        """Return the arm with another tip that is fixed to its own, such as a mounted camera.
 
         Args:
-            T_tip_new: (4, 4) pose of the new tip in the old one's frame, such as T_flange_camera of
-                a hand-eye calibration.
+            T_tip_new: (4, 4) pose of the new tip in the frame of the present one, such as
+                T_flange_camera from a hand-eye calibration.
 
         Raises:
             InputError: if it is not a rigid motion.
@@ -92,21 +93,22 @@ class Arm:
         acceleration_max: float | FloatArray | None = None,
         kind: str = "camera",
     ) -> Self:
-        """Read the joints that carry a camera, site or body off a MuJoCo model.
+        """Read the joints that carry a camera, site or body from a MuJoCo model.
 
         Args:
             model: any compiled model.
             tip: name of the camera, site or body at the end of the chain. A camera's frame is
-                turned to OpenCV's convention: z forward, x right, y down.
-            rate_max: joint rate limits, one for all or (n,), rad/s or m/s; up to those of the
-                model, which hold if absent. Where the model has none, π rad/s or 0.5 m/s.
-            acceleration_max: joint acceleration limits, likewise; 4π rad/s² or 2 m/s² if absent.
+                converted to OpenCV's convention: z forward, x right, y down.
+            rate_max: joint rate limits, one for all or (n,), rad/s or m/s; at most those of the
+                model, which are the default. Where the model has none: π rad/s or 0.5 m/s.
+            acceleration_max: joint acceleration limits, one for all or (n,); 4π rad/s² or 2 m/s² by
+                default.
             kind: "camera", "site" or "body".
 
         Raises:
-            InputError: if there is no such tip, no joint carries it, a joint has more than one
-                degree of freedom, joints are coupled in a way that no chain can be, or limits are
-                the wrong way round, too few, or looser than the model's.
+            InputError: if the tip does not exist, no joint carries it, a joint has more than one
+                degree of freedom, joints are coupled in a way that is not supported, or limits are
+                reversed, too few, or looser than the model's.
         """
         from vergence.robot.mujoco_chain import read_chain
 
@@ -135,7 +137,7 @@ class Arm:
 
     @property
     def sliding(self) -> BoolArray:
-        """Which joints slide, (n,)."""
+        """True for each prismatic joint, (n,)."""
         return _of_joints(self.chain.sliding, self.names, self.axis_names)
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
@@ -144,12 +146,12 @@ class Arm:
         return T
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
-        """Return the tip's Jacobian (6, n) in the tip's own axes: v_tip = J q̇."""
+        """Return the Jacobian (6, n) of the tip in its own frame: v_tip = J q̇."""
         J: FloatArray = jacobian(self.chain, frozen(q, (self.joint_count,), "q"))
         return J
 
     def axis_positions(self, q: FloatArray) -> FloatArray:
-        """Return how far joint positions q (n,) move every axis of the chain, (m,), rad or m."""
+        """Return the positions of all axes of the chain, (m,), at joints q (n,), rad or m."""
         positions = frozen(q, (self.joint_count,), "q")
         if len(self.chain.coupling) == 0:
             return positions
@@ -164,7 +166,7 @@ class Arm:
         return result
 
     def normalized(self, q: ArrayLike) -> FloatArray:
-        """Return q (…, n) with its limits at -1 and 1; 0 for a joint without limits."""
+        """Return q (…, n) scaled so that the limits are -1 and 1; 0 for a joint without limits."""
         q = np.asarray(q, dtype=np.float64)
         limited = np.isfinite(self.q_max - self.q_min)
         low, high = np.where(limited, self.q_min, -1.0), np.where(limited, self.q_max, 1.0)
@@ -172,7 +174,7 @@ class Arm:
         return result
 
     def index(self, joint: str) -> int:
-        """Return the place of a joint in the chain.
+        """Return the index of a joint.
 
         Raises:
             InputError: if the arm has no such joint.
@@ -185,13 +187,13 @@ class Arm:
 def _of_joints(
     axes: BoolArray | FloatArray, names: tuple[str, ...], axis_names: tuple[str, ...]
 ) -> BoolArray:
-    """Return of what all axes say (m,) that of the joints' own, (n,)."""
+    """Reduce values of all axes (m,) to those of the joints, (n,)."""
     own: BoolArray = np.array([bool(axes[axis_names.index(name)]) for name in names])
     return own
 
 
 def _within(rate_max: FloatArray, most: FloatArray, names: tuple[str, ...]) -> FloatArray:
-    """Return rate limits (n,) cut to the model's; refuse one above by more than rounding."""
+    """Return rate limits (n,) clamped to the model's; reject one beyond rounding."""
     for joint, rate, limit in zip(names, rate_max, most, strict=True):
         if rate > limit * (1 + _ROUNDING):
             allowed = f"up to {limit:g}, the model's velocity limit"
@@ -202,5 +204,5 @@ def _within(rate_max: FloatArray, most: FloatArray, names: tuple[str, ...]) -> F
 def _one_each(values: float | FloatArray, n: int, name: str) -> FloatArray:
     given = np.asarray(values, dtype=np.float64)
     if given.shape not in ((), (n,)):
-        raise InputError("arm", name, f"{given.size} values", f"one, or {n}, one per joint")
+        raise InputError("arm", name, f"{given.size} values", f"one value, or {n}: one per joint")
     return np.broadcast_to(given, (n,))

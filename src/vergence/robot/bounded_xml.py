@@ -13,15 +13,15 @@ _Events: TypeAlias = Iterator[tuple[str, Element]]
 _BYTES_MAX = 16 << 20
 _DEPTH_MAX = 256
 _ELEMENTS_MAX = 100_000
-_DIGITS_MAX = 64  # of one number
-_LARGEST = 1e18  # of a number
+_DIGITS_MAX = 64  # digits in one number
+_LARGEST = 1e18  # largest magnitude of a number
 
 
 def read_xml(path: Path) -> Element:
     """Return the root of an XML file.
 
     Raises:
-        InputError: if it cannot be read, is no XML, declares entities, or exceeds the bounds.
+        InputError: if it cannot be read, is not XML, declares entities, or exceeds the bounds.
     """
     source = str(path)
     try:
@@ -57,7 +57,7 @@ def _parse(text: bytes, source: str) -> Element:
     except (ET.ParseError, LookupError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(source, "", f"text that breaks off or is none ({error})", "XML") from None
+        raise InputError(source, "", f"incomplete or not XML ({error})", "XML") from None
     if root is None:
         raise InputError(source, "", Absent("no element"), "XML")
     return root
@@ -69,14 +69,14 @@ def numbers(
     """Return the numbers of an attribute, as many as the default has.
 
     Args:
-        element: that may have the attribute; the default replaces an absent one.
+        element: the element that may have the attribute.
         key: the attribute.
-        default: what holds without it.
+        default: returned if the attribute is absent.
         source: the file, for error messages.
-        where: the element, likewise.
+        where: the element, for error messages.
 
     Raises:
-        InputError: if they are not so many finite numbers.
+        InputError: if there is another number of values, or one is not finite.
     """
     given = element.get(key)
     if given is None:

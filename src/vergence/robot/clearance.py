@@ -1,4 +1,4 @@
-"""Distances between the bodies of an arm, and from them to others, as laws and planners ask."""
+"""Distances between the bodies of an arm and to other bodies, as laws and planners query them."""
 
 from typing import NamedTuple, Protocol
 
@@ -6,36 +6,36 @@ from vergence.arrays import FloatArray, IntArray
 
 
 class NearPairs(NamedTuple):
-    """Pairs of bodies that are near each other now."""
+    """Pairs of bodies that are close to each other at present."""
 
     distance: FloatArray  # (K,) m, negative where they overlap
-    margin: FloatArray  # (K,) m, the distance that is kept
-    gradient: FloatArray  # (K, n) of the distance by the arm's joints, m/rad or 1
-    drift: FloatArray  # (K,) m/s, how the distance changes by itself
-    pair: IntArray  # (K,) which pair of all
+    margin: FloatArray  # (K,) m, the distance to keep
+    gradient: FloatArray  # (K, n) of the distance with respect to the joints, m/rad or 1
+    drift: FloatArray  # (K,) m/s, change of the distance not caused by the arm's joints
+    pair: IntArray  # (K,) index into all pairs
 
 
 class Clearance(Protocol):
-    """Distances between the bodies of an arm, and from them to others, by joint positions.
+    """Distances between the bodies of an arm and to other bodies, as functions of joint positions.
 
     Attributes:
-        margin: (P,) the distance kept by each pair, m.
-        reach: (P, n) what a joint changes the distance of a pair by at most, m/rad or 1.
+        margin: (P,) the distance to keep for each pair, m.
+        reach: (P, n) the largest rate at which a joint can change the distance, m/rad or 1.
     """
 
     margin: FloatArray
     reach: FloatArray
 
     def near(self, q: FloatArray) -> NearPairs:
-        """Return the pairs that are near with the joints at q (n,)."""
+        """Return the pairs that are close to each other at joint positions q (n,)."""
         ...
 
     def distances(self, q: FloatArray) -> FloatArray:
-        """Return the distance of every pair, (P,), m; of one far apart what it is at least."""
+        """Return the distance of every pair, (P,), m; a lower bound for pairs far apart."""
         ...
 
     def least(self, near: NearPairs) -> dict[str, float]:
-        """Return the least distance, m, to each kind of thing that is near."""
+        """Return the smallest distance to each kind of body that is near, m."""
         ...
 
     def name(self, pair: int) -> str:
@@ -43,5 +43,5 @@ class Clearance(Protocol):
         ...
 
     def others(self) -> FloatArray:
-        """Return the joint positions of the other arms that are looked at, (k,), rad or m."""
+        """Return the joint positions of the other arms taken into account, (k,), rad or m."""
         ...

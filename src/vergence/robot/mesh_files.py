@@ -1,4 +1,4 @@
-"""Mesh files: which of them MuJoCo can draw, and why not the others."""
+"""Mesh files: which of them MuJoCo can draw, and why it cannot draw the others."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -9,30 +9,30 @@ import numpy as np
 from vergence.arrays import FloatArray, IntArray
 from vergence.errors import InputError
 
-_FORMATS = (".stl", ".obj", ".msh")  # that MuJoCo reads
+_FORMATS = (".stl", ".obj", ".msh")  # formats that MuJoCo reads
 FORMAT_FAULT = "is in a format that MuJoCo does not read"
 _BYTES_MAX = 256 << 20
-SHELL = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # the one that flat meshes have, too
+SHELL = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # the only inertia that flat meshes have as well
 
 
 class Triangles(NamedTuple):
     """A mesh in memory."""
 
     vertices: FloatArray  # (V, 3)
-    faces: IntArray  # (F, 3) numbers of vertices
+    faces: IntArray  # (F, 3) indices of vertices
 
 
 class MeshFile(NamedTuple):
     """The result of reading a mesh file."""
 
     fault: str | None = None  # why it cannot be drawn, as the end of a sentence
-    size_m: float = 0.0  # diameter of a ball around it
-    triangles: Triangles | None = None  # what it holds, where MuJoCo cannot read it itself
-    is_flat: bool = False  # without a volume: it takes `SHELL` to have an inertia
+    size_m: float = 0.0  # diameter of a bounding sphere
+    triangles: Triangles | None = None  # its contents, if MuJoCo cannot read the file itself
+    is_flat: bool = False  # without volume: needs `SHELL` to have an inertia
 
 
 def check_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> MeshFile:
-    """Return whether MuJoCo can draw a mesh file, at a scale along its axes."""
+    """Check whether MuJoCo can draw a mesh file at a scale along its axes."""
     if not path.is_file():
         return MeshFile("is missing")
     if path.suffix.lower() not in _FORMATS:
@@ -45,7 +45,7 @@ def check_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> MeshFi
         size, is_flat = _compiled(path, scale, triangles)
     except InputError as error:
         return MeshFile(f"cannot be read: {error.given}")
-    except ValueError as error:  # MuJoCo's, of several lines
+    except ValueError as error:  # from MuJoCo, several lines long
         reason = str(error).removeprefix("Error: ").partition("\n")[0]
         return MeshFile(f"cannot be drawn: {reason.replace(str(path), path.name)}")
     return MeshFile(None, size, triangles, is_flat)
@@ -54,7 +54,7 @@ def check_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> MeshFi
 def _compiled(
     path: Path, scale: tuple[float, ...], triangles: Triangles | None
 ) -> tuple[float, bool]:
-    """Return the diameter of a ball around a mesh, m, and whether it is flat."""
+    """Return the diameter of a mesh's bounding sphere, m, and whether it is flat."""
     spec = mujoco.MjSpec()
     mesh = spec.add_mesh(name="mesh", file=str(path), scale=scale)
     if triangles is not None:
@@ -74,16 +74,16 @@ def _compiled(
 
 
 def use_triangles(mesh: mujoco.MjsMesh, triangles: Triangles) -> None:
-    """Make a mesh of a spec one in memory."""
+    """Replace the file of a mesh in an MjSpec by triangles."""
     mesh.file = ""
     mesh.uservert, mesh.userface = triangles.vertices.ravel(), triangles.faces.ravel()
 
 
 def read_ascii_stl(path: Path) -> Triangles | None:
-    """Return the triangles of an STL in text form, which MuJoCo does not read; None if it is none.
+    """Return the triangles of an ASCII STL, which MuJoCo does not read; None for any other file.
 
     Raises:
-        InputError: if it begins as one and is not one.
+        InputError: if the file begins as an ASCII STL but is damaged.
     """
     if path.suffix.lower() != ".stl":
         return None
@@ -97,8 +97,8 @@ def read_ascii_stl(path: Path) -> Triangles | None:
     try:
         corners = np.array([words[i + 1 : i + 4] for i in at], dtype=np.float64).reshape(-1, 3, 3)
     except ValueError:
-        raise InputError(str(path), "", "an STL in text form that breaks off", "an STL") from None
+        raise InputError(str(path), "", "an incomplete ASCII STL", "an STL") from None
     if not len(corners) or not np.isfinite(corners).all():
-        raise InputError(str(path), "", "an STL in text form without triangles", "an STL")
+        raise InputError(str(path), "", "an ASCII STL without triangles", "an STL")
     vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     return Triangles(vertices, faces.reshape(-1, 3).astype(np.int64))

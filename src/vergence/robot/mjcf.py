@@ -1,4 +1,4 @@
-"""Reading an MJCF within bounds; of an arm, without the meshes that cannot be drawn."""
+"""Reading an MJCF within bounds; an arm is read even if some of its meshes cannot be drawn."""
 
 import logging
 from collections.abc import Iterator
@@ -13,23 +13,23 @@ from vergence.robot.bounded_xml import read_xml
 from vergence.robot.mesh_files import SHELL, check_mesh, use_triangles
 
 _LOG = logging.getLogger(__name__)
-_FILES_MAX = 64  # included ones
-_COPIES_MAX = 10_000  # bodies and shapes that few words make many
-_PIXELS_MAX = 8192  # along a side of a texture or height field
+_FILES_MAX = 64  # included files
+_COPIES_MAX = 10_000  # bodies and shapes that a short element can multiply
+_PIXELS_MAX = 8192  # along one side of a texture or height field
 _MEMORY_MAX = 1 << 30
-_SUFFIXES = {"k": 10, "m": 20, "g": 30, "t": 40, "p": 50, "e": 60}  # powers of two
+_SUFFIXES = {"k": 10, "m": 20, "g": 30, "t": 40, "p": 50, "e": 60}  # as powers of two
 
 
 def read_mjcf(path: Path, meshes_needed: bool) -> Any:
     """Return the MjSpec of an MJCF.
 
     Args:
-        path: of the file.
-        meshes_needed: whether one that cannot be drawn is an error, or, as an arm moves without it,
-            left out with a warning.
+        path: the file.
+        meshes_needed: if true, a mesh that cannot be drawn is an error; if false, it is left out
+            with a warning, since an arm moves without it.
 
     Raises:
-        InputError: if MuJoCo does not read it, or it asks for more than any cell needs.
+        InputError: if MuJoCo cannot read it, or it exceeds the bounds.
     """
     for file in _files(path):
         _check(file, read_xml(file), 1)
@@ -43,7 +43,7 @@ def read_mjcf(path: Path, meshes_needed: bool) -> Any:
 
 
 def _files(path: Path) -> Iterator[Path]:
-    """Yield a file and those that it includes, each once, as seen from the first's folder."""
+    """Yield a file and those it includes, each once, relative to the first one's folder."""
     waiting, known = [path], {path}
     while waiting:
         file = waiting.pop()
@@ -61,7 +61,7 @@ def _files(path: Path) -> Iterator[Path]:
 
 
 def _check(file: Path, element: Element, copies: int) -> None:
-    """Refuse an element that few words make large, or one inside it."""
+    """Reject an element, or one inside it, that asks for an excessive amount of data."""
     copies *= max(1, _product(file, element, "count"))
     if copies > _COPIES_MAX:
         given = f"{copies} copies"
@@ -88,7 +88,7 @@ def _product(file: Path, element: Element, key: str) -> int:
 
 
 def _bytes(memory: str) -> float:
-    """Return what MuJoCo makes of a size such as 10M; 0 for what it refuses itself."""
+    """Return the size in bytes that MuJoCo reads from text such as 10M; 0 if MuJoCo rejects it."""
     power = _SUFFIXES.get(memory[-1:].lower(), 0)
     try:
         return float(memory[:-1] if power else memory) * 2.0**power
@@ -97,7 +97,7 @@ def _bytes(memory: str) -> float:
 
 
 def _drop_meshes(spec: Any, path: Path) -> None:
-    """Leave out meshes that cannot be drawn, with the shapes made of them."""
+    """Remove meshes that cannot be drawn, together with the geoms that use them."""
     faults = {}
     for mesh in list(spec.meshes):
         if not mesh.file:
@@ -106,7 +106,7 @@ def _drop_meshes(spec: Any, path: Path) -> None:
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
         if found.is_flat:
             mesh.inertia = SHELL
-            for geom in shapes:  # a flat one has no hull to touch with
+            for geom in shapes:  # a flat mesh has no convex hull for contacts
                 geom.contype = geom.conaffinity = 0
         if found.triangles is not None:
             use_triangles(mesh, found.triangles)
@@ -119,5 +119,5 @@ def _drop_meshes(spec: Any, path: Path) -> None:
     if faults:
         spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
         name, fault = next(iter(faults.items()))
-        others = f" (and {len(faults) - 1} like it)" if len(faults) > 1 else ""
+        others = f" (and {len(faults) - 1} more meshes)" if len(faults) > 1 else ""
         _LOG.warning("%s: drawn without mesh %s, which %s%s", path, name, fault, others)

@@ -1,4 +1,4 @@
-"""A robot's or an object's model file, whichever format it is in."""
+"""The model file of a robot or an object, in either format."""
 
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,11 @@ def read_model(path: Path, last_body: str | None = None) -> Any:
     """Return the MjSpec of an MJCF or URDF.
 
     Args:
-        path: of the file.
-        last_body: of the arm that it is; absent where it is no arm.
+        path: the file.
+        last_body: last body of the arm; None if the model is not an arm.
 
     Raises:
-        InputError: if there is no such file, or it cannot be used.
+        InputError: if the file does not exist or cannot be used.
     """
     if not path.is_file():
         raise InputError(str(path), "", Absent("no such file"), "an MJCF or URDF file")

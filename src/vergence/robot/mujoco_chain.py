@@ -1,4 +1,4 @@
-"""Reading a serial chain off a MuJoCo model."""
+"""Reading a serial chain from a MuJoCo model."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from vergence.robot.mujoco_coupling import (
     shared_rates,
 )
 
-# MuJoCo's camera looks along -z with y up; ours along z with y down.
+# MuJoCo's camera looks along -z with y up; ours looks along z with y down.
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -27,20 +27,20 @@ _KINDS = {
 
 
 class ReadChain(NamedTuple):
-    """What a model says of the joints that carry a tip."""
+    """The joints that carry a tip, as a model describes them."""
 
-    names: tuple[str, ...]  # of the joints that may be commanded, base first
-    axis_names: tuple[str, ...]  # of all axes, those that follow others among them
+    names: tuple[str, ...]  # of the joints that can be commanded, base first
+    axis_names: tuple[str, ...]  # of all axes, including those that follow others
     chain: Chain
     limits: FloatArray  # (n, 2) of position, rad or m
-    rate_max: FloatArray  # (n,) rad/s or m/s, inf where the model does not say
+    rate_max: FloatArray  # (n,) rad/s or m/s, inf where the model has no limit
 
 
 def read_chain(model: Any, tip: str, kind: str) -> ReadChain:
     """Return the chain of the joints that carry a tip, with their limits.
 
-    The transforms are read from the model in its reference configuration, where MuJoCo draws every
-    axis and anchor in the world; so any nesting of bodies, offsets and fixed joints is covered.
+    The transforms are read from the model in its reference configuration, where MuJoCo computes the
+    world frame of every axis and anchor, so any nesting of bodies, offsets and fixed joints works.
     """
     tip_id, body = _find_tip(model, tip, kind)
     joints = joints_above(model, body)
@@ -101,7 +101,7 @@ def _tip_frame(data: Any, tip_id: int, kind: str) -> tuple[FloatArray, FloatArra
 def _relative(
     frames: list[tuple[FloatArray, FloatArray]], sliding: Any, reference: FloatArray
 ) -> Chain:
-    """Express every frame in the one before it, with the joint there at zero, not at reference."""
+    """Express every frame in the one before it, with the joint at zero, not at its reference."""
     rotation, position = np.empty((len(frames), 3, 3)), np.empty((len(frames), 3))
     R_before, p_before, undo_R, undo_p = np.eye(3), np.zeros(3), np.eye(3), np.zeros(3)
     for i, (R, p) in enumerate(frames):
@@ -119,7 +119,7 @@ def _relative(
 
 
 def _velocity_limit(model: Any, joint: int) -> float:
-    """Return what `read_urdf` kept of the file's limit, rad/s or m/s; inf where it has none."""
+    """Return the velocity limit that `read_urdf` stored, rad/s or m/s; inf if there is none."""
     name = velocity_limit_name(model.joint(joint).name)
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
     return np.inf if number < 0 else float(model.numeric_data[model.numeric_adr[number]])

@@ -23,10 +23,10 @@ class Follows(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Which axes of a chain may be commanded, and how those move the others."""
+    """Which axes of a chain can be commanded, and how these move the others."""
 
-    leaders: list[int]  # MuJoCo's numbers of the joints that follow none, base first
-    matrix: FloatArray  # (m, 3) of `Chain`; (0, 3) if every joint may be commanded
+    leaders: list[int]  # MuJoCo's joint ids of those that follow no other joint, base first
+    matrix: FloatArray  # (m, 3) as in `Chain`; (0, 3) if every joint can be commanded
 
 
 def read_coupling(model: Any, joints: Sequence[int]) -> Coupling:
@@ -34,11 +34,11 @@ def read_coupling(model: Any, joints: Sequence[int]) -> Coupling:
 
     Args:
         model: any compiled model.
-        joints: numbers of the joints of the chain, base first.
+        joints: ids of the joints of the chain, base first.
 
     Raises:
-        InputError: if a joint follows one outside the chain, follows itself or several, or in
-            another way than linearly; or if a constraint closes a loop over the chain.
+        InputError: if a joint follows one outside the chain, itself or several joints, or follows
+            nonlinearly; or if a constraint closes a loop over the chain.
     """
     follows: dict[int, Follows] = {}
     for constraint in np.flatnonzero(model.eq_active0):
@@ -60,12 +60,12 @@ def read_coupling(model: Any, joints: Sequence[int]) -> Coupling:
 
 
 def shared_limits(model: Any, joints: Sequence[int], coupling: Coupling) -> FloatArray:
-    """Return position limits (n, 2) of the joints that may be commanded.
+    """Return position limits (n, 2) of the joints that can be commanded.
 
-    They hold those that follow inside their limits as well.
+    They also keep the joints that follow within their limits.
 
     Raises:
-        InputError: if limits are the wrong way round, equal, or leave a joint no room.
+        InputError: if limits are reversed or equal, or leave a joint no range.
     """
     own = [_own_limits(model, joint) for joint in joints]
     if not len(coupling.matrix):
@@ -77,13 +77,13 @@ def shared_limits(model: Any, joints: Sequence[int], coupling: Coupling) -> Floa
         limit[:] = max(limit[0], ends[0]), min(limit[1], ends[1])
         if not limit[0] < limit[1]:
             leader = model.joint(coupling.leaders[int(j)]).name
-            given = f"a range that leaves {leader}, which it follows, no room"
-            raise _refused(model, joint, given, "ranges that both can keep")
+            given = f"a range that leaves {leader}, which it follows, no range"
+            raise _refused(model, joint, given, "ranges that overlap")
     return limits
 
 
 def shared_rates(own: Sequence[float], coupling: Coupling) -> FloatArray:
-    """Return rate limits (n,) of the joints that may be commanded, from those of all (m,)."""
+    """Return rate limits (n,) of the joints that can be commanded, from those of all axes (m,)."""
     if not len(coupling.matrix):
         return np.array(own)
     rates = np.full(len(coupling.leaders), np.inf)
@@ -104,7 +104,7 @@ def joints_above(model: Any, body: int) -> list[int]:
 
 def _own_limits(model: Any, joint: int) -> tuple[float, float]:
     low, high = (float(end) for end in model.jnt_range[joint])
-    if low > high or (low == high and low != 0.0):  # MuJoCo would take it for one without limits
+    if low > high or (low == high and low != 0.0):  # MuJoCo would treat it as unlimited
         allowed = "lower below upper"
         if low == high:
             allowed += "; a joint that cannot move is left out of an MJCF"
@@ -129,7 +129,7 @@ def _follows(model: Any, constraint: int, joints: Sequence[int]) -> Follows:
 
 
 def _to_leader(model: Any, joint: int, follows: dict[int, Follows]) -> Follows:
-    """Return how a joint follows one that follows none, through any that do."""
+    """Return how a joint follows a joint that follows none, through any in between."""
     ratio, offset, at = 1.0, 0.0, joint
     passed = {joint}
     while at in follows:
@@ -142,7 +142,7 @@ def _to_leader(model: Any, joint: int, follows: dict[int, Follows]) -> Follows:
 
 
 def _refuse_loop(model: Any, constraint: int, joints: Sequence[int]) -> None:
-    """Refuse a constraint that ties a part of the chain to what other joints of it move."""
+    """Reject a constraint that couples two parts of the chain other than by following."""
     if int(model.eq_type[constraint]) == _TENDON:
         tied = _of_tendon(model, int(model.eq_obj1id[constraint])) & set(joints)
     else:

@@ -1,4 +1,4 @@
-"""Which of the six directions of its tip an arm of few joints cannot serve."""
+"""Which of the six directions of its tip an arm with few joints cannot move in."""
 
 from typing import NamedTuple
 
@@ -7,15 +7,15 @@ import numpy as np
 from vergence.arrays import FloatArray
 
 _DIRECTIONS = (*(f"move along {axis}" for axis in "xyz"), *(f"turn about {axis}" for axis in "xyz"))
-_ALL, _SOME = 0.98, 0.02  # of a direction, as the share of it that no joint serves
-_ZERO = 1e-6  # of the largest singular value
+_ALL, _SOME = 0.98, 0.02  # fractions of a direction that lie in the unserved subspace
+_ZERO = 1e-6  # relative to the largest singular value
 
 
 class UnservedDirections(NamedTuple):
-    """What an arm cannot do with its tip at one configuration; false if it can do everything."""
+    """Directions in which the tip cannot move at one configuration; false if there are none."""
 
-    impossible: tuple[str, ...]  # directions that no motion of the joints has a part in
-    tied: tuple[str, ...]  # directions that come only together with others
+    impossible: tuple[str, ...]  # directions in which no joint motion moves the tip
+    tied: tuple[str, ...]  # directions possible only in combination with others
 
     def __bool__(self) -> bool:
         return bool(self.impossible or self.tied)
@@ -30,11 +30,12 @@ class UnservedDirections(NamedTuple):
 def unserved_directions(J: FloatArray, length_m: float) -> UnservedDirections:
     """Return the directions that the columns of a Jacobian do not span.
 
-    They are the null space of Jᵀ, shifts measured in a length so that they compare with turns.
+    They are the null space of Jᵀ, with translations scaled by a length so that they compare with
+    rotations.
 
     Args:
-        J: (6, n) of the tip in its own axes.
-        length_m: such as the distance from a camera to what it looks at.
+        J: (6, n) of the tip in its own frame.
+        length_m: such as the distance from the camera to the target.
     """
     scale = np.repeat((1.0 / length_m, 1.0), 3)
     U, values, _ = np.linalg.svd(scale[:, None] * J)
@@ -43,7 +44,7 @@ def unserved_directions(J: FloatArray, length_m: float) -> UnservedDirections:
 
 
 def unmeasured_directions(H: FloatArray, length_m: float) -> UnservedDirections:
-    """Return the directions of a twist that change nothing of a quadratic ½ vᵀ H v.
+    """Return the directions of a twist that leave a quadratic form ½ vᵀ H v unchanged.
 
     Args:
         H: (6, 6), positive semi-definite.
@@ -65,6 +66,6 @@ def _named(basis: FloatArray) -> UnservedDirections:
 
 
 def listed(names: tuple[str, ...], word: str) -> str:
-    """Return names as a list in a sentence, with a word such as "and" before the last."""
+    """Return names as a list in a sentence, with a word such as "and" before the last one."""
     *first, last = names
     return f"{', '.join(first)} {word} {last}" if first else last

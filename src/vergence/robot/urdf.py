@@ -1,4 +1,4 @@
-"""Reading a URDF as MuJoCo can: joints locked or coupled, limits kept, shapes that can be drawn."""
+"""Reading a URDF through MuJoCo: joints locked or coupled, limits kept, drawable shapes chosen."""
 
 from pathlib import Path
 from typing import Any
@@ -17,36 +17,36 @@ from vergence.robot.urdf_shapes import Shapes, choose_shapes, mend_inertia, repo
 from vergence.robot.urdf_tree import read_tree
 
 _DEFAULT_GREY = (0.5, 0.5, 0.5, 1.0)
-_PAINT = (0.86, 0.87, 0.89, 1.0)  # of shapes without a colour
-_PARTS = ("link", "joint", "material")  # of a robot; the rest is for other programs
+_PAINT = (0.86, 0.87, 0.89, 1.0)  # for shapes without a colour
+_PARTS = ("link", "joint", "material")  # of a robot; all other elements are for other programs
 
 
 def read_urdf(path: Path, last_body: str | None = None) -> Any:
     """Return the MjSpec of a URDF.
 
-    What MuJoCo alone would not do with one:
+    Extends what MuJoCo does with one:
 
-    - links that no joint moves stay bodies, so that cameras can be mounted on them;
-    - joints are locked where they cannot move, see `settle_joints`;
+    - links that no joint moves remain bodies, so that cameras can be mounted on them;
+    - joints that cannot move are locked, see `settle_joints`;
     - velocity limits are kept, as custom numbers that `Arm.from_mujoco` reads;
-    - `package://NAME/…` is searched for in the folders above the file, as a ROS workspace lays them
-      out, and a link whose visual meshes cannot be drawn is drawn by its collision shapes, or by
-      rods from joint to joint, if it is a link of an arm;
-    - an inertia that no body can have loses its products of inertia;
-    - arms touch nothing, as the arms of all our cells.
+    - `package://NAME/…` is searched for in the folders above the file, as in a ROS workspace, and a
+      link whose visual meshes cannot be drawn is drawn by its collision shapes, or by rods between
+      its joints if it belongs to an arm;
+    - a physically impossible inertia loses its products of inertia;
+    - contacts are disabled, as for the arms of all cells.
 
     Args:
-        path: of the file.
-        last_body: name of the arm's last link; without one no joint is locked, and all shapes have
-            to be there, as a target's.
+        path: the file.
+        last_body: name of the arm's last link. If None, no joint is locked and all shapes are
+            required, as for a target.
 
     Raises:
-        InputError: if the file is no URDF, or says what cannot be honoured.
+        InputError: if the file is not a URDF, or asks for something that is not supported.
     """
     source = str(path)
     robot = read_xml(path)
     if robot.tag != "robot":
-        raise InputError(source, "", f"<{robot.tag}>", "<robot>, as a URDF begins")
+        raise InputError(source, "", f"<{robot.tag}>", "<robot>, the root element of a URDF")
     shapes = Shapes(path, path.parent / _own_mesh_folder(robot), {}, {})
     for child in [child for child in robot if child.tag not in _PARTS]:
         robot.remove(child)
@@ -67,7 +67,7 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
 
 
 def _finish(spec: Any, shapes: Shapes, rates: dict[str, float]) -> None:
-    """Give MuJoCo what a URDF's text cannot tell it."""
+    """Set in the MjSpec what the text of a URDF cannot express."""
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
         if tuple(geom.rgba) == _DEFAULT_GREY:
@@ -83,13 +83,13 @@ def _finish(spec: Any, shapes: Shapes, rates: dict[str, float]) -> None:
 
 
 def _own_mesh_folder(robot: Element) -> str:
-    """Return where the file's extension for MuJoCo says that its meshes are."""
+    """Return the mesh folder given by the file's MuJoCo extension."""
     compiler = robot.find("mujoco/compiler")
     return "" if compiler is None else compiler.get("meshdir", "")
 
 
 def _set_compiler(robot: Element) -> None:
-    """Tell MuJoCo how to read it."""
+    """Add the compiler settings with which MuJoCo reads it."""
     compiler = {
         "fusestatic": "false",
         "strippath": "false",

@@ -1,4 +1,4 @@
-"""Which joints of a URDF move, which are locked, which follow others, and their velocity limits."""
+"""Which joints of a URDF move, are locked or follow others, and their velocity limits."""
 
 import logging
 from collections.abc import Sequence
@@ -12,23 +12,23 @@ from vergence.robot.bounded_xml import numbers
 from vergence.robot.urdf_tree import MOVING, Tree
 
 _LOG = logging.getLogger(__name__)
-_RADIANS_MAX = 20.0  # limits beyond are degrees, not turns
+_RADIANS_MAX = 20.0  # larger limits are assumed to be in degrees
 _METRES_MAX = 20.0  # no arm is longer
-_NO_LIMIT = 1e6  # rad or m: the limit of a joint without limits
+_NO_LIMIT = 1e6  # rad or m: stands for "no limit"
 
 
 def settle_joints(tree: Tree, last_body: str) -> dict[str, float]:
-    """Make the joints those of an arm, in place; return velocity limits by joint, rad/s or m/s.
+    """Prepare the joints of an arm in place; return velocity limits by joint, rad/s or m/s.
 
-    - joints that do not lead to the last body, as a gripper's, are locked where they are zero, or
-      at the limit next to it;
-    - a joint whose lower limit equals its upper one is locked there;
-    - a joint that follows a locked one is locked, too; one that follows a moving one keeps its
-      `<mimic>`, of which MuJoCo makes an equality constraint.
+    - Joints that do not lead to the last body, such as a gripper's, are locked at zero, or at the
+      limit nearest to it.
+    - A joint whose lower limit equals its upper limit is locked there.
+    - A joint that follows a locked one is locked as well; one that follows a moving joint keeps its
+      `<mimic>`, which MuJoCo turns into an equality constraint.
 
     Raises:
-        InputError: if a joint that leads to the last body has more than one degree of freedom, no
-            limits, or follows one that it cannot follow.
+        InputError: if a joint that leads to the last body has more than one degree of freedom or no
+            limits, or follows a joint that it cannot follow.
     """
     path = tree.path_to(last_body)
     _check_axes(tree, path)
@@ -46,20 +46,20 @@ def settle_joints(tree: Tree, last_body: str) -> dict[str, float]:
             rate = _number(joint, "limit", "velocity", 0.0, tree.source)
             if rate < 0:
                 key = f"joint {name}: velocity"
-                raise InputError(tree.source, key, rate, "a limit above zero")
+                raise InputError(tree.source, key, rate, "a positive limit")
             if rate > 0:
                 rates[name] = rate
             elif joint.find("limit[@velocity]") is not None:
                 unlimited.append(name)
     if unlimited:
-        text = "%s: velocity limits of 0 are taken for none: %s"
+        text = "%s: velocity limits of 0 are ignored: %s"
         _LOG.warning(text, tree.source, ", ".join(unlimited))
     _check_units(tree, path)
     return rates
 
 
 def _locked(tree: Tree, path: Sequence[Element]) -> dict[str, float]:
-    """Return the joints that do not move and where they stay, rad or m, by name."""
+    """Return the positions of the joints that do not move, rad or m, by name."""
     places: dict[str, float | None] = {}
     for name in tree.joints:
         _place(tree, name, path, places, ())
@@ -68,7 +68,7 @@ def _locked(tree: Tree, path: Sequence[Element]) -> dict[str, float]:
     for name in beside:
         places[name] = _number(tree.joints[name], "mimic", "offset", 0.0, tree.source)
     if beside:
-        text = "%s: drawn as if the joints that they follow were at zero: %s, beside the arm"
+        text = "%s: joints beside the arm are drawn as if the joints they follow were at zero: %s"
         _LOG.warning(text, tree.source, ", ".join(beside))
     return {name: place for name, place in places.items() if place is not None}
 
@@ -80,13 +80,13 @@ def _place(
     places: dict[str, float | None],
     followers: tuple[str, ...],
 ) -> float | None:
-    """Return where a joint is locked, None if it moves; note it in places."""
+    """Return the position at which a joint is locked, None if it moves; add it to `places`."""
     if name in places:
         return places[name]
     joint, mimic = tree.joints[name], tree.joints[name].find("mimic")
     on_path = joint in path
     if name in followers:
-        raise InputError(tree.source, f"mimic of joint {name}", "itself", "a joint that leads")
+        raise InputError(tree.source, f"mimic of joint {name}", "itself", "another joint")
     if joint.get("type") not in MOVING:
         if on_path and joint.get("type") != "fixed":
             given = f"{joint.get('type')}, between the base and the arm's last body"
@@ -136,7 +136,7 @@ def _place_of_follower(
 
 
 def _limits(joint: Element, source: str, required: bool = True) -> tuple[float, float]:
-    """Return a joint's position limits, infinite where it has none."""
+    """Return a joint's position limits, infinite if it has none."""
     limit, name = joint.find("limit"), joint.get("name")
     if joint.get("type") == "continuous":
         return -np.inf, np.inf
@@ -164,7 +164,7 @@ def _number(joint: Element, tag: str, key: str, default: float, source: str) -> 
 
 
 def _lock(joint: Element, place: float, source: str) -> None:
-    """Make a joint a fixed one that stays at a place, rad or m."""
+    """Make a joint fixed at a position, rad or m."""
     where = f"joint {joint.get('name')}"
     if place != 0.0:
         axis = np.array(_axis(joint, source))
@@ -192,12 +192,12 @@ def _axis(joint: Element, source: str) -> tuple[float, ...]:
         return (1.0, 0.0, 0.0)
     axis = numbers(element, "xyz", (1.0, 0.0, 0.0), source, where)
     if not any(axis):
-        raise InputError(source, where, element.get("xyz"), "a direction")
+        raise InputError(source, where, element.get("xyz"), "a non-zero vector")
     return axis
 
 
 def _check_axes(tree: Tree, path: Sequence[Element]) -> None:
-    """Refuse numbers that are none, and axes without direction on the way to the last body."""
+    """Reject invalid numbers, and axes of zero length, on the path to the last body."""
     for name, joint in tree.joints.items():
         if (origin := joint.find("origin")) is not None:
             for key in ("xyz", "rpy"):
@@ -207,7 +207,7 @@ def _check_axes(tree: Tree, path: Sequence[Element]) -> None:
 
 
 def _check_units(tree: Tree, path: Sequence[Element]) -> None:
-    """Warn of what looks like degrees or millimetres."""
+    """Warn about values that look like degrees or millimetres."""
     length = 0.0
     for joint in path:
         origin = joint.find("origin")

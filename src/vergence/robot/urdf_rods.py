@@ -1,4 +1,4 @@
-"""Rods from joint to joint, in place of shapes that a URDF's links should have."""
+"""Rods between joints, in place of missing shapes of a URDF's links."""
 
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
@@ -10,14 +10,14 @@ from vergence.robot.bounded_xml import numbers
 from vergence.robot.urdf_shapes import Shapes
 from vergence.robot.urdf_tree import Tree, link_of
 
-_SLENDER = 0.2  # radius of a rod in its length
+_SLENDER = 0.2  # radius of a rod relative to its length
 _THICKEST_M, _SHORTEST_M = 0.035, 0.01
 
 
 def add_rods(tree: Tree, shapes: Shapes) -> None:
     """Give each link that lost all its shapes a rod to each of its joints, in its own frame.
 
-    They are seen, and count as the link's body when collisions are avoided.
+    Rods are visible to cameras, and count as the link's body in collision avoidance.
     """
     bare = {name for name in shapes.undrawn if tree.links[name].find("visual") is None}
     bare -= {name for name in bare if tree.links[name].find("collision") is not None}
@@ -33,10 +33,10 @@ def add_rods(tree: Tree, shapes: Shapes) -> None:
 
 
 def _add_rod(link: Element, end: FloatArray) -> None:
-    """Add a rod from a link's origin to a place (3,), m."""
+    """Add a rod from a link's origin to a point (3,), m."""
     length = float(np.linalg.norm(end))
     x, y, z = end / length
-    rpy = (0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x))  # its z axis along the rod
+    rpy = (0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x))  # z axis along the rod
     visual = ET.SubElement(link, "visual")
     ET.SubElement(visual, "origin", {"xyz": _text(end / 2), "rpy": _text(rpy)})
     size = {"radius": f"{min(_SLENDER * length, _THICKEST_M):.6g}", "length": f"{length:.9g}"}

@@ -1,4 +1,4 @@
-"""The shapes of a URDF's links: those that can be drawn, and what to do about the others."""
+"""The shapes of a URDF's links: which can be drawn, and what replaces the others."""
 
 import logging
 from collections.abc import Iterator
@@ -13,9 +13,9 @@ from vergence.robot.bounded_xml import numbers
 from vergence.robot.mesh_files import FORMAT_FAULT, MeshFile, check_mesh
 
 _LOG = logging.getLogger(__name__)
-_SCHEMES = ("package", "model")  # of names that begin with that of a package
+_SCHEMES = ("package", "model")  # of file names that begin with a package name
 _METRES_MAX = 20.0  # no link is larger
-_NAMED = 3  # links in a warning
+_NAMED = 3  # number of links named in a warning
 _INSTEAD = "Other shapes or rods are drawn instead; the arm's motion is not affected."
 _SIZES: dict[str, dict[str, int]] = {  # how many numbers the keys of a shape have
     "box": {"size": 3},
@@ -26,23 +26,23 @@ _SIZES: dict[str, dict[str, int]] = {  # how many numbers the keys of a shape ha
 
 
 class Shapes(NamedTuple):
-    """A URDF's file, and the result of reading its shapes."""
+    """A URDF file, and the results of reading its shapes."""
 
     path: Path
-    mesh_folder: Path  # as the file's extension for MuJoCo names it, else the file's own
+    mesh_folder: Path  # from the file's MuJoCo extension, else the file's folder
     meshes: dict[tuple[str, tuple[float, ...]], MeshFile]  # by file and scale
-    undrawn: dict[str, list[str]]  # links that are not drawn as they should be, and why
+    undrawn: dict[str, list[str]]  # links that are not drawn as the file says, and why
 
 
 def choose_shapes(link: Element, shapes: Shapes) -> None:
     """Keep a link's visual shapes if all can be drawn, else the collision shapes that can.
 
-    Where none is left, `add_rods` draws the link. A shape that cannot be drawn costs the drawing,
-    not the arm.
+    If none is left, `add_rods` draws the link. A shape that cannot be drawn affects only the
+    drawing, not the arm's motion.
     """
     visual, collision = link.findall("visual"), link.findall("collision")
     for shape in (*visual, *collision):
-        shape.attrib.pop("name", None)  # MuJoCo wants each to be the only one of its name
+        shape.attrib.pop("name", None)  # MuJoCo requires unique names
     faults = [fault for shape in visual if (fault := _fault(shape, shapes))]
     if visual and not faults:
         kept, dropped = visual, collision
@@ -58,10 +58,10 @@ def choose_shapes(link: Element, shapes: Shapes) -> None:
 
 
 def report_faults(shapes: Shapes, needed: bool) -> None:
-    """Warn of links that are not drawn as they should be, one line a file; refuse if needed.
+    """Warn about links that are not drawn as the file says, in one line per file.
 
     Raises:
-        InputError: for a file whose shapes are needed, as those of a target are.
+        InputError: if the shapes are needed, as those of a target are.
     """
     if not shapes.undrawn:
         return
@@ -78,7 +78,7 @@ def report_faults(shapes: Shapes, needed: bool) -> None:
 
 
 def mend_inertia(link: Element, source: str) -> None:
-    """Drop the products of an inertia that no body can have."""
+    """Drop the products of inertia of a physically impossible inertia."""
     where = f"inertia of link {link.get('name')}"
     mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
     if mass is not None:
@@ -95,7 +95,7 @@ def mend_inertia(link: Element, source: str) -> None:
 
 
 def _fault(shape: Element, shapes: Shapes) -> str | None:
-    """Return why a shape cannot be drawn; put its mesh's own file in place of the name."""
+    """Return why a shape cannot be drawn; replace its mesh's name by the path of the file."""
     source = str(shapes.path)
     if (origin := shape.find("origin")) is not None:
         for key in ("xyz", "rpy"):
@@ -122,10 +122,10 @@ def _fault(shape: Element, shapes: Shapes) -> str | None:
 
 
 def find_mesh(name: str, urdf: Path, mesh_folder: Path) -> Path:
-    """Return the file that a mesh's name means, the likeliest place if there is none.
+    """Return the file that a mesh's name refers to; the most likely path if there is none.
 
-    `package://NAME/…` is searched for in the folders above the URDF, as a ROS workspace lays them
-    out; other names beside the URDF.
+    `package://NAME/…` is searched for in the folders above the URDF, as in a ROS workspace; other
+    names are relative to the URDF.
     """
     scheme, _, rest = name.rpartition("://")
     if scheme in _SCHEMES and (inside := Path(rest.lstrip("/"))).parts:
@@ -138,7 +138,7 @@ def find_mesh(name: str, urdf: Path, mesh_folder: Path) -> Path:
 
 
 def _in_packages(path: Path, urdf: Path) -> Iterator[Path]:
-    """Return where a path that begins with a package's name may lie, nearest first."""
+    """Yield candidates for a path that begins with a package name, nearest first."""
     package, inside = path.parts[0], Path(*path.parts[1:])
     for folder in urdf.resolve().parents:
         if folder.name == package:

@@ -11,12 +11,12 @@ _KINDS = (*MOVING, "fixed", "floating", "planar")
 
 
 class Tree(NamedTuple):
-    """A URDF whose links hang together."""
+    """A URDF whose links are connected."""
 
     source: str  # the file
     links: Mapping[str, Element]  # by name
     joints: Mapping[str, Element]  # by name
-    above: Mapping[str, Element]  # the joint that carries a link, by the link's name
+    above: Mapping[str, Element]  # the joint that carries each link, by the link's name
 
     def path_to(self, link: str) -> list[Element]:
         """Return the joints from the base to a link, base first."""
@@ -31,8 +31,8 @@ def read_tree(robot: Element, source: str) -> Tree:
     """Return the links and joints of a robot.
 
     Raises:
-        InputError: if names are missing, doubled or unknown, or the links make no tree: a closed
-            loop, a circle, several roots.
+        InputError: if names are missing, duplicate or unknown, or the links do not form a tree:
+            a closed loop, or several roots.
     """
     links = _by_name(robot, "link", source)
     joints = _by_name(robot, "joint", source)
@@ -75,7 +75,7 @@ def _check_connected(tree: Tree) -> None:
     roots = [name for name in tree.links if name not in tree.above]
     if len(roots) > 1:
         given = f"{len(roots)} that no joint carries: {', '.join(roots[:5])}"
-        raise InputError(tree.source, "links", given, "one root, from which all others hang")
+        raise InputError(tree.source, "links", given, "one root link, connected to all others")
     below: dict[str, list[str]] = {}
     for child, joint in tree.above.items():
         below.setdefault(link_of(joint, "parent"), []).append(child)
@@ -85,7 +85,7 @@ def _check_connected(tree: Tree) -> None:
         reached.update(found)
         waiting += found
     if lost := [name for name in tree.links if name not in reached]:
-        given = f"joints in a circle, through link {lost[0]}" if tree.links else Absent("none")
+        given = f"joints that form a loop through link {lost[0]}" if tree.links else Absent("none")
         raise InputError(tree.source, "joints", given, "a tree of links with one root")
     if not tree.links:
         raise InputError(tree.source, "links", Absent("none"), "at least one")
