@@ -1,4 +1,4 @@
-"""How an arm moves by itself: its joints at every inner tick, from way-points."""
+"""Motions of arms in their own right: joints at every inner tick, from way-points."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ _CLOSE = 1e-9  # m and rad
 
 
 class JointTrajectory(NamedTuple):
-    """Joints at every inner tick; after the last one the arm rests."""
+    """Joints at every inner tick; after the last one the arm is at rest."""
 
     position: FloatArray  # (K, n) rad or m
     velocity: FloatArray  # (K, n) rad/s or m/s
@@ -34,12 +34,12 @@ def arm_trajectory(cell: Cell, name: str, arm: Arm, start: FloatArray) -> JointT
 
     Args:
         cell: the cell.
-        name: of the arm; it has a motion.
-        arm: with the target as its tip if it carries it, else its last body.
+        name: of an arm that has a motion.
+        arm: up to the target if it carries the target, else up to its last body.
         start: joint positions, (n,).
 
     Raises:
-        InputError: if it leads out of reach, or past a position or rate limit.
+        InputError: if the motion leads out of reach, or past a position or rate limit.
     """
     motion = cell.arms[name].motion
     assert motion is not None
@@ -53,8 +53,8 @@ def arm_trajectory(cell: Cell, name: str, arm: Arm, start: FloatArray) -> JointT
         poses = motion.poses(arm.forward_kinematics(start), times)
         position, reached = trace_poses(arm.chain, start, poses)
         if reached < len(poses):
-            given = f"a path that at {reached * dt:.2f} s leads out of reach"
-            raise InputError(source, key, given, "poses that the arm reaches")
+            given = f"a path that leads out of reach at {reached * dt:.2f} s"
+            raise InputError(source, key, given, "poses within the arm's reach")
     trajectory = JointTrajectory(position, np.gradient(position, dt, axis=0))
     _check_limits(trajectory, arm, dt, source, key)
     return trajectory
@@ -65,7 +65,7 @@ def _through_joints(
 ) -> FloatArray:
     offsets = np.array([list(row) for row in motion.offsets_deg], dtype=np.float64)
     if offsets.shape[1] != arm.joint_count:
-        allowed = f"{arm.joint_count} values a way-point: {', '.join(arm.names)}"
+        allowed = f"{arm.joint_count} values per way-point: {', '.join(arm.names)}"
         raise InputError(source, f"{key}.offsets_deg", f"{offsets.shape[1]} values", allowed)
     offsets *= np.where(arm.sliding, 1.0, np.pi / 180)
     return start + motion.through(offsets, times)
@@ -86,10 +86,10 @@ def _check_limits(trajectory: JointTrajectory, arm: Arm, dt: float, source: str,
 
 @njit(cache=True)
 def trace_poses(chain: Chain, start: FloatArray, poses: FloatArray) -> tuple[FloatArray, int]:
-    """Follow poses (K, 4, 4) of the tip from a start (n,) by Newton's method, damped.
+    """Follow poses (K, 4, 4) of the tip from a start (n,) by a damped Newton method.
 
     Returns:
-        Joint positions (K, n), and how many poses were reached: K if all.
+        Joint positions (K, n), and the number of poses reached: K if all.
     """
     n = len(start)
     positions = np.empty((len(poses), n))

@@ -1,4 +1,4 @@
-"""The cell as it truly is in a simulation: off what its file says by the errors that it states."""
+"""The cell as it really is in a simulation, with the placement errors that its file states."""
 
 from typing import TypeVar
 
@@ -14,11 +14,11 @@ P = TypeVar("P", bound=Placement)
 
 
 def as_built(cell: Cell) -> Cell:
-    """Return a cell whose targets and cameras are where they truly are.
+    """Return a cell whose targets and cameras are where they really are.
 
-    A file holds what its user knows. A target's placement is off by `perception.start_error_*`,
-    a camera's by its `calibration_error_*`, in random directions that follow from the seed. Without
-    such errors the cell is returned as it is.
+    A cell file holds what its user knows. In simulation, a target's placement differs from it by
+    `perception.start_error_*` and a camera's by its `calibration_error_*`, in random directions
+    drawn from the seed. Without such errors the cell is returned unchanged.
     """
     targets, cameras = dict(cell.targets), dict(cell.cameras)
     distance, angle = cell.placement_error
@@ -45,7 +45,7 @@ def _placed(table: P, T: FloatArray) -> P:
 
 
 def _small_motion(rng: np.random.Generator, distance_m: float, angle_deg: float) -> FloatArray:
-    """Return a motion (4, 4) of the given size in random directions."""
+    """Return a motion (4, 4) of the given size in a random direction about a random axis."""
     shift, turn = rng.normal(size=3), rng.normal(size=3)
     R = so3_exp(np.deg2rad(angle_deg) * turn / np.linalg.norm(turn))
     T: FloatArray = se3(R, distance_m * shift / np.linalg.norm(shift))

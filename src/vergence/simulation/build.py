@@ -1,4 +1,4 @@
-"""From a cell file to MuJoCo's description: arms with servos, cameras with lenses, targets."""
+"""Builds MuJoCo's description from a cell: arms with servos, cameras with lenses, targets."""
 
 from pathlib import Path
 from typing import Any
@@ -20,20 +20,21 @@ from vergence.simulation.tag_plate import add_tag
 
 FROM_MUJOCO_CAMERA = np.diag([1.0, -1.0, -1.0])
 _FOLLOWS, _BALL = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtGeom.mjGEOM_SPHERE
-HULL_BITS = 1 << 30, 1 << 29  # neither mask has a bit of the other's, nor those that people use
+HULL_BITS = 1 << 30, 1 << 29  # no bit in common with each other or with masks in use
 _ROOM = Path(__file__).with_name("scene.xml")
 
 
 def assemble(cell: Cell) -> Any:
-    """Return the MjSpec of a cell; everything of arm A is named "A/…".
+    """Return the MjSpec of a cell.
 
-    Everything of a target is named with its `target_body` and a slash.
+    Everything of arm A is named "A/…"; everything of a target has its `target_body` and a slash as
+    prefix.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep = 1.0 / cell.inner_rate_hz
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.visual.quality.offsamples = 0
-    spec.visual.quality.numslices = 96  # a round edge to a few hundredths of a pixel
+    spec.visual.quality.numslices = 96  # round edges are accurate to a few hundredths of a pixel
     spec.visual.map.znear = 0.01
     spec.stat.extent = 1.0
     spec.visual.headlight.active = 0
@@ -62,23 +63,24 @@ def assemble(cell: Cell) -> Any:
 
 
 def with_hulls(spec: Any) -> Any:
-    """Return a description whose visible meshes get convex hulls, which makes distances fast.
+    """Return a description whose visible meshes have convex hulls, which speeds up distances.
 
-    MuJoCo makes hulls only of what may collide; such meshes may, by `HULL_BITS`, but with nothing.
+    MuJoCo makes hulls only for geoms that can collide. `HULL_BITS` makes these meshes such geoms
+    without anything that they collide with.
     """
     meshes = {mesh.name: mesh for mesh in spec.meshes}
     for geom in spec.geoms:
         mesh = meshes.get(geom.meshname)
-        solid = mesh is not None and mesh.inertia != SHELL  # a flat one has no hull
+        solid = mesh is not None and mesh.inertia != SHELL  # a flat mesh has no hull
         if solid and not (geom.contype or geom.conaffinity):
             geom.contype, geom.conaffinity = HULL_BITS
     return spec
 
 
 def under_a_sky(cell: Cell) -> Any:
-    """Return the compiled model of a cell for people to look at: its state is that of any other.
+    """Return the compiled model of a cell for display, with a sky; it takes the same states.
 
-    The cameras of the cell see none of the sky.
+    The cell's cameras do not see the sky.
     """
     spec = assemble(cell)
     sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
@@ -92,7 +94,7 @@ def under_a_sky(cell: Cell) -> Any:
 
 
 def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, arm: str) -> Any:
-    """Return the frame in an arm's last body to attach a model to, its weight compensated."""
+    """Return the frame in an arm's last body to attach a model to; gravity is compensated."""
     for body in model.bodies:
         body.gravcomp = 1.0
     holder = spec.body(f"{arm}/{cell.arms[arm].body}").add_body(name=name)
@@ -101,7 +103,7 @@ def _held(spec: Any, cell: Cell, name: str, model: Any, placement: Placement, ar
 
 
 def _add_output(spec: Any, cell: Cell, name: str, output: OutputTable) -> None:
-    """Fix an output, and what it looks like, to the last body of its arm."""
+    """Attach an output and its model to the last body of its arm."""
     if output.model is None:
         model = mujoco.MjSpec()
     else:
@@ -113,7 +115,7 @@ def _add_output(spec: Any, cell: Cell, name: str, output: OutputTable) -> None:
 
 
 def _add_target(spec: Any, cell: Cell, name: str, target: TargetTable) -> None:
-    """Attach a target to the arm that carries it, else to a body that is moved about."""
+    """Attach a target to the arm that carries it, else to a mocap body."""
     model, body = mujoco.MjSpec(), target_body(name)
     if target.model is not None:
         model = _read(cell, f"{target_key(name)}.model", target.model)
@@ -145,11 +147,11 @@ def _place(element: Any, placement: Placement, camera: bool = False) -> None:
 
 
 def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
-    """Attach an arm and give every joint towards its last body that follows none a position servo.
+    """Attach an arm, with position servos for the joints up to its last body that follow no other.
 
-    The arm's weight, and friction, damping and springs of these joints, are compensated, as a
-    robot's own controller does. A servo that shapes only the inertia would not overcome a friction
-    that was identified on a geared drive. Effort limits stay.
+    The arm's weight, and the friction, damping and springs of these joints, are compensated, as by
+    a robot's own controller: a servo tuned to the inertia alone would not overcome the friction
+    identified on a geared drive. Effort limits remain.
     """
     model = _read(cell, f"arms.{name}.model", table.model, table.body)
     for key in list(model.keys):
@@ -169,7 +171,7 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
             joint.damping, joint.stiffness, joint.frictionloss = np.zeros(3), np.zeros(3), 0.0
     couplings = [eq for eq in model.equalities if eq.active and eq.type == _FOLLOWS]
     for coupling in couplings:
-        coupling.solref = [2.0 * spec.option.timestep, 1.0]  # as stiff as MuJoCo holds one
+        coupling.solref = [2.0 * spec.option.timestep, 1.0]  # the stiffest that MuJoCo supports
     followers = {coupling.name1 for coupling in couplings}
     frame = spec.worldbody.add_frame()
     _place(frame, table)
@@ -184,7 +186,7 @@ def _add_arm(spec: Any, cell: Cell, name: str, table: ArmTable) -> None:
 
 
 def named_joints(last_body: Any) -> list[str]:
-    """Return the names of the joints that move a body, base first; those without get one."""
+    """Name the unnamed joints that move a body; return the names of all, base first."""
     joints: list[Any] = []
     body = last_body
     while body is not None and body.name != "world":
@@ -208,13 +210,13 @@ def _add_camera(spec: Any, cell: Cell, name: str, table: CameraTable) -> None:
     _place(element, table, camera=True)
     if table.radius_m is not None:
         ball = body.add_geom(name=f"{name}/ball", type=_BALL, pos=element.pos)
-        ball.size[0], ball.rgba, ball.mass = table.radius_m, np.zeros(4), 0.0  # nothing sees it
+        ball.size[0], ball.rgba, ball.mass = table.radius_m, np.zeros(4), 0.0  # invisible
         ball.contype = ball.conaffinity = 0
     element.resolution = [camera.width, camera.height]
-    # MuJoCo wants a sensor of some size: one metre a pixel keeps its numbers equal to ours.
+    # MuJoCo requires a sensor size: one metre per pixel keeps its numbers equal to ours.
     element.sensor_size = [camera.width, camera.height]
     element.focal_pixel = [camera.fx, camera.fy]
-    # Its principal offset counts leftwards and upwards: seen by where a rendered disc falls.
+    # Its principal offset points left and up, as verified by where a rendered disc appears.
     element.principal_pixel = [
         (camera.width - 1) / 2 - camera.cx,
         (camera.height - 1) / 2 - camera.cy,
@@ -237,7 +239,7 @@ def intrinsics(table: CameraTable) -> Camera:
 
 
 def _rendered(cell: Cell, name: str) -> Camera:
-    """Return the camera that MuJoCo draws for one of a cell; its images are distorted after."""
+    """Return the camera that MuJoCo renders for one of the cell; distortion is added afterwards."""
     try:
         return intrinsics(cell.cameras[name]).undistorted()
     except InputError as error:

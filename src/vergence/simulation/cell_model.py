@@ -19,25 +19,24 @@ from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import FROM_MUJOCO_CAMERA, assemble, intrinsics, with_hulls
 from vergence.simulation.motion import placement_pose
 
-_SKIN_M = 0.003  # how deep under a surface a feature may lie and still be seen
+_SKIN_M = 0.003  # depth below a surface at which a feature still counts as visible
 
 
 class CellModel:
-    """The compiled model of a cell, and where everything in it is.
+    """The compiled model of a cell, and the poses of everything in it.
 
-    It knows what the file and the models say: placements, joint positions that it is given, and
-    nothing of the truth.
+    It knows only what the files say and the joint positions that it is given, never the truth.
 
     Args:
-        cell: what it is of.
-        hulls: whether distances between bodies will be asked for, which hulls of meshes make fast.
+        cell: the cell.
+        hulls: whether to make convex hulls of meshes, which speeds up distances between bodies.
 
     Attributes:
         model: MuJoCo's model; everything of arm A is named "A/…", see `assemble`.
         data: its state.
         cameras: intrinsics by camera name.
         arms: by name, each up to the first camera it carries, else up to its last body.
-        target_name: the target that the task is about, which is meant where none is named.
+        target_name: the task's target, the default wherever a target is to be named.
     """
 
     def __init__(self, cell: Cell, hulls: bool = False) -> None:
@@ -46,7 +45,7 @@ class CellModel:
         self.data: Any = mujoco.MjData(self.model)
         self.cameras = {name: intrinsics(table) for name, table in cell.cameras.items()}
         self.arms = {name: self._arm(name) for name in cell.arms}
-        self._to_camera: dict[str, Arm] = {}  # made when asked for
+        self._to_camera: dict[str, Arm] = {}  # created on demand
         self._joints = {name: self._joint_ids(name) for name in cell.arms}
         self._qpos = {n: self.model.jnt_qposadr[ids] for n, ids in self._joints.items()}
         self._axis_qpos = {name: self._axis_addresses(name) for name in cell.arms}
@@ -84,7 +83,7 @@ class CellModel:
         return self._body_pose(self.target_bodies[name or self.target_name])
 
     def tool_pose(self) -> FloatArray:
-        """Return T_world_tool (4, 4) of what the task's arm holds, as of the last `update`."""
+        """Return T_world_tool (4, 4) of the task arm's tool, as of the last `update`."""
         return self._body_pose(int(self.model.body("tool").id))
 
     def output_pose(self, name: str) -> FloatArray:
@@ -92,7 +91,7 @@ class CellModel:
         return self._body_pose(int(self.model.body(f"output {name}").id))
 
     def move_target(self, T_world_target: FloatArray, name: str | None = None) -> None:
-        """Put a target, the task's if None, somewhere; see `put_target`.
+        """Move a target, the task's if None; see `put_target`.
 
         It takes effect with the next step or `update`. A target that an arm carries stays with it.
         """
@@ -101,21 +100,21 @@ class CellModel:
             put_target(self.model, self.data, body, T_world_target)
 
     def target_is_free(self, name: str | None = None) -> bool:
-        """Whether `move_target` moves a target: no arm carries it."""
+        """Whether `move_target` moves a target, that is, whether no arm carries it."""
         return bool(self.model.body_mocapid[self.target_bodies[name or self.target_name]] >= 0)
 
     def place_arm(self, arm: str, position: FloatArray) -> None:
-        """Put an arm's joints somewhere (n,), against all physics, and update every pose."""
+        """Set an arm's joint positions (n,) regardless of physics, and update every pose."""
         self.place({arm: position})
 
     def place(self, joints: Mapping[str, FloatArray]) -> None:
-        """Put arms where their joints say, arm name to positions (n,), and update every pose."""
+        """Set the joint positions (n,) of arms, by name, and update every pose."""
         for arm, position in joints.items():
             self.write_position(self.data, arm, position)
         self.update()
 
     def write_position(self, data: Any, arm: str, position: FloatArray) -> None:
-        """Write an arm's joint positions (n,) into a state, joints that follow them among them."""
+        """Write an arm's joint positions (n,) into a state, including joints that follow others."""
         data.qpos[self._axis_qpos[arm]] = self.arms[arm].axis_positions(position)
 
     def state(self) -> FloatArray:
@@ -126,9 +125,9 @@ class CellModel:
         return state
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
-        """Return where the rays of image points (M, 2) meet the target, in its frame, (M, 3), m.
+        """Return where the rays of image points (M, 2) meet the task's target, (M, 3), m.
 
-        It is the task's. A ray that misses it gives NaN.
+        The points are in the target's frame; a ray that misses the target gives NaN.
         """
         T_world_camera = self.camera_pose(camera)
         T_target_world = se3_inverse(self.target_pose())
@@ -143,12 +142,12 @@ class CellModel:
         return points
 
     def update(self) -> None:
-        """Bring every pose up to date with the joint positions and the target."""
+        """Update every pose to the joint positions and the target."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
 
     def ray(self, origin: FloatArray, direction: FloatArray) -> tuple[float, int]:
-        """Return how far a ray goes and the body it meets; (-1, -1) if it meets none."""
+        """Return the length of a ray and the body that it meets; (-1, -1) if it meets none."""
         geom = np.array([-1], dtype=np.int32)
         distance = mujoco.mj_ray(
             self.model, self.data, origin, direction, None, True, -1, geom, None
@@ -156,9 +155,9 @@ class CellModel:
         return float(distance), int(self.model.geom_bodyid[geom[0]]) if geom[0] >= 0 else -1
 
     def sees(self, camera: str, points: FloatArray, inside: str | None = None) -> BoolArray:
-        """Return which points (N, 3) in the world no surface hides from a camera, (N,).
+        """Return which points (N, 3) in the world are not occluded for a camera, (N,).
 
-        Points inside a target, if one is named, are not hidden by it.
+        If a target is named, it does not occlude the points, which are inside it.
         """
         eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
         geoms = hiding(self.model, self.data, eye, points)
@@ -169,14 +168,14 @@ class CellModel:
         return seen
 
     def in_the_way(self, camera: str, points: FloatArray) -> tuple[str, ...]:
-        """Return the names of the bodies that hide points (N, 3) in the world from a camera."""
+        """Return the names of the bodies that occlude points (N, 3) in the world for a camera."""
         eye = self.data.cam_xpos[self._camera_ids[camera]].copy()
         geoms = hiding(self.model, self.data, eye, points)
         bodies = {int(self.model.geom_bodyid[geom]) for geom in geoms if geom >= 0}
         return tuple(sorted(self.model.body(body).name for body in bodies))
 
     def target_of(self, body: int) -> str | None:
-        """Return the name of the target that a body is or is a part of; None of any other."""
+        """Return the name of the target that a body belongs to; None for any other body."""
         return next((name for name, parts in self._parts.items() if body in parts), None)
 
     def bodies_of(self, arm: str) -> frozenset[int]:
@@ -188,7 +187,7 @@ class CellModel:
         )
 
     def axes_of(self, arm: str) -> list[int]:
-        """Return the numbers of the joints that are the axes of an arm's chain, base first."""
+        """Return the ids of the joints that are the axes of an arm's chain, base first."""
         return [int(self.model.joint(f"{arm}/{n}").id) for n in self.arms[arm].axis_names]
 
     def arm_to_body(self, name: str) -> Arm:
@@ -196,7 +195,7 @@ class CellModel:
         return self._arm_to(name, f"{name}/{self.cell.arms[name].body}", "body")
 
     def arm_to_target(self, name: str | None = None) -> Arm:
-        """Return the arm that carries a target, the task's if None, with it as its tip."""
+        """Return the arm that carries a target, the task's if None, with the target as its tip."""
         name = name or self.target_name
         carrier = self.cell.targets[name].carried_by
         assert carrier is not None
@@ -249,13 +248,13 @@ class CellModel:
 
 
 def put_target(model: Any, data: Any, body: int, T_world_target: FloatArray) -> None:
-    """Put a target that no arm carries somewhere in a state of a model.
+    """Set the pose of a target that no arm carries, in a state of a model.
 
     Args:
-        model: MuJoCo's.
+        model: MuJoCo's model.
         data: its state.
-        body: the target's.
-        T_world_target: where, (4, 4).
+        body: id of the target's body.
+        T_world_target: the pose, (4, 4).
     """
     rail = model.body_mocapid[body]
     data.mocap_pos[rail] = T_world_target[:3, 3]
@@ -265,15 +264,15 @@ def put_target(model: Any, data: Any, body: int, T_world_target: FloatArray) -> 
 def hidden(
     model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None
 ) -> BoolArray:
-    """Return which points (N, 3) a surface hides from an eye, (N,)."""
+    """Return which points (N, 3) are occluded for a viewpoint (3,), (N,)."""
     result: BoolArray = hiding(model, data, eye, points, groups) >= 0
     return result
 
 
 def hiding(model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: Any = None) -> Any:
-    """Return which geometry hides each of the points (N, 3) from an eye, (N,); -1 for none.
+    """Return the geom that occludes each of the points (N, 3) for a viewpoint, (N,); -1 for none.
 
-    A point counts as seen up to a few millimetres inside a surface, so that corners do.
+    A point up to a few millimetres below a surface counts as visible, so that corners do.
     """
     rays = points - eye
     distance = np.linalg.norm(rays, axis=1)
@@ -289,7 +288,7 @@ def hiding(model: Any, data: Any, eye: FloatArray, points: FloatArray, groups: A
 def _compiled(cell: Cell, hulls: bool) -> Any:
     spec = assemble(cell)
     if hulls:
-        with suppress(ValueError):  # a mesh of which there is no hull
+        with suppress(ValueError):  # a mesh that has no hull
             return with_hulls(spec).compile()
         spec = assemble(cell)
     try:
@@ -300,7 +299,7 @@ def _compiled(cell: Cell, hulls: bool) -> Any:
 
 def _descendants(model: Any, root: int) -> frozenset[int]:
     found = {root}
-    for body in range(root + 1, model.nbody):  # parents come before their children
+    for body in range(root + 1, model.nbody):  # parents precede their children
         if int(model.body_parentid[body]) in found:
             found.add(body)
     return frozenset(found)

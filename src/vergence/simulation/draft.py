@@ -1,4 +1,4 @@
-"""A first cell for an arm that has none yet: its posture, its camera and its target."""
+"""A first cell for a new arm: its posture, its camera and its target."""
 
 import math
 from collections.abc import Iterator
@@ -18,31 +18,31 @@ from vergence.robot.mujoco_chain import read_chain
 from vergence.simulation.build import named_joints
 from vergence.simulation.cell_model import hidden
 
-_POSTURES = 4000  # drawn at random
-_TRIED = 200  # of the best, until one sees the board
+_POSTURES = 4000  # number of random postures
+_TRIED = 200  # of the best ones, until one sees the board
 _STANDOFFS_M = (0.05, 0.15)  # from the body's origin to the camera
-_ASIDE_M = (0.08, 0.15)  # how far beside the body it is mounted if something is in the way
-_HANGING_M = 0.1  # below its own zero: an arm that reaches lower hangs, and is lifted
+_ASIDE_M = (0.08, 0.15)  # sideways mounting distances where something blocks the view
+_HANGING_M = 0.1  # below its own zero: an arm that reaches lower is assumed to hang, and is raised
 _ABOVE_FLOOR_M = 0.05
-_WITHOUT_LIMITS = 2.0  # rad or m: how far such a joint is turned for a start
-_RATES = 0.25, np.pi / 2  # m/s if it slides, rad/s if not: where the model says nothing
+_WITHOUT_LIMITS = 2.0  # rad or m: range in which a joint without limits starts
+_RATES = 0.25, np.pi / 2  # m/s (prismatic), rad/s (revolute): where the model has no limit
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
 SPAN = 0.35  # half a side of the board as a share of its distance
-_FARTHEST = 1.5  # times its reach, from which an arm can still keep a target in view
+_FARTHEST = 1.5  # multiples of its reach up to which an arm can keep a target in view
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What a first cell needs to know of an arm."""
+    """The properties of an arm that a first cell needs."""
 
     start: FloatArray  # (n,) joint positions, rad or m
     arm: Arm  # with the body as its tip
     T_body_camera: FloatArray  # (4, 4)
-    T_world_target: FloatArray  # (4, 4) of a board before the camera, its z towards it
+    T_world_target: FloatArray  # (4, 4) of a board in front of the camera, its z towards the camera
     height_m: float  # of the arm's base above the floor
     half_side_m: float  # of the board
     distance_m: float  # of the board from the camera
-    rates_from: str  # whose the rate limits of the arm are
+    rates_from: str  # where the rate limits of the arm come from
 
     @property
     def J_camera(self) -> FloatArray:
@@ -53,21 +53,22 @@ class Draft:
 def draft_cell(
     model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
 ) -> Draft:
-    """Find a posture from which a camera on an arm's last body looks well at a board.
+    """Find a posture from which a camera on an arm's last body has a good view of a board.
 
-    Well means: far from singular postures and joint limits, downwards rather than up, not twisted
-    about for nothing, with none of the arm in the way and the board above the floor. An arm that
-    reaches none such from its place gets a pedestal.
+    Good means far from singularities and joint limits, looking down rather than up, without
+    needless twists, unobstructed by the arm, and with the board above the floor. If the arm has no
+    such posture, it is put on a pedestal.
 
     Args:
         model_path: MJCF or URDF.
-        body: the last body of the arm, which carries the camera.
-        span: half a side of the board as a share of its distance.
-        half_side_m: of what is in the board's place; if None, the arm's reach decides.
+        body: the last body of the arm; the camera is mounted on it.
+        span: half a side of the board relative to its distance.
+        half_side_m: size of the object in place of the board; if None, it follows from the arm's
+            reach.
 
     Raises:
-        InputError: if there is no such body, nothing moves it, the arm is always in the way, or
-            the target is too large to be seen as a whole.
+        InputError: if the body does not exist, no joint moves it, the arm always blocks the view,
+            or the target is too large to fit into the image.
     """
     model = _compile(model_path, body)
     arm, rates_from = _arm(model, body)
@@ -107,7 +108,7 @@ def _compile(path: Path, body: str) -> Any:
 
 
 def _arm(model: Any, body: str) -> tuple[Arm, str]:
-    """Return the arm, cautious where its model sets no limits, and whose its rate limits are."""
+    """Return the arm, with cautious limits where its model has none, and their origin."""
     arm = Arm.from_mujoco(model, body, kind="body")
     given = read_chain(model, body, "body").rate_max
     guessed = [name for name, rate in zip(arm.names, given, strict=True) if np.isinf(rate)]
@@ -120,7 +121,7 @@ def _arm(model: Any, body: str) -> tuple[Arm, str]:
 
 
 def _postures(arm: Arm) -> FloatArray:
-    """Return postures well inside the limits, to a tenth of a degree or a millimetre, (K, n)."""
+    """Return postures well inside the limits, rounded to 0.1 degrees or 1 mm, (K, n)."""
     rng = np.random.default_rng(0)
     low = np.where(np.isfinite(arm.q_min), arm.q_min, -_WITHOUT_LIMITS)
     high = np.where(np.isfinite(arm.q_max), arm.q_max, _WITHOUT_LIMITS)
@@ -131,7 +132,7 @@ def _postures(arm: Arm) -> FloatArray:
 
 
 def _distance(reach: float, span: float, half_side_m: float | None) -> float:
-    """Return how far from the camera a board or a target is placed, m."""
+    """Return the distance of the board or target from the camera, m."""
     if half_side_m is None:
         return float(np.clip(0.5 * reach, 0.15, 0.6))
     if half_side_m > span * _FARTHEST * reach:
@@ -144,16 +145,16 @@ def _distance(reach: float, span: float, half_side_m: float | None) -> float:
 
 
 def _reach(arm: Arm, postures: FloatArray) -> float:
-    """Return about half of how far apart places of the tip are, m."""
+    """Return about half the size of the arm's workspace, m."""
     places = np.array([arm.forward_kinematics(q)[:3, 3] for q in postures[:200]])
     return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
 
 
 def _height(model: Any, data: Any) -> float:
-    """Return how high the base has to be for the arm to be above the floor at zero, m."""
+    """Return the height of the base at which the arm is above the floor at zero, m."""
     mujoco.mj_kinematics(model, data)
     centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
-    up = data.geom_xmat.reshape(-1, 3, 3)[:, 2]  # of each geometry's axes
+    up = data.geom_xmat.reshape(-1, 3, 3)[:, 2]  # of each geom's axes
     bottom = data.geom_xpos[:, 2] + np.sum(up * centre, axis=1) - np.sum(np.abs(up) * half, axis=1)
     solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
     lowest = float(bottom[solid].min(initial=0.0))
@@ -161,7 +162,7 @@ def _height(model: Any, data: Any) -> float:
 
 
 def _best_first(arm: Arm, postures: FloatArray, T_body_camera: FloatArray) -> FloatArray:
-    """Return postures, those first that move well, look down, and are clear of every limit."""
+    """Return postures ranked by manipulability, downward view and distance from limits."""
     measure = np.array([manipulability_measure(arm.jacobian(q)) for q in postures])
     clear = 1.0 - np.abs(arm.normalized(postures)).max(axis=1)
     plain = -np.abs(postures).mean(axis=1)
@@ -182,9 +183,9 @@ def _candidates(
 
 
 def _mountings(model: Any, data: Any, body: str) -> Iterator[FloatArray]:
-    """Yield poses (4, 4) of a camera in the body: ahead of it, then beside it.
+    """Yield poses (4, 4) of a camera in the body: first ahead of it, then beside it.
 
-    Ahead is along the axis of the body that leads most away from the body before.
+    Ahead is along the axis of the body that points most away from its parent body.
     """
     mujoco.mj_kinematics(model, data)
     number = model.body(body).id
@@ -192,7 +193,7 @@ def _mountings(model: Any, data: Any, body: str) -> Iterator[FloatArray]:
     while before > 0 and np.linalg.norm(data.xpos[number] - data.xpos[before]) < 0.01:
         before = model.body_parentid[before]
     away = data.xmat[number].reshape(3, 3).T @ (data.xpos[number] - data.xpos[before])
-    axes = np.vstack((np.eye(3)[::-1], -np.eye(3)[::-1]))  # z first, should they tie
+    axes = np.vstack((np.eye(3)[::-1], -np.eye(3)[::-1]))  # z first in case of a tie
     ahead = axes[np.argmax(axes @ away)]
     aside = [axis for axis in axes if abs(axis @ ahead) < 0.5]
     T = np.eye(4)
@@ -205,7 +206,7 @@ def _mountings(model: Any, data: Any, body: str) -> Iterator[FloatArray]:
 
 
 def _before(T_world_camera: FloatArray, distance: float) -> FloatArray:
-    """Return the pose of a board that faces a camera, its x along the image's, (4, 4)."""
+    """Return the pose (4, 4) of a board that faces a camera, its x along the image's."""
     T_camera_board = np.diag([1.0, -1.0, -1.0, 1.0])
     T_camera_board[2, 3] = distance
     board: FloatArray = se3_compose(T_world_camera, T_camera_board)
@@ -213,7 +214,7 @@ def _before(T_world_camera: FloatArray, distance: float) -> FloatArray:
 
 
 def _grid(board: FloatArray, half_side: float) -> FloatArray:
-    """Return points (25, 3) all over a board at a pose (4, 4)."""
+    """Return points (25, 3) spread over a board at a pose (4, 4)."""
     side = np.linspace(-half_side, half_side, 5)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     points: FloatArray = board[:3, 3] + np.outer(x, board[:3, 0]) + np.outer(y, board[:3, 1])
@@ -223,7 +224,7 @@ def _grid(board: FloatArray, half_side: float) -> FloatArray:
 def _sees(
     model: Any, data: Any, arm: Arm, q: FloatArray, T_world_camera: FloatArray, points: FloatArray
 ) -> bool:
-    """Return whether nothing of the arm at q is before points (N, 3)."""
+    """Return whether no part of the arm at q occludes points (N, 3)."""
     for name, position in zip(arm.axis_names, arm.axis_positions(q), strict=True):
         data.joint(name).qpos[0] = position
     mujoco.mj_kinematics(model, data)

@@ -1,4 +1,4 @@
-"""Corners of a target as a simulated camera truly projects them, measured in windows."""
+"""Corners of a target as exact projections into a simulated camera, measured in windows."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from vergence.simulation.exact_points import no_truth
 
 
 class ExactCorners:
-    """Takes corners from the truth of a simulated camera, with noise.
+    """Measures corners as a simulated camera truly projects them, plus noise.
 
     A point outside its window is not found, as in an image.
 
     Args:
         noise_px: standard deviation of the noise on each coordinate.
-        rng: draws the noise.
-        target: name of the target that they are of; the task's if None.
+        rng: generator of the noise.
+        target: name of the target that has the corners; the task's if None.
     """
 
     def __init__(

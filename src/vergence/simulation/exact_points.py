@@ -1,4 +1,4 @@
-"""Perception without images: true projections, with noise if desired."""
+"""Perception without images: true projections, optionally with noise."""
 
 import numpy as np
 
@@ -12,9 +12,9 @@ class ExactPoints:
     """Observes the target's features as a simulated camera truly projects them.
 
     Args:
-        camera: the camera's name; other cameras' frames are passed over.
+        camera: the camera's name; frames of other cameras are ignored.
         noise_px: standard deviation of the noise on each coordinate.
-        rng: draws the noise.
+        rng: generator of the noise.
     """
 
     def __init__(
@@ -48,5 +48,5 @@ class ExactPoints:
 
 
 def no_truth(camera: str) -> InputError:
-    """Say that only a simulated camera projects exactly."""
+    """Return the error of a camera that is not simulated, so has no exact projections."""
     return InputError(f"camera {camera}", "", "frames without truth", "images, or a simulation")

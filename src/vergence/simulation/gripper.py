@@ -7,18 +7,19 @@ from vergence.cell.schema import OutputTable
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.simulation.world import World
 
-CLOSED = 0.5  # the value from which on it is
+CLOSED = 0.5  # the value from which it is closed
 
 
 class Gripper:
-    """Takes hold of the nearest target within its reach when it closes, until it opens.
+    """Attaches the nearest target within its reach when it closes, until it opens.
 
-    The target then moves rigidly with the arm. Let go, it stays where it is: nothing falls.
+    The target then moves rigidly with the arm. Once released it stays where it is; it does not
+    fall.
 
     Args:
         world: of the cell.
         name: of the output.
-        table: how far it reaches.
+        table: with its reach.
     """
 
     def __init__(self, world: World, name: str, table: OutputTable) -> None:
@@ -31,7 +32,7 @@ class Gripper:
         return None if self._held is None else self._held[0]
 
     def set(self, value: float) -> None:
-        """Close it, from a value of a half on, or open it."""
+        """Close the gripper if the value is at least 0.5, else open it."""
         if value < CLOSED:
             self._held = None
             return
@@ -46,7 +47,7 @@ class Gripper:
             self._held = name, T
 
     def target_pose(self) -> FloatArray | None:
-        """Return T_world_target (4, 4) of a target that it holds, as of the last update."""
+        """Return T_world_target (4, 4) of the target that it holds, as of the last update."""
         if self._held is None:
             return None
         T: FloatArray = se3_compose(self._world.output_pose(self._name), self._held[1])

@@ -14,9 +14,9 @@ from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
 from vergence.simulation.motions import TargetPoses
 
 ARM, CAMERA = "arm", "camera"
-_POSES = 64  # of the target that are made at once
+_POSES = 64  # of the target, computed at once
 
-# From joint positions (n,) and T_world_target (4, 4) to the features that nothing hides, (M,).
+# From joint positions (n,) and T_world_target (4, 4) to the features that are not occluded, (M,).
 Sees = Callable[[FloatArray, FloatArray], BoolArray]
 
 
@@ -27,24 +27,24 @@ class KinematicCell:
     arm: Arm  # up to the camera
     camera: Camera
     start: FloatArray  # (n,) joint positions
-    target: TargetPoses  # poses at times
+    target: TargetPoses  # its poses at given times
     features: FloatArray  # (M, 3) in the target's frame, m
     rate_hz: float = 30.0  # of the camera
-    inner_rate_hz: float = 120.0  # at which set-points come
+    inner_rate_hz: float = 120.0  # rate of the set-points
     latency_frames: int = 0
-    dropped: float = 0.0  # share of the images that never arrive
-    seed: int = 0  # of what is dropped
-    sees: Sees | None = None  # what nothing hides; everything if None
+    dropped: float = 0.0  # fraction of the images that never arrive
+    seed: int = 0  # for the choice of dropped images
+    sees: Sees | None = None  # which features are not occluded; all if None
 
 
 class KinematicDriver:
     """Moves the joints exactly as commanded and projects the features exactly.
 
-    It is a driver like any other, so the loop, the guard and the laws that run in it are those that
-    move a real arm.
+    It is a driver like any other, so the loop, the guard and the laws are the same as on a real
+    arm.
     """
 
-    sim_time = True  # it passes in `step` only
+    sim_time = True  # time advances in `step` only
 
     def __init__(self, cell: KinematicCell) -> None:
         self._cell = cell
@@ -52,7 +52,7 @@ class KinematicDriver:
         self._tick = self._exposed = 0
         self._position, self._velocity = np.array(cell.start), np.zeros(len(cell.start))
         self._queue: deque[tuple[int, Frame]] = deque()
-        self._poses = np.empty((0, 4, 4))  # of the target, at a run of images
+        self._poses = np.empty((0, 4, 4))  # of the target, for a run of images
         self._expose()
 
     @property
@@ -76,7 +76,7 @@ class KinematicDriver:
         return self._tick / self.inner_rate_hz
 
     def read(self) -> Sample:
-        """Return joints now and the images that have arrived since the last call."""
+        """Return the joints now and the images that have arrived since the last call."""
         frames = []
         while self._queue and self._queue[0][0] <= self._tick:
             frames.append(self._queue.popleft()[1])
@@ -84,17 +84,17 @@ class KinematicDriver:
         return Sample(self.time, {ARM: joints}, tuple(frames))
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-        """Put the joints where they should be."""
+        """Move the joints to the set-points."""
         self.advance(setpoints, 1)
 
     @property
     def quiet_ticks(self) -> int:
-        """After how many inner ticks the next image is taken or arrives."""
+        """Return the number of inner ticks until the next image is exposed or arrives."""
         events = [self._tick_of(self._exposed), *(tick for tick, _ in self._queue)]
         return min(events) - self._tick
 
     def advance(self, setpoints: Mapping[str, Setpoint], ticks: int) -> None:
-        """Put the joints where they should be after so many ticks."""
+        """Move the joints to where they are after this many ticks."""
         self._position = setpoints[ARM].position
         self._velocity = setpoints[ARM].velocity
         self._tick += ticks
@@ -102,7 +102,7 @@ class KinematicDriver:
             self._expose()
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing; there is no resource to release."""
 
     def frame(self) -> Frame:
         """Return what the camera sees now."""
@@ -119,7 +119,7 @@ class KinematicDriver:
             self._queue.append((arrival, self._frame(T_world_target)))
 
     def _pose_at(self, image: int) -> FloatArray:
-        """Return the target's pose (4, 4) at an image; a run of them is made at once."""
+        """Return the target's pose (4, 4) at an image; poses are computed for a run of images."""
         at = image % _POSES
         if at == 0:
             ticks = [self._tick_of(image + k) for k in range(_POSES)]
@@ -138,7 +138,7 @@ class KinematicDriver:
         in_front = depth > 1e-3
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = cell.camera.project(points[in_front])
-        # Only a lens bends what is far outside of the image back into it.
+        # Far outside the image, only a distorted lens model could fold points back into it.
         distorted = cell.camera.distorted
         seen = cell.camera.in_view(points) if distorted else cell.camera.contains(points_px)
         visible = in_front & seen

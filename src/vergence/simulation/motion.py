@@ -1,4 +1,4 @@
-"""Where the target of a cell is at any time."""
+"""The pose of a cell's target at any time."""
 
 import numpy as np
 
@@ -24,22 +24,22 @@ def target_pose(start: Placement, motion: Motion, seed: int) -> TargetPose:
 
 
 def target_seed(seed: int, number: int) -> int:
-    """Return the seed of a target's motion, each target's another; that of the first is the cell's.
+    """Return the seed of a target's motion, different for each target; the first has the cell's.
 
     Args:
         seed: of the cell.
-        number: of the target in the cell, from 0.
+        number: index of the target in the cell, from 0.
     """
     return seed if number == 0 else int(np.random.default_rng([seed, 8, number]).integers(1 << 62))
 
 
 def target_poses(start: Placement, motion: Motion, seed: int) -> TargetPoses:
-    """Return the poses of the target as a function of many times.
+    """Return the poses of the target as a function of several times.
 
     Args:
-        start: where it is placed.
-        motion: how it moves from there.
-        seed: of what is drawn by chance.
+        start: its placement.
+        motion: its motion from there.
+        seed: for random motions.
     """
     T_start = placement_pose(start)
     return lambda times: motion.poses(T_start, times, seed)

@@ -1,4 +1,4 @@
-"""What in a cell is between a camera and a target, for the joints the arms report."""
+"""Occlusions between a camera and a target, for the joint positions that the arms report."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -11,18 +11,18 @@ from vergence.arrays import BoolArray, FloatArray
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
 
-_LEFT_OUT = 5  # MuJoCo's last group of geometry
+_LEFT_OUT = 5  # the last group of geoms in MuJoCo
 
 
 class Obstacles:
-    """Arms and fixtures of a cell as they are known, and other targets where they are believed.
+    """Arms and fixtures of a cell as modelled, and other targets where they are estimated to be.
 
-    It asks rays whether anything is in the way. The target itself is left out: where it is has to
-    be estimated, and how it hides itself follows from that estimate. So is any other target of
-    which nothing is known.
+    Rays decide whether anything is in the way. The target itself is excluded: its pose has to be
+    estimated, and its self-occlusion follows from that estimate. So is every other target without
+    an estimate.
 
     Args:
-        model: of the cell; its geometry is copied, its state is not looked at.
+        model: of the cell; its geometry is copied, its state is not used.
         target: name of the target; the task's if None.
     """
 
@@ -42,11 +42,11 @@ class Obstacles:
     def move(
         self, joints: Mapping[str, FloatArray], targets: Mapping[str, FloatArray] | None = None
     ) -> None:
-        """Put arms and other targets where they are.
+        """Set the joint positions of arms and the poses of other targets.
 
         Args:
             joints: arm name to positions (n,).
-            targets: other targets' names to T_world_target (4, 4), as far as they are known.
+            targets: names of other targets to T_world_target (4, 4), as far as they are known.
         """
         import mujoco
 
@@ -62,20 +62,20 @@ class Obstacles:
             mujoco.mj_kinematics(self._model, self._data)
 
     def blocked(self, eye: FloatArray, points: FloatArray) -> BoolArray:
-        """Return which points (N, 3) are hidden from an eye (3,), (N,); world frame, m."""
+        """Return which points (N, 3) are occluded for a viewpoint (3,), (N,); world frame, m."""
         from vergence.simulation.cell_model import hidden
 
         eye = np.ascontiguousarray(eye, dtype=np.float64)
         return hidden(self._model, self._data, eye, points, self._groups)
 
     def _show(self, others: frozenset[str]) -> None:
-        """Let no target but these be in the way."""
+        """Let only these targets occlude."""
         self._shown = others
         left_out = np.array([owner != "" and owner not in others for owner in self._owner])
         self._model.geom_group[:] = np.where(left_out, _LEFT_OUT, self._group)
 
     def _put(self, body: int, T_world_target: FloatArray) -> None:
-        """Put a target somewhere, also one that an arm carries."""
+        """Set the pose of a target, even one that an arm carries."""
         from vergence.geometry import matrix_to_quaternion, se3_inverse
         from vergence.simulation.cell_model import put_target
 

@@ -1,4 +1,4 @@
-"""Offscreen images of the world, as its cameras would take them."""
+"""Offscreen images of the world as seen by its cameras."""
 
 import importlib
 import os
@@ -17,22 +17,22 @@ from vergence.cell.schema import CameraTable, DepthTable
 from vergence.errors import RenderingError
 from vergence.simulation.sensor import Sensor
 
-# Mesa's software renderer then reads one size of a texture for each pixel instead of blending two:
-# an image takes two thirds of the time, and a tracked point drifts by 0.028 px instead of 0.024
-# (root mean square, the Puma's cell). No other renderer knows the word.
+# With this option Mesa's software renderer reads one mipmap level per pixel instead of blending
+# two: an image takes two thirds of the time, and a tracked point drifts by 0.028 px instead of
+# 0.024 (root mean square, the Puma's cell). Other renderers ignore the option.
 _SOFTWARE = ("LP_PERF", "no_mip_linear")
-_CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo settles on it, when imported
+_CHOICE = "mujoco.rendering.classic.gl_context"  # where MuJoCo makes the choice, on import
 _T = TypeVar("_T")
-_BLOTCH_PX = 24  # side of a place without depth
+_BLOTCH_PX = 24  # side of a blotch without depth
 
 
 def choose_renderer(needed: bool = True) -> None:
-    """Choose how MuJoCo draws without a screen: EGL, else OSMesa, unless MUJOCO_GL says.
+    """Choose how MuJoCo renders without a screen: EGL, else OSMesa, unless MUJOCO_GL is set.
 
-    Where MuJoCo has been imported already, it is made to choose again.
+    If MuJoCo has already been imported, it is made to choose again.
 
     Raises:
-        RenderingError: if neither library is there and a renderer is needed.
+        RenderingError: if neither library is installed and a renderer is needed.
     """
     if "MUJOCO_GL" in os.environ or sys.platform != "linux":
         return
@@ -53,11 +53,11 @@ def choose_renderer(needed: bool = True) -> None:
 def offscreen(model: Any, height: int, width: int) -> Any:
     """Return MuJoCo's renderer of a model, without shadows and reflections, which cost the most.
 
-    It belongs to the thread that calls this.
+    It can be used only by the thread that calls this function.
     """
     import mujoco
 
-    model.vis.quality.shadowsize = 0  # else a map of 4096 x 4096 is made, and never used
+    model.vis.quality.shadowsize = 0  # else MuJoCo allocates a map of 4096 x 4096 that is not used
     renderer = mujoco.Renderer(model, height, width)
     for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
         renderer.scene.flags[flag] = 0
@@ -65,33 +65,34 @@ def offscreen(model: Any, height: int, width: int) -> Any:
 
 
 class CameraRenderer:
-    """Takes grey images with one camera of a world, with distortion and what its sensor does.
+    """Takes grey images with one camera of a world, with lens distortion and sensor effects.
 
-    Shadows and multisampling stay off: an image then costs a few milliseconds on a CPU. MuJoCo
-    draws without distortion, an image wide enough for all that the camera sees; each pixel of
-    the camera's own image is then looked up in that one.
+    Shadows and multisampling are off, so an image takes a few milliseconds on a CPU. MuJoCo renders
+    without distortion an image wide enough for everything that the camera sees; each pixel of the
+    camera's image is then interpolated in that one.
 
-    A thread of its own draws, beside physics and the loop: a graphics context belongs to one
-    thread. Images come out in the order in which they are begun, and the same as if waited for.
+    A thread of its own renders in parallel with physics and the loop, since a graphics context
+    belongs to one thread. Images come out in the order in which they were requested, and are the
+    same as without the thread.
 
     Args:
-        model: MuJoCo's.
+        model: MuJoCo's model.
         name: of the camera in it.
-        camera: its lens.
+        camera: its intrinsics.
         table: of the camera in its cell.
-        rng: draws the noise.
+        rng: generator of the noise.
     """
 
     def __init__(
         self, model: Any, name: str, camera: Camera, table: CameraTable, rng: np.random.Generator
     ) -> None:
         self._thread = ThreadPoolExecutor(1, "renderer")
-        self._last: Future[ImageArray] | None = None  # image begun
+        self._last: Future[ImageArray] | None = None  # the last image requested
         try:
             drawn = camera.undistorted()
             os.environ.setdefault(*_SOFTWARE)
             self._renderer = self._in_thread(offscreen, model, drawn.height, drawn.width)
-        except Exception as error:  # whatever the graphics library throws
+        except Exception as error:  # the graphics library may raise anything
             raise RenderingError(
                 f"the offscreen renderer does not start ({error}); "
                 "Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
@@ -107,16 +108,16 @@ class CameraRenderer:
         """Return the image (height, width) of the world in its present state, black if blind.
 
         Args:
-            data: MuJoCo's, of the world.
-            blind: whether no light comes in.
-            settled: whether the automatic exposure is adjusted to the scene, see `Sensor.read`.
+            data: MuJoCo's state of the world.
+            blind: whether no light reaches the sensor.
+            settled: whether the automatic exposure has adapted to the scene, see `Sensor.read`.
         """
         return self.begin(data, blind, settled).result()
 
     def begin(self, data: Any, blind: bool = False, settled: bool = True) -> Future[ImageArray]:
-        """Begin to take an image of the present world, which may move on meanwhile.
+        """Begin to take an image of the present world, which may change meanwhile.
 
-        Arguments and the image to come are those of `take`.
+        Arguments and result are those of `take`.
         """
         if not blind:
             self._show(data)
@@ -130,12 +131,12 @@ class CameraRenderer:
     def take_moving(
         self, world_at: Callable[[float], Any], moments: FloatArray, weights: FloatArray
     ) -> ImageArray:
-        """Return the image (height, width) that a moving world gives.
+        """Return the image (height, width) of a moving world.
 
         Args:
-            world_at: returns MuJoCo's data of the world at a moment.
-            moments: that are rendered, (J,).
-            weights: by how much each counts in each row, (J, height).
+            world_at: returns MuJoCo's state of the world at a moment.
+            moments: those to render, (J,).
+            weights: the weight of each in each row, (J, height).
         """
         light: Float32Array = np.zeros(self._shape, dtype=np.float32)
         for moment, rows in zip(moments.tolist(), weights, strict=True):
@@ -148,9 +149,9 @@ class CameraRenderer:
         return self._in_thread(self._drawn)
 
     def _show(self, data: Any) -> None:
-        """Make the present world what is drawn next."""
+        """Set the present world as the next to be rendered."""
         if self._last is not None:
-            wait((self._last,))  # it is drawn from the same list of shapes
+            wait((self._last,))  # it is rendered from the same scene
         self._renderer.update_scene(data, self._name)
 
     def _drawn(self) -> ImageArray:
@@ -175,7 +176,7 @@ class CameraRenderer:
         return self._measured(np.array(z, dtype=np.float32), sensor)
 
     def _measured(self, z: DepthArray, sensor: DepthTable) -> DepthArray:
-        """Return true depth (height, width) as a sensor measures it, written over."""
+        """Return true depth (height, width) as a sensor measures it, in place."""
         least, most = sensor.range_m
         z[(z < least) | (z > most)] = np.nan
         if sensor.noise_m:
@@ -185,7 +186,7 @@ class CameraRenderer:
         return z
 
     def _blotches(self, share: float) -> BoolArray:
-        """Return a mask (height, width) of blotches that cover a share of the image."""
+        """Return a mask (height, width) of blotches that cover a given fraction of the image."""
         import cv2
 
         height, width = self._shape
@@ -201,7 +202,7 @@ class CameraRenderer:
         self._thread.shutdown()
 
     def _in_thread(self, function: Callable[..., _T], *arguments: Any) -> _T:
-        """Return what a function returns in the thread that draws."""
+        """Return the result of a function called in the rendering thread."""
         return self._thread.submit(function, *arguments).result()
 
 
@@ -212,7 +213,7 @@ def _close_in(thread: ThreadPoolExecutor, renderer: Any) -> None:
 
 
 def _lookup(camera: Camera, drawn: Camera) -> tuple[Any, Any]:
-    """Return where each pixel of a camera lies in the image drawn, as OpenCV's remap has it."""
+    """Return the position of each pixel of a camera in the rendered image, for OpenCV's remap."""
     import cv2
 
     v, u = np.mgrid[: camera.height, : camera.width]

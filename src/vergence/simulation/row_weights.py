@@ -1,4 +1,4 @@
-"""By how much each moment counts in each row of an image: rolling shutter and motion blur."""
+"""Weights of the rendered moments in each image row: rolling shutter and motion blur."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from vergence.cell.schema import ImagingTable
 
 
 def row_weights(moments_s: FloatArray, rows: int, imaging: ImagingTable) -> FloatArray:
-    """Return by how much each moment counts in each row, (J, rows); a row's weights sum to one.
+    """Return the weight of each moment in each row, (J, rows); a row's weights sum to one.
 
-    Row r is exposed around readout (r / (rows - 1) - 1/2), for the exposure time; between moments
-    the image is taken to change linearly.
+    Row r is exposed around readout (r / (rows - 1) - 1/2), for the exposure time; the image is
+    assumed to change linearly between moments.
 
     Args:
-        moments_s: evenly spaced, about the middle of the exposure, (J,), s.
+        moments_s: evenly spaced, relative to the middle of the exposure, (J,), s.
         rows: of the image.
         imaging: of its camera.
     """

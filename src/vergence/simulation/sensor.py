@@ -1,4 +1,4 @@
-"""From the light on a sensor to the image that arrives: gain, noise, compression."""
+"""From the light on a sensor to the delivered image: gain, noise, compression."""
 
 import math
 from typing import Any
@@ -8,24 +8,24 @@ import numpy as np
 from vergence.arrays import Float32Array, ImageArray
 from vergence.cell.schema import CameraTable, ImagingTable
 
-_NOISE_POOL = 256  # rows and columns by which the pool of noise exceeds the image
+_NOISE_POOL = 256  # rows and columns by which the noise pool is larger than the image
 _WHITE = 255.0
-_GAINS = 0.125, 8.0  # that the automatic exposure has
+_GAINS = 0.125, 8.0  # range of the automatic exposure
 
 
 class Sensor:
-    """Turns light, in grey levels at unit gain, into images.
+    """Converts light, in grey levels at unit gain, into images.
 
-    With s the signal in grey levels behind the gain g, a pixel's variance is
+    With s the signal in grey levels after the gain g, a pixel's variance is
 
         g 255 / N s + g² σ²
 
-    where N is the electrons of a white pixel and σ the read noise [EMVA2021].
+    where N is the number of electrons of a white pixel and σ the read noise [EMVA2021].
 
     Args:
         shape: of its images: rows, columns, and channels if they are in colour.
         table: of the camera.
-        rng: draws the noise.
+        rng: generator of the noise.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Sensor:
         self._imaging = table.imaging or ImagingTable()
         self._read_noise, self._period, self._rng = table.noise_grey, 1.0 / table.rate_hz, rng
         self._ideal = table.imaging is None
-        self._gain = 0.0  # none yet
+        self._gain = 0.0  # not set yet
         pool = (shape[0] + _NOISE_POOL, shape[1] + _NOISE_POOL, *shape[2:])
         self._pool: Any = None
         if self._ideal and self._read_noise:
@@ -45,12 +45,12 @@ class Sensor:
         self._lens = lens.reshape(*lens.shape, *(1 for _ in shape[2:]))
 
     def read(self, light: ImageArray | Float32Array, settled: bool = True) -> ImageArray:
-        """Return the image (height, width), or with channels.
+        """Return the image (height, width), or (height, width, channels).
 
         Args:
             light: on the sensor, (height, width), 0 … 255.
-            settled: whether the automatic exposure has had time for this scene; else it continues
-                from the last image, one period ago.
+            settled: whether the automatic exposure has had time to adapt to the scene; if not, it
+                continues from the last image, one period ago.
         """
         import cv2
 
@@ -67,7 +67,7 @@ class Sensor:
         return self._compressed(grey)
 
     def _noise(self) -> Any:
-        """Return a fresh window of one pool: to draw deviates would cost more than the image."""
+        """Return a random window of one noise pool: new deviates would take longer."""
         assert self._pool is not None
         row, column = self._rng.integers(0, _NOISE_POOL, 2)
         rows, columns = (side - _NOISE_POOL for side in self._pool.shape[:2])
@@ -82,7 +82,7 @@ class Sensor:
         return np.sqrt(variance, out=variance)
 
     def _gain_for(self, mean: float, settled: bool) -> float:
-        """Return the gain of this image, and adjust that of the next to its mean."""
+        """Return the gain of this image, and adapt that of the next one to the mean grey level."""
         lag = self._imaging.auto_exposure_s
         if not lag:
             return 1.0
@@ -104,7 +104,7 @@ class Sensor:
 
 
 def _transmission(shape: tuple[int, ...], lost: float) -> Float32Array:
-    """Return the fraction of the light that reaches each pixel, 1 - lost (r / r_corner)²."""
+    """Return the fraction of light that reaches each pixel, 1 - lost (r / r_corner)²."""
     rows, columns = ((np.arange(side) - (side - 1) / 2) / max((side - 1) / 2, 1) for side in shape)
     aspect = shape[1] / shape[0]
     r2 = (rows[:, None] ** 2 + (aspect * columns[None]) ** 2) / (1.0 + aspect**2)

@@ -1,4 +1,4 @@
-"""Which moments each row of an image sees, and where everything was then."""
+"""The moments that each image row is exposed at, and the state of the world at them."""
 
 from collections import deque
 from typing import Any, NamedTuple
@@ -12,13 +12,13 @@ from vergence.geometry import se3_inverse, transform_points
 from vergence.simulation.build import FROM_MUJOCO_CAMERA
 from vergence.simulation.cell_model import CellModel
 
-_STEP_PX = 0.5  # that the image may move between two moments: widens blur by 0.2 px at most
-_MOST_MOMENTS = 32  # of one image
-_NEAREST_M = 0.05  # at which motion is judged
+_STEP_PX = 0.5  # image motion between two moments; widens the blur by 0.2 px at most
+_MOST_MOMENTS = 32  # in one image
+_NEAREST_M = 0.05  # distance at which motion is evaluated at the least
 
 
 class _State(NamedTuple):
-    """Where everything was at one tick."""
+    """The state of the world at one tick."""
 
     qpos: FloatArray
     mocap_pos: FloatArray
@@ -26,11 +26,11 @@ class _State(NamedTuple):
 
 
 class Shutter:
-    """Remembers the last states of a world, and renders from between them.
+    """Remembers the last states of a world, and interpolates between them.
 
     Args:
-        world: whose states they are.
-        longest_s: for which any camera's shutter is open.
+        world: the world.
+        longest_s: the longest time for which a camera's shutter is open.
         rate_hz: of the ticks.
     """
 
@@ -42,29 +42,29 @@ class Shutter:
         self._last = 0  # tick of the latest state
 
     def begin(self, tick: int) -> None:
-        """Forget all: everything has rested where it is now."""
+        """Forget all states: the world has been at rest in its present state."""
         self._states.clear()
         self.remember(tick)
 
     def remember(self, tick: int) -> None:
-        """Remember the world as it is at a tick, one after the last."""
+        """Remember the world's state at a tick, one after the last."""
         data = self._world.data
         quat = data.mocap_quat.copy()
-        if self._states:  # q and -q are the same: those to blend point the same way
+        if self._states:  # q and -q are the same rotation; blended ones must have the same sign
             before = self._states[-1].mocap_quat
             quat *= np.where(np.sum(quat * before, axis=1) < 0.0, -1.0, 1.0)[:, None]
         self._states.append(_State(data.qpos.copy(), data.mocap_pos.copy(), quat))
         self._last = tick
 
     def ticks_after(self, imaging: ImagingTable) -> int:
-        """Return how many ticks after the middle of its exposure an image is complete."""
+        """Return the number of ticks from the middle of an exposure until its image is complete."""
         return int(np.ceil(imaging.open_s / 2 * self._rate))
 
     def moments(self, camera: str, tick: int, imaging: ImagingTable) -> FloatArray:
-        """Return the ticks to render for an image exposed about a tick, (J,), evenly spaced.
+        """Return the ticks to render for an image exposed around a tick, (J,), evenly spaced.
 
-        As many as make the image move by half a pixel in between, at the targets' distances; one
-        if nothing moves.
+        There are enough that the image moves by half a pixel between two of them, at the targets'
+        distances; one if nothing moves.
         """
         half = imaging.open_s / 2 * self._rate
         ticks = tick + half * np.linspace(-1.0, 1.0, 5)
@@ -76,7 +76,7 @@ class Shutter:
         return tick + half * np.linspace(-1.0, 1.0, count)
 
     def at(self, tick: float) -> Any:
-        """Return MuJoCo's data of the world at a tick, or between two; until the next call."""
+        """Return MuJoCo's state at a tick, possibly fractional; valid until the next call."""
         back = float(np.clip(self._last - tick, 0, len(self._states) - 1))
         newer = len(self._states) - 1 - int(back)
         older, share = max(newer - 1, 0), back - int(back)
@@ -89,9 +89,9 @@ class Shutter:
         return self._past
 
     def _displacement(self, camera: str, ticks: FloatArray, target: int) -> float:
-        """Return how far the image moves over some ticks, px: the most over the image.
+        """Return the largest image motion over some ticks, px.
 
-        Both what is stationary and what moves with a target is looked at, at its distance.
+        Considers stationary points and points that move with a target, at the target's distance.
         """
         poses = [self._poses(camera, tick, target) for tick in ticks]
         T_camera, T_target = poses[len(poses) // 2]

@@ -1,4 +1,4 @@
-"""The cameras of a simulated cell: when they expose, what of it arrives, and when."""
+"""The cameras of a simulated cell: when they expose, what arrives, and when."""
 
 from collections import deque
 from collections.abc import Callable
@@ -21,10 +21,10 @@ from vergence.simulation.world import World
 
 
 class _Arriving(NamedTuple):
-    """An image under way."""
+    """An image that has not arrived yet."""
 
     arrival: int  # tick
-    frame: Frame  # without its image, if that is drawn meanwhile
+    frame: Frame  # without its image while that is being rendered
     image: Future[ImageArray] | None = None
 
     def complete(self) -> Frame:
@@ -42,26 +42,26 @@ class _Exposing(NamedTuple):
 
 
 class SimulatedCameras:
-    """Exposes images at each camera's rate, and delivers them its latency later.
+    """Exposes images at each camera's rate, and delivers them after its latency.
 
     The cameras have been running before the simulation begins: the first images are those exposed
-    one latency before, at a time below zero. Without images, frames carry only the truth.
+    one latency earlier, at a negative time. Without images, frames carry only the ground truth.
 
-    Where a camera's `imaging` gives its shutter a duration, its time of exposure is the middle of
-    it, and the image arrives no sooner than the shutter has closed.
+    If a camera's `imaging` gives its shutter a duration, its time of exposure is the middle of that
+    interval, and the image arrives no sooner than the shutter has closed.
 
     Args:
-        cell: whose cameras they are.
-        world: that they look at.
-        subject: of which frames tell the truth.
-        images: whether they are rendered.
+        cell: with the cameras.
+        world: that they see.
+        subject: provides the ground truth in frames.
+        images: whether images are rendered.
     """
 
     def __init__(self, cell: Cell, world: World, subject: Subject, images: bool) -> None:
         self._cell, self._world, self._subject = cell, world, subject
         self._exposed = dict.fromkeys(cell.cameras, 0)
         self._queue: deque[_Arriving] = deque()
-        self._before_motion: list[_Arriving] = []  # all that was exposed until the start
+        self._before_motion: list[_Arriving] = []  # everything exposed before the start
         self._exposing: list[_Exposing] = []
         self._renderers = {
             name: CameraRenderer(
@@ -88,7 +88,7 @@ class SimulatedCameras:
         return bool(self._renderers)
 
     def restart(self) -> None:
-        """Begin again with what the cameras see now, before the first tick."""
+        """Start again from the present view of the cameras, before the first tick."""
         self.clear()
         if self._shutter is not None:
             self._shutter.begin(0)
@@ -101,12 +101,12 @@ class SimulatedCameras:
         self._before_motion = list(self._queue)
 
     def clear(self) -> None:
-        """Drop the images that are under way."""
+        """Drop the images that have not arrived yet."""
         self._queue.clear()
         self._exposing.clear()
 
     def tell_again(self) -> None:
-        """Deliver once more what was exposed until the start, with what is true of it now."""
+        """Deliver the images exposed before the start once more, with updated ground truth."""
         self._before_motion = [o._replace(frame=self._told(o.frame)) for o in self._before_motion]
         self._queue = deque(self._before_motion)
 
@@ -115,7 +115,7 @@ class SimulatedCameras:
 
         Args:
             tick: now.
-            update: brings all that cameras see to now; called if any camera looks.
+            update: updates everything that cameras see; called if an image is due.
         """
         if self._shutter is not None:
             update()
@@ -133,11 +133,11 @@ class SimulatedCameras:
         return tuple(sorted(frames, key=lambda frame: frame.time))
 
     def frame(self, camera: str, tick: int) -> Frame:
-        """Return what a camera sees now, its automatic exposure adjusted to the scene."""
+        """Return the present view of a camera, its automatic exposure adapted to the scene."""
         return self._begin(camera, tick, tick).complete()
 
     def _begin(self, camera: str, tick: int, arrival: int, settled: bool = True) -> _Arriving:
-        """Begin to take what a camera sees now; see `Sensor.read`."""
+        """Begin to take a camera's present view; see `Sensor.read`."""
         frame, renderer = self._without_image(camera, tick), self._renderers.get(camera)
         if renderer is None:
             return _Arriving(arrival, frame)
@@ -183,7 +183,7 @@ class SimulatedCameras:
                 self._take(name, tick, arrival)
 
     def _tick_of(self, camera: str, later: int) -> int:
-        """Return the tick of a camera's next image, or of one so many images later."""
+        """Return the tick of a camera's next image, or of a later one by its number."""
         number, rate_hz = self._exposed[camera] + later, self._cell.cameras[camera].rate_hz
         return image_tick(number, self._cell.inner_rate_hz, rate_hz)
 

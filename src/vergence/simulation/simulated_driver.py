@@ -1,4 +1,4 @@
-"""The cell in simulation, behind the same border as a real one."""
+"""A simulated cell behind the same driver protocol as a real one."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,14 +19,14 @@ from vergence.simulation.renderer import choose_renderer
 class SimulatedDriver:
     """Renders the cameras and moves the arms of a cell, in lock-step with the loop.
 
-    With `images` off frames carry no image, only the truth, for perception that is exact by
-    construction. How images come about is told by `SimulatedCameras`.
+    If `images` is false, frames carry no image, only the ground truth, for exact perception. See
+    `SimulatedCameras` for how images are made.
 
-    Targets and cameras are where `as_built` has them: off the cell's placements by the errors that
-    the cell states.
+    Targets and cameras are where `as_built` puts them: they differ from the cell's placements by
+    the errors that the cell states.
     """
 
-    sim_time = True  # it passes in `step` only
+    sim_time = True  # time advances in `step` only
 
     def __init__(self, cell: Cell, images: bool = True) -> None:
         choose_renderer(needed=images)
@@ -44,7 +44,7 @@ class SimulatedDriver:
             for number, (name, target) in enumerate(cell.targets.items())
         }
         self._grippers = {n: Gripper(self.world, n, t) for n, t in cell.outputs.items()}
-        self._let_go: dict[str, FloatArray] = {}  # (4, 4) where targets were let go last, by name
+        self._let_go: dict[str, FloatArray] = {}  # (4, 4) where targets were released last, by name
         self._tick = 0
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
         self._move_targets()
@@ -80,23 +80,23 @@ class SimulatedDriver:
         return self._subject.features
 
     def look_for(self, features: FloatArray) -> None:
-        """Make points (M, 3) in the target's frame those of which frames tell the truth.
+        """Set the points (M, 3), in the target's frame, whose ground truth frames carry.
 
-        Before the first `step`, what `read` has delivered it delivers again. Later, images under
-        way are dropped: they tell of other points.
+        Before the first `step`, frames already delivered by `read` are delivered again. Later,
+        images that have not arrived are dropped, since they refer to other points.
         """
         self._subject.features = np.array(features, dtype=np.float64)
         self._told_anew()
 
     def take_up(self, task: Task, frames: Mapping[str, Frame]) -> dict[str, Frame]:
-        """Tell the truth from now on of what another task of the cell looks at.
+        """Provide the ground truth for another task of the cell from now on.
 
         Args:
             task: the next one.
             frames: taken at rest before it, by camera.
 
         Returns:
-            The frames, which without images show what the next task looks at.
+            The frames; without images, updated to the next task's features.
         """
         self._subject.take_up(task, self._cameras.render)
         self._told_anew()
@@ -105,17 +105,17 @@ class SimulatedDriver:
         return {name: replace(self.first_frame(name), time=f.time) for name, f in frames.items()}
 
     def restart_cameras(self) -> None:
-        """Begin again with what the cameras see now; to be called before the first `step`."""
+        """Start again from the present view of the cameras; call before the first `step`."""
         self._cameras.restart()
 
     def first_frame(self, camera: str) -> Frame:
-        """Return what a camera sees at the start, without its latency."""
+        """Return the view of a camera at the start, without its latency."""
         return self._cameras.frame(camera, self._tick)
 
     def frame_at(self, camera: str, arm: str, position: FloatArray) -> Frame:
-        """Return what a camera would see if an arm's joints stood at a position, (n,).
+        """Return the view that a camera would have if an arm's joints were at a position, (n,).
 
-        It represents an image taken beforehand, by driving there.
+        It replaces an image taken beforehand by moving the arm there.
         """
         now = self.world.joint_position(arm)
         self.world.place_arm(arm, position)
@@ -124,17 +124,17 @@ class SimulatedDriver:
         return frame
 
     def anchor(self, camera: str, points_px: FloatArray) -> FloatArray:
-        """Make image points (M, 2) the target's features, and return those, (M, 3).
+        """Make image points (M, 2) the target's features, and return them in its frame, (M, 3), m.
 
-        They are seen from where the camera is now. So frames tell the truth of features that were
-        picked in the image. A ray that misses the target gives NaN.
+        They are taken from the camera's present pose, so frames then carry the ground truth of
+        features that were picked in the image. A ray that misses the target gives NaN.
         """
         points = self.world.anchor(camera, points_px)
         self.look_for(points)
         return points
 
     def read(self) -> Sample:
-        """Return joints now and the images that have arrived since the last call."""
+        """Return the joints now and the images that have arrived since the last call."""
         joints = {
             name: JointState(
                 self.time, self.world.joint_position(name), self.world.joint_velocity(name)
@@ -146,7 +146,7 @@ class SimulatedDriver:
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
         """Advance the world by one inner period.
 
-        Arms with a motion of their own follow that, whatever their set-points.
+        Arms with a motion of their own follow it, whatever their set-points.
         """
         for name, setpoint in setpoints.items():
             if name not in self._trajectories:
@@ -164,7 +164,7 @@ class SimulatedDriver:
         return tuple(self._grippers)
 
     def set_output(self, name: str, value: float) -> None:
-        """Close a gripper, from a value of a half on, or open it; see `Gripper`."""
+        """Close a gripper if the value is at least 0.5, else open it; see `Gripper`."""
         self.world.update()
         gripper = self._grippers[name]
         target, held = gripper.holds, gripper.target_pose()
@@ -183,19 +183,19 @@ class SimulatedDriver:
             self._cameras.tell_again()
 
     def _move_targets(self) -> None:
-        """Put every target where it is now."""
+        """Set every target to its present pose."""
         for name in self._motions:
             self.world.move_target(self._target_pose(name), name)
 
     def _target_pose(self, name: str) -> FloatArray:
-        """Return T_world_target (4, 4): with the arm, where it was let go, or as it moves."""
+        """Return T_world_target (4, 4): carried by an arm, as released, or by its motion."""
         for gripper in self._grippers.values():
             if gripper.holds == name and (held := gripper.target_pose()) is not None:
                 return held
         return self._let_go[name] if name in self._let_go else self._motions[name](self.time)
 
     def _update(self) -> None:
-        """Bring all that cameras see to now: a target that is held, too, not one tick ago."""
+        """Update everything that cameras see, including targets held by a gripper."""
         self.world.update()
         if any(gripper.holds for gripper in self._grippers.values()):
             self._move_targets()

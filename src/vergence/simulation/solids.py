@@ -1,4 +1,4 @@
-"""Obstacles in a cell, as a constrained law keeps it out of its camera's lines of sight."""
+"""Obstacles in a cell, for laws that keep them out of the camera's lines of sight."""
 
 from collections.abc import Callable, Mapping
 from copy import copy
@@ -14,17 +14,16 @@ if TYPE_CHECKING:
 
 
 class Solids:
-    """Fixtures and other arms as rounded boxes, where they are now.
+    """Fixtures and other arms as rounded boxes at their present poses.
 
-    Targets are left out, since where they are is estimated, and so is the arm that carries the
-    camera. Floors hide nothing above them. A mesh is taken for the box
-    around it, a cylinder for one with rounded ends.
+    Targets are excluded because their poses are estimated, and so is the arm that carries the
+    camera. Floors occlude nothing above them. A mesh is replaced by its bounding box, a cylinder by
+    one with rounded ends.
 
     Args:
         model: of the cell; its state is copied.
         arm: that carries the camera.
-        joints: gives where the arms are now, arm name to positions (n,); where the model has them
-            if None.
+        joints: returns the present joint positions, arm name to (n,); those of the model if None.
     """
 
     def __init__(
@@ -48,13 +47,13 @@ class Solids:
             dtype=np.int64,
         )
         self._solids = np.zeros((len(self._geoms), COLUMNS))
-        self._offset = np.zeros((len(self._geoms), 3))  # of the box from the geom's own frame
+        self._offset = np.zeros((len(self._geoms), 3))  # of the box in the geom's own frame
         for row, geom in enumerate(self._geoms):
             half, radius, self._offset[row] = _rounded_box(model.model, geom)
             self._solids[row, HALF : HALF + 3], self._solids[row, RADIUS] = half, radius
 
     def __call__(self) -> FloatArray:
-        """Return the solids now, (K, 16); see `vergence.control.limits`."""
+        """Return the present solids, (K, 16); see `vergence.control.limits`."""
         if self._joints is not None:
             self._place(self._joints())
         axes = self._data.geom_xmat[self._geoms]
@@ -64,7 +63,7 @@ class Solids:
         return self._solids
 
     def _place(self, joints: Mapping[str, FloatArray]) -> None:
-        """Put the arms where they are, unless they are there."""
+        """Set the joint positions of the arms if they have changed."""
         if joints is self._placed:
             return
         import mujoco
@@ -84,7 +83,7 @@ def _hides(model: Any, geom: int) -> bool:
 
 
 def _rounded_box(model: Any, geom: int) -> tuple[FloatArray, float, FloatArray]:
-    """Return half the sides of a geom's core, the radius around it, and its middle."""
+    """Return the half sides of a geom's core box, the radius around it, and its centre."""
     from mujoco import mjtGeom
 
     size, middle = model.geom_size[geom], np.zeros(3)

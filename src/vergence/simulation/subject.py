@@ -1,4 +1,4 @@
-"""What the cameras look at for a task, and the truth of it."""
+"""The features that the cameras observe in a task, and their ground truth."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,28 +23,29 @@ class _Points(NamedTuple):
     """Points of an object."""
 
     features: FloatArray  # (M, 3) in its frame, m
-    inside: str | None  # the target that they lie inside of, which does not hide them
+    inside: str | None  # the target that contains them, which does not occlude them
 
 
 class Subject:
-    """The features of target or tool, and of the other targets, and where they truly are.
+    """The features of the task's target or tool and of the other targets, and their true positions.
 
     Args:
-        cell: whose targets and tool they are.
-        world: as it is now.
+        cell: with its targets and tool.
+        world: in its present state.
     """
 
     def __init__(self, cell: Cell, world: World) -> None:
         self._cell, self._world = cell, world
         self._curve: CurveTracking | None = None
-        self._inside: str | None = None  # the target that the features lie inside of
-        self._others: dict[str, _Points] = {}  # of the targets that the task is not about
+        self._inside: str | None = None  # the target that contains the features
+        self._others: dict[str, _Points] = {}  # of targets other than the task's
         self.features = np.empty((0, 3))  # in the target's frame, m
 
     def take_up(self, task: Task, images: bool) -> None:
-        """Look at what a task follows, as far as it is known.
+        """Observe the features of a task, as far as they are known.
 
-        Without images nobody picks features: they are spread over the middle of the task's image.
+        Without images no features can be picked; they are spread over the middle of the task's
+        image.
         """
         tracker = getattr(task, "tracker", None)
         self._curve = tracker if isinstance(tracker, CurveTracking) else None
@@ -62,7 +63,7 @@ class Subject:
             self.features = self._world.anchor(task.camera, points_px)
 
     def truth(self, camera: str, blind: bool) -> FrameTruth:
-        """Return what is true of an image that a camera takes now."""
+        """Return the ground truth of an image that a camera takes now."""
         T_world_target, features = self._seen_by(camera)
         truth = self._truth_of(camera, T_world_target, _Points(features, self._inside), blind)
         if self._curve is not None:
@@ -87,7 +88,7 @@ class Subject:
     def _truth_of(
         self, camera: str, T_world_target: FloatArray, points: "_Points", blind: bool
     ) -> FrameTruth:
-        """Return where the points of one object truly are in an image."""
+        """Return the true positions of the points of one object in an image."""
         features = points.features
         T_world_camera = self._world.camera_pose(camera)
         T_camera_target = se3_inverse(T_world_camera) @ T_world_target
@@ -105,7 +106,7 @@ class Subject:
         return FrameTruth(T_world_target, T_world_camera, points_px, depth, visible)
 
     def _seen_by(self, camera: str) -> tuple[FloatArray, FloatArray]:
-        """Return pose (4, 4) and features (M, 3) of what a camera looks at: target or tool."""
+        """Return pose (4, 4) and features (M, 3) of what a camera observes: target or tool."""
         tool = self._cell.tool
         if tool is None or tool.camera != camera:
             return self._world.target_pose(), self.features
@@ -146,7 +147,7 @@ def _truth_of_curves(truth: FrameTruth, curves: CurveTracking, camera: Camera) -
 
 
 def _grid(width: int, height: int, count: int) -> FloatArray:
-    """Return points (count, 2) spread over the middle of an image; one alone in its centre."""
+    """Return points (count, 2) spread over the middle of an image; one alone at its centre."""
     side = int(np.ceil(np.sqrt(count)))
     share = (np.arange(side) + 0.5) / side
     u, v = np.meshgrid(width * (0.25 + 0.5 * share) - 0.5, height * (0.25 + 0.5 * share) - 0.5)

@@ -10,17 +10,17 @@ from vergence.geometry import matrix_to_quaternion
 from vergence.simulation.motion import placement_pose
 from vergence.tag_families import TAG_FAMILIES
 
-_CELL_TEXELS = 48  # of a bit
-_QUIET = 1  # bits of white around the border
+_CELL_TEXELS = 48  # per bit
+_QUIET = 1  # width of the white margin, in bits
 _PLATE_M = 1e-3  # thickness
-_FACE_M = 2e-5  # by which the face lies before the plate
+_FACE_M = 2e-5  # offset of the face in front of the plate
 
 
 def add_tag(spec: Any, tag: TagTable) -> None:
-    """Put a marker into the world of a description, at its placement.
+    """Add a marker to the world of a description, at its placement.
 
     Args:
-        spec: MuJoCo's, of the target alone.
+        spec: MuJoCo's description of the target alone.
         tag: the marker.
     """
     image, bits = tag_image(tag)
@@ -55,7 +55,7 @@ def add_tag(spec: Any, tag: TagTable) -> None:
 
 
 def tag_image(tag: TagTable) -> tuple[Any, int]:
-    """Return a marker with white around it, (N, N) grey, and how many bits its side has."""
+    """Return a marker with its white margin, (N, N) grey, and the number of bits along a side."""
     import cv2
 
     known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, TAG_FAMILIES[tag.dictionary][0]))

@@ -14,7 +14,7 @@ _SERVO_DAMPING = 1.0  # critical
 
 
 class World(CellModel):
-    """The model of a cell, brought to life: arms with servos, and a target that is moved about."""
+    """A cell in motion: arms with servos and physics, and a target that moves."""
 
     def __init__(self, cell: Cell) -> None:
         super().__init__(cell)
@@ -35,7 +35,7 @@ class World(CellModel):
         return frozen(self.data.qvel[self._qvel[arm]])
 
     def command(self, arm: str, position: FloatArray, velocity: FloatArray) -> None:
-        """Set an arm's servos: their lag k_v/k_p times the desired rate is fed forward."""
+        """Set an arm's servos; the rate is fed forward to compensate their lag k_v/k_p."""
         self.data.ctrl[self._actuators[arm]] = position + self._lag[arm] * velocity
 
     def step(self) -> None:
@@ -46,14 +46,14 @@ class World(CellModel):
         return np.array([self.model.actuator(f"{arm}/{j}").id for j in self.arms[arm].names])
 
     def _felt_inertia(self, arm: str, inertia: FloatArray) -> FloatArray:
-        """Return the inertia (n,) of all that each joint moves, from that of all joints (N, N)."""
+        """Return the inertia (n,) that each joint moves, given that of all joints (N, N)."""
         dofs = [self.model.joint(f"{arm}/{name}").dofadr[0] for name in self.arms[arm].axis_names]
         ratios = joint_columns(self.arms[arm].chain, np.eye(len(dofs)), self.arms[arm].joint_count)
         felt: FloatArray = np.diag(ratios.T @ inertia[np.ix_(dofs, dofs)] @ ratios)
         return felt
 
     def _tune_servos(self, arm: str) -> FloatArray:
-        """Give every joint a critically damped servo; return k_v/k_p (n,)."""
+        """Tune every joint to a critically damped servo; return k_v/k_p (n,)."""
         inertia = np.empty((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, inertia)
         bandwidth = 2 * np.pi * self.cell.arms[arm].servo_bandwidth_hz

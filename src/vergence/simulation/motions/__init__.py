@@ -1,4 +1,4 @@
-"""Motions of targets and of arms that move by themselves."""
+"""Motions of targets, and of arms that move independently of the task."""
 
 from vergence.simulation.motions.motion import Motion, TargetPose, TargetPoses
 from vergence.simulation.motions.random import Random

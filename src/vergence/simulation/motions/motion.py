@@ -1,4 +1,4 @@
-"""What moves a target: its pose as a function of time."""
+"""The protocol of a target's motion: its pose as a function of time."""
 
 from collections.abc import Callable
 from typing import Annotated, Protocol, TypeAlias, runtime_checkable
@@ -21,15 +21,15 @@ TargetPoses: TypeAlias = Callable[[FloatArray], FloatArray]
 
 @runtime_checkable
 class Motion(Protocol):
-    """Moves a target from where it is placed."""
+    """Moves a target from its placement."""
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:
-        """Return T_world_target (K, 4, 4) at many times.
+        """Return T_world_target (K, 4, 4) at the given times.
 
         Args:
-            T_start: where the target is placed, (4, 4).
+            T_start: the target's placement, (4, 4).
             times: since the start, (K,), s.
-            seed: of what is drawn by chance.
+            seed: for random motions.
         """
         ...
 
@@ -37,12 +37,12 @@ class Motion(Protocol):
 def offset_poses(
     T_start: FloatArray, position: FloatArray, yaw_pitch_roll: FloatArray | None = None
 ) -> FloatArray:
-    """Return poses (K, 4, 4) that are shifted, and turned about the world's axes.
+    """Return poses (K, 4, 4) shifted along and rotated about the world's axes.
 
     Args:
         T_start: (4, 4).
         position: shifts along the world's axes, (K, 3), m.
-        yaw_pitch_roll: turns, (K, 3), rad; none if None.
+        yaw_pitch_roll: rotations, (K, 3), rad; none if None.
     """
     T = np.tile(T_start, (len(position), 1, 1))
     T[:, :3, 3] += position

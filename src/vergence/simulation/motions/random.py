@@ -1,4 +1,4 @@
-"""A motion that wanders."""
+"""A smooth random motion."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _SINUSOIDS = 3
 
 @part("motion", "random")
 class Random:
-    """The target wanders smoothly: a few sinusoids of random phase on every axis."""
+    """The target moves smoothly at random: a few sinusoids of random phase on every axis."""
 
     amplitude_m: Vector3 = knob(unit="m")  # amplitude along the world's axes
     amplitude_rpy_deg: Angles3 = knob((0.0, 0.0, 0.0), "°")  # amplitude of rotation about them
@@ -25,7 +25,7 @@ class Random:
         phase = rng.uniform(0, 2 * np.pi, (_SINUSOIDS, 6))
         yaw_pitch_roll = np.deg2rad(self.amplitude_rpy_deg)[::-1]
         amplitude = np.concatenate((self.amplitude_m, yaw_pitch_roll)) / _SINUSOIDS
-        # Each sinusoid less its value and its tangent at the start: it sets off from rest.
+        # Subtracting each sinusoid's value and tangent at the start makes it start from rest.
         t = np.maximum(times - self.start_s, 0.0)[:, None]
         onset = 1.0 - np.exp(-t)
         wave = np.sin(frequency * t[:, :, None] + phase) - np.sin(phase)

@@ -1,4 +1,4 @@
-"""Motions that a line of arithmetic describes."""
+"""Motions with a simple closed form."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ class Stationary:
     """The target does not move."""
 
     def poses(self, T_start: FloatArray, times: FloatArray, seed: int) -> FloatArray:
-        """Return the pose of the start (K, 4, 4)."""
+        """Return the start pose at all times, (K, 4, 4)."""
         return offset_poses(T_start, np.zeros((len(times), 3)))
 
 

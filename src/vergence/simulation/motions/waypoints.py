@@ -1,4 +1,4 @@
-"""From rest to rest through way-points."""
+"""Motions through way-points, at rest at each of them."""
 
 from itertools import pairwise
 from typing import Annotated
@@ -18,14 +18,14 @@ _Times = Annotated[tuple[_Time, ...], Field(min_length=2, max_length=_MOST_WAYPO
 
 
 def smooth_step(share: FloatArray) -> FloatArray:
-    """Return 10 s³ - 15 s⁴ + 6 s⁵: from rest to rest with the least jerk, s from 0 to 1."""
+    """Return 10 s³ - 15 s⁴ + 6 s⁵, the minimum-jerk motion from rest to rest, s from 0 to 1."""
     s = np.clip(share, 0.0, 1.0)
     result: FloatArray = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return result
 
 
 class Waypoints:
-    """What motions through way-points share: rest at each and minimum jerk between them."""
+    """Base of motions through way-points: at rest at each, minimum jerk in between."""
 
     times_s: tuple[float, ...]
     speed: float
@@ -36,7 +36,7 @@ class Waypoints:
         return self.times_s[-1] / self.speed
 
     def through(self, values: FloatArray, times: FloatArray) -> FloatArray:
-        """Return the path through values (W, …) of the way-points at times (K,): (K, …)."""
+        """Return the path through way-point values (W, …) at times (K,): (K, …)."""
         knots = np.array(self.times_s) / self.speed
         leg = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
         share = smooth_step((times - knots[leg]) / (knots[leg + 1] - knots[leg]))
@@ -46,7 +46,7 @@ class Waypoints:
     def _check(self, *lists: str) -> None:
         times = self.times_s
         if times[0] != 0 or any(b <= a for a, b in pairwise(times)):
-            allowed = "times_s that begin with 0 and increase"
+            allowed = "times_s that start at 0 and increase"
             raise InputError(type(self).__name__, "times_s", list(times), allowed)
         for name in lists:
             count = len(getattr(self, name))
@@ -58,9 +58,9 @@ class Waypoints:
 
 @part(("motion", "arm_motion"), "poses")
 class PoseMotion(Waypoints):
-    """An arm moves its last body, or the target it carries; or a target moves by itself.
+    """An arm moves its last body or the target it carries, or a target moves independently.
 
-    A way-point is the pose in the frame that the body or target had at the start.
+    Each way-point is a pose in the start frame of the body or target.
     """
 
     times_s: _Times = knob(unit="s")  # times of the way-points, increasing from 0
