@@ -106,7 +106,7 @@ class TestRunAsBag:
     def test_a_folder_that_is_there_is_not_overwritten(
         self, run: Recording, tmp_path: Path
     ) -> None:
-        with pytest.raises(InputError, match="which is there already"):
+        with pytest.raises(InputError, match="which already exists"):
             write_bag(run, tmp_path)
 
     def test_it_is_watched_as_the_run_is(self, run: Recording, tmp_path: Path) -> None:

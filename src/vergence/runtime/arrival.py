@@ -1,4 +1,4 @@
-"""Whether a run gets to its goal, or comes to rest before it, and what holds it there."""
+"""Detects whether a run reaches its goal, or comes to rest before it and why."""
 
 from collections import Counter, deque
 from typing import NamedTuple
@@ -9,23 +9,24 @@ from vergence.arrays import FloatArray
 from vergence.runtime import endings
 from vergence.signals import ImagePoints, JointCommand, Observation, Outcome, Reference
 
-_WINDOW_S = 1.0  # over which errors are averaged and rest is judged
-_FALLING = 0.1  # share of the error by which it is less in the later half of a window, if it falls
-_FALLING_PX = 0.01  # and by how much at least
+_WINDOW_S = 1.0  # for averaging errors and judging rest
+_FALLING = 0.1  # smallest relative decrease of the error, over half a window, to be falling
+_FALLING_PX = 0.01  # and the smallest absolute one
 _NO_LIMIT = (
     "no limit: this is a local minimum of the law, or its features do not "
     "determine the rest of the motion"
 )
-_REST = 1e-3  # share of the rate limits up to which an arm is at rest
-_DESIRED_MOVED_PX = 0.1  # in a window, up to which the desired features are at rest
+_REST = 1e-3  # fraction of the rate limits below which an arm is at rest
+_DESIRED_MOVED_PX = 0.1  # in a window, below which the desired features are at rest
 
 
 class Goal(NamedTuple):
-    """When a task counts as reached.
+    """The conditions under which a task is reached.
 
     Attributes:
-        tolerance_px: distance of the farthest feature from its goal, averaged over a second.
-        ends: whether the task ends at its goal; else it continues until its time is over.
+        tolerance_px: largest distance of any feature from its desired point, averaged over a
+            second.
+        ends: true if the task ends at its goal; if false, it continues until its time is over.
     """
 
     tolerance_px: float = 1.0
@@ -33,7 +34,7 @@ class Goal(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """One image."""
+    """The values of one image."""
 
     time: float  # s
     error_px: FloatArray  # (M, 2) measured less desired; NaN where not found
@@ -43,15 +44,15 @@ class _Row(NamedTuple):
 
 
 class Arrival:
-    """Watches the error and the joints of a run.
+    """Monitors the error and the joints of a run.
 
-    A run is stalled where arm and desired features have been at rest for a second, and the mean
-    error is above the tolerance and falls no longer. A target that moves keeps the arm moving: no
-    stall.
+    A run is stalled if the arm and the desired features have been at rest for a second while the
+    mean error is above the tolerance and no longer falling. A moving target keeps the arm moving,
+    so it does not count as a stall.
 
     Args:
         goal: of the task.
-        rate_max: of the joints, (n,).
+        rate_max: rate limits of the joints, (n,).
     """
 
     def __init__(self, goal: Goal, rate_max: FloatArray) -> None:
@@ -61,7 +62,7 @@ class Arrival:
     def observe(
         self, observation: Observation, reference: Reference, command: JointCommand, q: FloatArray
     ) -> None:
-        """Take in what an image showed and what the law made of it, at joint positions q (n,)."""
+        """Add an image's observation, reference and command, at joint positions q (n,)."""
         views = [view for view in observation.views if view.camera not in reference.elsewhere_px]
         if reference.points_px is None or not views:
             return
@@ -69,7 +70,7 @@ class Arrival:
         if view.points_px.shape != reference.points_px.shape:
             return
         if self._rows and self._rows[-1].desired_px.shape != reference.points_px.shape:
-            self._rows.clear()  # other features
+            self._rows.clear()  # the features have changed
         error = np.where(view.found[:, None], view.points_px - reference.points_px, np.nan)
         self._rows.append(_Row(view.time, error, reference.points_px, q.copy(), command.active))
         while self._rows[0].time < view.time - _WINDOW_S:
@@ -77,7 +78,7 @@ class Arrival:
 
     @property
     def error_px(self) -> float:
-        """Mean distance of the farthest feature from its goal; NaN before any is known."""
+        """Mean distance of the farthest feature from its desired point; NaN before any is known."""
         return _mean_error(list(self._rows))
 
     @property
@@ -90,7 +91,7 @@ class Arrival:
 
     @property
     def points_px(self) -> FloatArray:
-        """Mean place of each feature in the last second, (M, 2); NaN where it was not found."""
+        """Mean position of each feature over the last second, (M, 2); NaN where not found."""
         places = np.array([row.desired_px + row.error_px for row in self._rows])
         counts = np.isfinite(places).all(axis=2).sum(axis=0)
         total = np.where(np.isfinite(places), places, 0.0).sum(axis=0)
@@ -104,25 +105,25 @@ class Arrival:
 
     @property
     def stalled(self) -> bool:
-        """Whether the arm is at rest away from its goal, and the error falls no longer."""
+        """Whether the arm is at rest away from its goal and the error no longer falls."""
         away = self._rests() and self.error_px > self._goal.tolerance_px
         return away and not self.falls
 
     @property
     def active(self) -> tuple[str, ...]:
-        """The limits that shaped the motion in most of the last images."""
+        """The limits that were active in most of the recent images."""
         counts = Counter(name for row in self._rows for name in row.active)
         return tuple(name for name, count in counts.items() if 2 * count > len(self._rows))
 
     def holder(self) -> str:
-        """Return what holds a run that is stalled."""
+        """Return what holds a stalled run."""
         held = list(self.active)
         if _mirrored(self._rows[-1]):
             held.append("a goal that shows the mirror image of the features seen")
         return " and ".join(held) or _NO_LIMIT
 
     def outcome(self, duration_s: float, time: float) -> Outcome:
-        """Return how a run ends whose time is over."""
+        """Return the outcome of a run whose time is over."""
         if self.stalled:
             return endings.not_reached(self.error_px, f"held by {self.holder()}", time)
         if not self._goal.ends:
@@ -142,7 +143,7 @@ class Arrival:
 
 
 def _mean_error(rows: list[_Row]) -> float:
-    """Return how far the farthest feature is from its goal, on average; NaN if none is known."""
+    """Return the mean distance of the farthest feature from its desired point, NaN if none."""
     if not rows:
         return float("nan")
     errors = np.array([row.error_px for row in rows])
@@ -155,7 +156,7 @@ def _mean_error(rows: list[_Row]) -> float:
 
 
 def _mirrored(row: _Row) -> bool:
-    """Return whether the best affine map from the features seen to those desired mirrors them."""
+    """Return whether the best affine map from measured to desired features is a reflection."""
     seen = np.isfinite(row.error_px).all(axis=1)
     if seen.sum() < 3:
         return False

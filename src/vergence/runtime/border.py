@@ -1,4 +1,4 @@
-"""The one place where what crosses into the loop is checked: samples, images, clocks, commands."""
+"""Checks everything that enters the loop: samples, images, clocks, commands."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -14,33 +14,33 @@ from vergence.runtime.image_check import ImageCheck
 from vergence.runtime.joint_check import JointCheck
 from vergence.signals import Frame, JointCommand, Sample
 
-_FROZEN_S = 0.1  # the clock may fall so far behind the ticks,
-_SLOW = 0.95  # beyond running so slow, as a share of its nominal rate,
-_JUMP_S = 1.0  # and advance by so much from one tick to the next while an arm moves
+_FROZEN_S = 0.1  # the clock may lag this far behind the ticks,
+_SLOW = 0.95  # beyond running at this fraction of its nominal rate,
+_JUMP_S = 1.0  # and advance by this much from one tick to the next while an arm moves
 
 
 class Border:
     """Checks every sample and every command once.
 
-    Behind it, every joint array is finite, contiguous and of its arm's length, and every image is
-    new, recent, and of its camera's size and type. Each check costs a microsecond or so a tick.
+    After that, every joint array is finite, contiguous and of its arm's length, and every image is
+    new, recent, and of its camera's size and type. A check takes about a microsecond per tick.
 
     Args:
-        driver: says which arms and cameras there are.
-        at_rest: whether no set-point moves; the clock may then jump.
-        image_age_s: how old an image may be when it arrives.
+        driver: defines the arms and cameras.
+        at_rest: returns whether no set-point moves; only then may the clock jump.
+        image_age_s: largest age of an image on arrival.
     """
 
     def __init__(self, driver: Driver, at_rest: Callable[[], bool], image_age_s: float) -> None:
         self._arms: Mapping[str, Arm] = driver.arms
         self._dt = 1.0 / driver.inner_rate_hz
-        self._least_s = _SLOW * self._dt  # by which the clock has to advance in a tick
+        self._least_s = _SLOW * self._dt  # the least advance of the clock in a tick
         self._at_rest = at_rest
         self._images = ImageCheck(driver.cameras, image_age_s)
         self._joints = [JointCheck(name, arm) for name, arm in self._arms.items()]
         self._origin: float | None = None  # the driver's time at the start of the run, s
-        self._time = 0.0  # the driver's at the last sample, s
-        self._behind = 0.0  # s by which the clock has fallen behind the ticks
+        self._time = 0.0  # of the driver at the last sample, s
+        self._behind = 0.0  # s by which the clock lags behind the ticks
 
     @property
     def time(self) -> float:
@@ -48,7 +48,7 @@ class Border:
         return self._time - self._origin if self._origin else self._time
 
     def admit(self, sample: Sample) -> Sample | Fault:
-        """Return the sample with its new images only, or what is wrong with it."""
+        """Return the sample with its new images only, or the fault in it."""
         try:
             time = sample.time
             if self._origin is None:
@@ -69,7 +69,7 @@ class Border:
             return bad_sample(f"the driver's sample cannot be read: {error}")
 
     def in_run_time(self, sample: Sample) -> Sample:
-        """Return a sample that was admitted with times since the start of the run."""
+        """Return an admitted sample with times relative to the start of the run."""
         start = self._origin
         if not start:
             return sample
@@ -80,27 +80,27 @@ class Border:
         return replace(sample, time=sample.time - start, joints=joints, frames=frames)
 
     def check_command(self, arm: str, command: JointCommand) -> Fault | None:
-        """Return what is wrong with a law's command for an arm."""
+        """Return the fault in a law's command for an arm, if any."""
         if not isinstance(command, JointCommand):
             return bad_command(f"the law returned {type(command).__name__}, not a JointCommand")
         return self.check_rates(arm, command.velocity)
 
     def check_rates(self, arm: str, rates: FloatArray) -> Fault | None:
-        """Return what is wrong with joint rates (n,) for an arm."""
+        """Return the fault in joint rates (n,) for an arm, if any."""
         names = self._arms[arm].names
         if not isinstance(rates, np.ndarray) or rates.dtype.kind not in "fiu":
             kind = getattr(rates, "dtype", type(rates).__name__)
             return bad_command(f"the law's rates are {kind}, not float64")
         if rates.shape != (len(names),):
             return bad_command(f"the law's rates have shape {rates.shape} for {len(names)} joints")
-        # A sum that is finite has finite terms; others are looked at one by one.
+        # A finite sum has finite terms; only otherwise is each term checked.
         if isfinite(sum(rates.tolist())) or np.isfinite(rates).all():
             return None
         first = names[int(np.argmin(np.isfinite(rates)))]
         return bad_command(f"the law's rate of {first} is not finite")
 
     def _check_clock(self, time: float, elapsed: float) -> Fault | None:
-        """Return what is wrong with a clock that went backwards, far ahead, or hardly at all."""
+        """Return the fault of a clock that went backwards, jumped ahead or hardly advanced."""
         if 0.0 <= elapsed < np.inf and self._behind > _FROZEN_S:
             return clock_error(f"the driver's clock stays at {time:.3f} s while set-points go out")
         if 0.0 <= elapsed < np.inf and self._at_rest():
@@ -120,7 +120,7 @@ class Border:
         return sample if len(new) == len(sample.frames) else replace(sample, frames=tuple(new))
 
     def _check_exposure(self, frame: Frame) -> Fault | None:
-        """Return what is wrong with the joints at an exposure."""
+        """Return the fault in the joint positions at an exposure, if any."""
         for arm, position in frame.joints.items():
             known = self._arms.get(arm)
             if known is None:

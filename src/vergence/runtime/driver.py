@@ -1,4 +1,4 @@
-"""The driver protocol: what the loop needs of a cell, simulated or real."""
+"""The driver protocol: the loop's interface to a cell, simulated or real."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
@@ -13,9 +13,9 @@ __all__ = ["Driver", "Sample", "Setpoint"]
 class Driver(Protocol):
     """A cell: arms that take set-points at the inner rate, cameras that deliver frames.
 
-    A simulated driver advances its world by one inner period in `step`; a real one passes the
-    set-points on and returns at the next inner tick. So the loop needs no other clock. Hardware
-    that does not answer in time is reported by raising `DriverSilent` from `read` or `step`.
+    A simulated driver advances its world by one inner period in `step`; a real one sends the
+    set-points and returns at the next inner tick, so the loop needs no other clock. If the hardware
+    does not respond in time, `read` or `step` raises `DriverSilent`.
     """
 
     @property
@@ -30,25 +30,25 @@ class Driver(Protocol):
 
     @property
     def inner_rate_hz(self) -> float:
-        """How often `step` returns."""
+        """The rate at which `step` returns, Hz."""
         ...
 
     def read(self) -> Sample:
-        """Return joints now and the images that arrived since the last call."""
+        """Return the joints now and the images that arrived since the last call."""
         ...
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-        """Hand set-points to the arms and wait for the next inner tick."""
+        """Send set-points to the arms and wait for the next inner tick."""
         ...
 
     def close(self) -> None:
-        """Let go of the cell."""
+        """Release the hardware."""
         ...
 
 
 @runtime_checkable
 class HasOutputs(Protocol):
-    """A driver that has more to switch than arms: grippers, lamps, valves."""
+    """A driver with outputs besides its arms: grippers, lamps, valves."""
 
     @property
     def outputs(self) -> Sequence[str]:
@@ -56,11 +56,11 @@ class HasOutputs(Protocol):
         ...
 
     def set_output(self, name: str, value: float) -> None:
-        """Set an output; returns at once, whatever time it takes.
+        """Set an output; returns at once, however long the action takes.
 
         Args:
             name: of the output.
-            value: 0 for off or open, to 1 for on or closed.
+            value: from 0 (off, open) to 1 (on, closed).
         """
         ...
 
@@ -69,37 +69,37 @@ class HasOutputs(Protocol):
 class ExactDriver(Protocol):
     """A driver of one ideal arm, which follows set-points exactly.
 
-    So the loop knows all that it could read until an image is taken or arrives, and may hand over
-    the last of the set-points until then.
+    The loop therefore knows every sample until the next image is exposed or arrives, and may send
+    only the last of the set-points until then.
     """
 
     @property
     def quiet_ticks(self) -> int:
-        """After how many inner ticks the next image is taken or arrives."""
+        """Return the number of inner ticks until the next image is exposed or arrives."""
         ...
 
     def advance(self, setpoints: Mapping[str, Setpoint], ticks: int) -> None:
-        """Let so many ticks pass, after which the arm is at its set-point.
+        """Advance by several ticks, after which the arm is at its set-point.
 
         Args:
             setpoints: by name of the arm.
-            ticks: no more than `quiet_ticks`.
+            ticks: at most `quiet_ticks`.
         """
         ...
 
 
 @runtime_checkable
 class HasSimTime(Protocol):
-    """A driver whose time may pass in `step` only, such as a simulator's."""
+    """A driver whose time may advance in `step` only, such as a simulator's."""
 
     @property
     def sim_time(self) -> bool:
-        """Whether it does: what takes long delays nothing then, and is waited for."""
+        """Whether it does: slow computations then cause no delay, and the loop waits for them."""
         ...
 
 
 def has_sim_time(driver: object) -> bool:
-    """Return whether a driver's time stops while the loop does something else."""
+    """Return whether a driver's time stops while the loop computes."""
     return driver.sim_time if isinstance(driver, HasSimTime) else False
 
 
@@ -108,5 +108,5 @@ def outputs_of(driver: object) -> tuple[str, ...]:
     return tuple(driver.outputs) if isinstance(driver, HasOutputs) else ()
 
 
-# A class that inherits from it may be named by `--driver`, see `vergence.registry`.
+# Lets `--driver` name any class that inherits from it, see `vergence.registry`.
 Driver.__part_roles__ = ("driver",)  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""A driver around another."""
+"""A driver that wraps another one."""
 
 from collections.abc import Mapping
 
@@ -9,10 +9,10 @@ from vergence.signals import Sample, Setpoint
 
 
 class DriverWrapper:
-    """Passes everything on to another driver; a class that changes something derives from it.
+    """Forwards everything to another driver; base of classes that change something.
 
     Args:
-        driver: the one behind it.
+        driver: the wrapped driver.
     """
 
     def __init__(self, driver: Driver) -> None:
@@ -30,20 +30,20 @@ class DriverWrapper:
 
     @property
     def inner_rate_hz(self) -> float:
-        """How often `step` returns."""
+        """The rate at which `step` returns, Hz."""
         return self.driver.inner_rate_hz
 
     @property
     def sim_time(self) -> bool:
-        """Whether the driver's time passes in `step` only."""
+        """Whether the driver's time advances in `step` only."""
         return has_sim_time(self.driver)
 
     def read(self) -> Sample:
-        """Return what the driver has."""
+        """Return the driver's sample."""
         return self.driver.read()
 
     def step(self, setpoints: Mapping[str, Setpoint]) -> None:
-        """Hand the set-points on."""
+        """Forward the set-points."""
         self.driver.step(setpoints)
 
     @property
@@ -53,9 +53,9 @@ class DriverWrapper:
 
     def set_output(self, name: str, value: float) -> None:
         """Set an output of the driver."""
-        assert isinstance(self.driver, HasOutputs), "only an output that there is can be set"
+        assert isinstance(self.driver, HasOutputs), "only existing outputs can be set"
         self.driver.set_output(name, value)
 
     def close(self) -> None:
-        """Let go."""
+        """Release the driver."""
         self.driver.close()

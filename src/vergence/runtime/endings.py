@@ -1,4 +1,4 @@
-"""How a run ends, in words: for the loop and for the batch kernel that replaces it."""
+"""The outcomes of a run with their reasons, for the loop and for the batch kernel."""
 
 import re
 from collections.abc import Iterable
@@ -15,33 +15,33 @@ class Fault(NamedTuple):
 
 
 def bad_sample(reason: str) -> Fault:
-    """Return what is wrong with a sample."""
+    """Return the fault of a sample."""
     return Fault(OutcomeKind.BAD_SAMPLE, reason)
 
 
 def bad_command(reason: str) -> Fault:
-    """Return what is wrong with a law's command."""
+    """Return the fault of a law's command."""
     return Fault(OutcomeKind.BAD_COMMAND, reason)
 
 
 def clock_error(reason: str) -> Fault:
-    """Return what is wrong with a clock."""
+    """Return the fault of a clock."""
     return Fault(OutcomeKind.CLOCK_ERROR, reason)
 
 
 def completed(duration_s: float, time: float) -> Outcome:
-    """Return the end of a run that went on as long as it should."""
+    """Return the outcome of a run that lasted its full time."""
     reason = f"ran for {round(duration_s, 3):g} s with the target in view"
     return Outcome(OutcomeKind.COMPLETED, reason, time)
 
 
 def reached(error_px: float, time: float) -> Outcome:
-    """Return the end of a run that is at its goal."""
+    """Return the outcome of a run that reached its goal."""
     return Outcome(OutcomeKind.REACHED, f"{error_px:.2g} px from the goal", time)
 
 
 def not_reached(error_px: float, why: str, time: float) -> Outcome:
-    """Return the end of a run away from its goal."""
+    """Return the outcome of a run that ended away from its goal."""
     where = (
         "the features are not found" if error_px != error_px else f"{error_px:.3g} px from the goal"
     )
@@ -49,12 +49,12 @@ def not_reached(error_px: float, why: str, time: float) -> Outcome:
 
 
 def image_late(waited_s: float, time: float) -> Outcome:
-    """Return the end of a run without images."""
+    """Return the outcome of a run without images."""
     return Outcome(OutcomeKind.IMAGE_LATE, f"no image for {waited_s:.2f} s", time)
 
 
 def target_lost(reasons: Iterable[str], time: float) -> Outcome:
-    """Return the end of a run whose target is gone; reasons as perception gave them."""
+    """Return the outcome of a run that lost its target, given perception's reasons."""
     return Outcome(OutcomeKind.TARGET_LOST, why_lost(reasons), time)
 
 
@@ -65,11 +65,11 @@ def why_lost(reasons: Iterable[str]) -> str:
 
 
 def collision(hindrance: str, time: float) -> Outcome:
-    """Return the end of a run whose arm would have brought bodies together."""
+    """Return the outcome of a run stopped because its arm would have made bodies collide."""
     return Outcome(OutcomeKind.COLLISION, f"braked, as {hindrance} of each other", time)
 
 
 def joint_limit(joints: Iterable[str], time: float) -> Outcome:
-    """Return the end of a run with joints held at their limits."""
+    """Return the outcome of a run with joints held at their limits."""
     reason = f"{' and '.join(joints)} at the end of its range, driven against it"
     return Outcome(OutcomeKind.JOINT_LIMIT, reason, time)

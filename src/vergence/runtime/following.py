@@ -1,4 +1,4 @@
-"""Set-points that stay with the measured joints."""
+"""Keeps set-points close to the measured joints."""
 
 from typing import NamedTuple
 
@@ -12,20 +12,20 @@ from vergence.runtime.endings import Fault
 from vergence.runtime.servo_lag import ServoLag
 from vergence.signals import JointState, OutcomeKind, RobotMode, RobotState, Setpoint
 
-_LAG_ROOM = 1.5  # how much longer a servo may lag than was measured, and still follow
+_LAG_ROOM = 1.5  # factor by which a servo may lag more than was measured
 
 
 class FollowingBound(NamedTuple):
-    """How far an arm may be from its set-points: so far from all those of the last `lag_s`.
+    """The largest allowed distance of an arm from all its set-points of the last `lag_s`.
 
-    A critically damped servo of bandwidth ω that is fed the desired rate errs by at most q̈_max/ω²;
-    this is added to `offset` for each joint. The defaults are those of stiff servos.
+    A critically damped servo of bandwidth ω that is fed the desired rate has an error of at most
+    q̈_max/ω², which is added to `offset` for each joint. The defaults are for stiff servos.
     """
 
     lag_s: float = 0.1  # by which a servo may lag behind its set-points
-    offset: float = 0.03  # rad or m that gravity, other joints and a late tick explain
+    offset: float = 0.03  # rad or m, error caused by gravity, other joints or a late tick
     servo_hz: float = np.inf  # the bandwidth of the joints' servos
-    servo_lag_s: float = 0.0  # by which the joints follow, as it was measured
+    servo_lag_s: float = 0.0  # the measured lag of the joints
 
     def of(self, arm: Arm) -> FloatArray:
         """Return the bound for each joint of an arm (n,), rad or m."""
@@ -42,9 +42,9 @@ def farthest_joint(
     Args:
         measured: joint positions, (n,).
         setpoint: the last one, (n,).
-        memory: the bound of each joint, rad or m, then the last set-points, (1 + K, n); the oldest
-            is overwritten.
-        tick: how many set-points there were before.
+        memory: the bound of each joint, rad or m, followed by the last set-points, (1 + K, n); the
+            oldest one is overwritten.
+        tick: number of earlier set-points.
     """
     recent = memory[1:]
     recent[tick % len(recent)] = setpoint
@@ -62,20 +62,20 @@ def farthest_joint(
 
 
 class Follower:
-    """The guarded set-points of one arm, held back to where the arm is when it does not follow.
+    """The guarded set-points of one arm, held at the measured joints when the arm does not follow.
 
     While the arm is stopped, guided by hand, or farther from its recent set-points than the bound,
-    set-points go to the measured joints within all limits. From there the run resumes as soon as
-    the arm is free; a run that waited for longer than `timeout_s` ends.
+    the set-points move to the measured joints within all limits. The run resumes from there once
+    the arm is free; it ends if the arm is held for longer than `timeout_s`.
 
     Args:
         arm: with its limits.
         name: of the arm.
         start: measured joints at the start, (n,).
         dt: inner period, s.
-        bound: how far the arm may be from its set-points.
-        timeout_s: how long to wait for it.
-        braking: finds what the arm would touch, see `Guard`.
+        bound: largest allowed distance of the arm from its set-points.
+        timeout_s: longest time for which the arm is held.
+        braking: finds what the arm would collide with, see `Guard`.
     """
 
     def __init__(
@@ -89,9 +89,9 @@ class Follower:
         braking: Braking | None = None,
     ) -> None:
         self.guard = Guard(arm, start, dt, braking)
-        self.guard.approach(start)  # compiles or loads what a hold needs; it moves nothing
-        self.holding: Fault | None = None  # why the arm is held, if it is,
-        self._held_for: Fault | None = None  # and why it was held last
+        self.guard.approach(start)  # compiles or loads the code for a hold; nothing moves
+        self.holding: Fault | None = None  # reason for which the arm is held at present,
+        self._held_for: Fault | None = None  # and for which it was held last
         self._name, self._names = name, arm.names
         self._bound, self._timeout_s = bound.of(arm), timeout_s
         self._lag = ServoLag(round(bound.servo_lag_s / dt), dt)
@@ -101,11 +101,11 @@ class Follower:
         self._tick = 0
         self._scale = 1.0
         self._anchor = start  # where set-points go while the arm is held
-        self._since, self._freed = 0.0, -np.inf  # s, when the arm was held first, and freed last
+        self._since, self._freed = 0.0, -np.inf  # s, start of the present hold, end of the last one
         self._held_at = np.full(arm.joint_count, np.inf)
 
     def observe(self, time: float, measured: FloatArray, robot: RobotState | None) -> Fault | None:
-        """Take note of where the arm is; return why the run ends, if it was held for too long."""
+        """Process a sample; return the fault that ends the run if the arm was held for too long."""
         joint = farthest_joint(measured, self.guard.position, self._memory, self._tick)
         self._tick += 1
         if robot is None:
@@ -118,7 +118,7 @@ class Follower:
         return self._hold(time, measured, self._reason(joint, measured, robot))
 
     def step(self, rates: FloatArray) -> Setpoint:
-        """Return the next set-point, at desired rates (n,) or on the way to the measured joints."""
+        """Return the next set-point, at desired rates (n,) or towards the measured joints."""
         if self.holding is not None:
             setpoint = self.guard.approach(self._anchor)
         else:
@@ -127,20 +127,20 @@ class Follower:
         return setpoint
 
     def steps(self, rates: FloatArray, count: int) -> Setpoint | None:
-        """Return the set-point after many steps at desired rates (n,), by `Guard.steps`.
+        """Return the set-point after several steps at desired rates (n,), see `Guard.steps`.
 
-        It is for an arm that follows set-points exactly: one that lags or is held is None.
+        Only for an arm that follows set-points exactly; None if it lags or is held.
         """
         if self.holding is not None or self._scale != 1.0 or self._lag.ticks:
             return None
         return self.guard.steps(rates, count)
 
     def ahead(self, joints: JointState) -> JointState:
-        """Return measured joints as they will be when a command is felt, one servo lag later."""
+        """Return the joints predicted to when a command takes effect, one servo lag later."""
         return self._lag.ahead(joints)
 
     def hindered(self, time: float, measured: FloatArray) -> Fault | None:
-        """Return why the arm is held, or has hardly moved from where it last was."""
+        """Return why the arm is held, or why it has hardly moved since it was."""
         stands = (np.abs(measured - self._held_at) <= self._bound).all()
         lately = stands and time - self._freed < self._timeout_s
         return self.holding or (self._held_for if lately else None)
@@ -159,13 +159,13 @@ class Follower:
         return Fault(OutcomeKind.NOT_FOLLOWING, reason)
 
     def _hold(self, time: float, measured: FloatArray, reason: Fault | None) -> Fault | None:
-        """Begin, continue or end a hold; return why the run ends, if it does."""
+        """Begin, continue or end a hold; return the fault that ends the run, if any."""
         if reason is not None:
             moved = (np.abs(measured - self._held_at) > self._bound).any()
             if self.holding is None and (moved or time - self._freed > self._timeout_s):
                 self._since, self._held_at = time, measured
-            # An arm that does not follow is met where it was found, not chased: its sensors may
-            # be biased. One that is stopped or guided by hand is kept up with.
+            # An arm that does not follow is held where it was found: its sensors may be biased, so
+            # chasing them could move it. An arm that is stopped or guided by hand is followed.
             if self.holding is None or reason.kind is OutcomeKind.PROTECTIVE_STOP:
                 self._anchor = measured
             self.holding = self._held_for = reason

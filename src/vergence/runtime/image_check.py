@@ -1,4 +1,4 @@
-"""Whether an image is new, recent, and of its camera's size and type."""
+"""Checks whether an image is new, recent, and of its camera's size and type."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -11,10 +11,10 @@ from vergence.camera import Camera
 from vergence.runtime.endings import Fault, bad_sample, clock_error
 from vergence.signals import Frame, OutcomeKind, Sample
 
-EARLY_S = 0.01  # a stamp may be so far ahead of the sample's clock
-_REPEATS = 2  # as many repetitions of an image that arrived before another one was exposed,
-_KEPT = 64  # of those that are remembered,
-_MOVED = 5e-3  # while a joint moves by so much, rad or m, are no coincidence
+EARLY_S = 0.01  # largest lead of a stamp over the sample's clock
+_REPEATS = 2  # this many repetitions of an image that arrived before another one was exposed,
+_KEPT = 64  # of those that are stored,
+_MOVED = 5e-3  # while a joint moves by this much, rad or m, are not a coincidence
 
 
 @dataclass(slots=True)
@@ -25,16 +25,16 @@ class _Seen:
     image: ImageArray | None
     joints: Mapping[str, FloatArray]  # at its exposure
     measured: Mapping[str, FloatArray]  # joints when it arrived
-    # When its repetitions arrived, s, and the joints then; the oldest go first.
+    # When its repetitions arrived, s, and the joints then; the oldest are dropped.
     repeats: deque[tuple[float, Mapping[str, FloatArray]]]
 
 
 class ImageCheck:
-    """Checks every image once, as it arrives.
+    """Checks every image once, on arrival.
 
     Args:
-        cameras: by name; their sizes are the images'.
-        age_s: how old an image may be when it arrives.
+        cameras: by name; images must have their sizes.
+        age_s: largest age of an image on arrival.
     """
 
     def __init__(self, cameras: Mapping[str, Camera], age_s: float) -> None:
@@ -42,7 +42,7 @@ class ImageCheck:
         self._seen: dict[str, _Seen] = {}
 
     def check(self, frame: Frame, sample: Sample) -> Fault | bool:
-        """Return what is wrong with a frame; if nothing is, whether it is new."""
+        """Return the fault in a frame; if there is none, whether the frame is new."""
         if frame.camera not in self._cameras:
             return bad_sample(f"an image of {frame.camera!r}, which is not a camera of the driver")
         age = sample.time - frame.time
@@ -75,10 +75,10 @@ class ImageCheck:
         return None
 
     def _check_motion(self, frame: Frame, seen: _Seen | None, sample: Sample) -> Fault | None:
-        """Compare a frame with the last one, and say whether an arm moved while none changed.
+        """Compare a frame with the last one; return a fault if an arm moved but no image changed.
 
-        What counts is the motion between the first arrival and the last exposure: an image that is
-        older than the motion may well repeat the one before.
+        Only motion between the first arrival and the last exposure counts: an image older than the
+        motion may well repeat the one before.
         """
         measured = {name: state.position for name, state in sample.joints.items()}
         if seen is None or not _same(frame, seen):
@@ -105,7 +105,7 @@ def _delivered_twice(frame: Frame, seen: _Seen) -> bool:
 
 
 def _same(frame: Frame, seen: _Seen) -> bool:
-    """Return whether a frame repeats the last one; an image of one grey level shows nothing."""
+    """Return whether a frame repeats the last one; an image of one grey level does not count."""
     if frame.image is None or seen.image is None:
         return bool(frame.joints) and all(
             np.array_equal(position, seen.joints[name]) for name, position in frame.joints.items()

@@ -1,4 +1,4 @@
-"""Signals that end a run, taken at a moment when nothing is half done."""
+"""Signals that end a run, handled only at a safe point of the loop."""
 
 import signal
 from time import monotonic
@@ -8,19 +8,19 @@ from typing import Any, Self
 _SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-_BRAKING_S = 2.0  # a second Ctrl-C within this time is the first one's echo
+_BRAKING_S = 2.0  # a second Ctrl-C within this time is taken for the first one
 
 
 class Interrupt:
-    """While entered, only notes SIGINT (Ctrl-C), SIGTERM and SIGHUP, so that the loop can brake.
+    """While entered, only records SIGINT (Ctrl-C), SIGTERM and SIGHUP, so that the loop can brake.
 
-    A Ctrl-C two seconds or more after the first signal interrupts as ever, for the case that the
-    driver hangs. Signals that the process ignores stay ignored. Outside of the main thread, where
-    Python delivers no signals, nothing is ever noted.
+    A Ctrl-C two seconds or more after the first signal interrupts as usual, in case the driver
+    hangs. Signals that the process ignores remain ignored. Outside the main thread, where Python
+    delivers no signals, nothing is recorded.
     """
 
     def __init__(self) -> None:
-        self.asked = False  # whether the run is to end
+        self.asked = False  # whether the run should end
         self.reason = "stopped by the user"
         self._since = 0.0
         self._before: dict[int, Any] = {}

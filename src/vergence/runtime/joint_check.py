@@ -1,4 +1,4 @@
-"""Whether measured joints are all there, finite, recent, and where they can be."""
+"""Checks whether measured joints are complete, finite, recent and plausible."""
 
 import numpy as np
 from numba import njit
@@ -9,9 +9,9 @@ from vergence.runtime.endings import Fault, bad_sample
 from vergence.runtime.image_check import EARLY_S
 from vergence.signals import JointState, Sample
 
-_STALE_S = 0.1  # joints may be so old
-_RATE_MARGIN = 3.0  # a joint moves at most so many times its rate limit
-_NOISE = 0.01  # rad or m that a joint may move in no time: resolution, vibration
+_STALE_S = 0.1  # largest age of joints
+_RATE_MARGIN = 3.0  # largest speed of a joint relative to its rate limit
+_NOISE = 0.01  # rad or m that a joint may jump: resolution, vibration
 
 
 @njit(cache=True, error_model="numpy")
@@ -20,13 +20,13 @@ def first_implausible(
 ) -> int:
     """Return i if joint i is not finite, n + i if it moved too far since the last sample.
 
-    Else -1, or -2 if there are not n positions and velocities.
+    Otherwise -1, or -2 if there are not n positions and velocities.
 
     Args:
         position: measured, (n,).
         velocity: measured, (n,).
-        memory: the positions of the last sample, NaN before the first, and the fastest that each
-            joint may be seen to move, (2, n); the positions are overwritten if nothing is wrong.
+        memory: the positions of the last sample, NaN before the first, and the largest plausible
+            speed of each joint, (2, n); the positions are overwritten if there is no fault.
         elapsed: time since the last sample, s.
     """
     n = len(memory[0])
@@ -42,7 +42,7 @@ def first_implausible(
 
 
 class JointCheck:
-    """Checks what every sample says about one arm.
+    """Checks what every sample contains about one arm.
 
     Args:
         name: of the arm.
@@ -54,7 +54,7 @@ class JointCheck:
         self._memory = np.vstack((np.full(arm.joint_count, np.nan), _RATE_MARGIN * arm.rate_max))
 
     def check(self, sample: Sample, elapsed: float) -> Fault | None:
-        """Return what is wrong with the arm's joints in a sample.
+        """Return the fault in the arm's joints in a sample, if any.
 
         Args:
             sample: with the driver's time.

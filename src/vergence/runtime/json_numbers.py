@@ -1,4 +1,4 @@
-"""Numbers as JSON and back; what is not a finite number travels as null."""
+"""Numbers as JSON and back; null stands for a number that is not finite."""
 
 import json
 import math
@@ -35,7 +35,7 @@ def dumps(message: Mapping[str, Any]) -> bytes:
 
 
 def finite(summary: Mapping[str, float | str]) -> dict[str, float | str | None]:
-    """Return a summary that JSON can hold: null where a number is not finite."""
+    """Return a summary that JSON can represent: null where a number is not finite."""
     return {name: _plain(value) for name, value in summary.items()}
 
 

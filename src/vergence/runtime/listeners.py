@@ -1,4 +1,4 @@
-"""Several listeners as one, of which none can end a run."""
+"""Combines several listeners, none of which can end a run."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -14,11 +14,11 @@ _LOG = logging.getLogger(__name__)
 class Listeners:
     """Notifies every listener; one that raises is dropped, and the others are informed.
 
-    The loop continues when a disk is full or a page is gone. A listener that was dropped is still
-    closed, so that it can finish what it has.
+    The loop continues when a disk is full or a page was closed. A dropped listener is still closed,
+    so that it can finish what it has.
 
     Args:
-        listeners: in the order in which they are told.
+        listeners: in the order in which they are notified.
     """
 
     def __init__(self, listeners: Sequence[Listener]) -> None:

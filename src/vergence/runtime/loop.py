@@ -29,34 +29,34 @@ from vergence.runtime.timeouts import Timeouts
 from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Reference, Sample
 
 _LOG = logging.getLogger(__name__)
-_OUTSIDE = 0.5  # rad or m outside its range from which a joint is brought back, not farther
-_IMAGE_AGE_S = 0.5  # the least age that every image may have when it arrives
+_OUTSIDE = 0.5  # rad or m beyond its range from which a joint is still brought back
+_IMAGE_AGE_S = 0.5  # the smallest allowed limit on the age of an image on arrival
 
 
 class Loop:
     """Runs one arm's task with a simulated or a real driver.
 
-    Each inner tick reads a sample, checks it, and hands guarded set-points to the driver. An image
-    is processed in the tick in which it arrives: perception, planner and law then give new joint
-    rates. An `InnerLaw` is asked for rates at each inner tick, any other's are kept until the next
-    image is due. Without it the rates fade to zero. On an `ExactDriver`, the ticks until something
-    can happen are taken at once, with the same result.
+    Each inner tick reads a sample, checks it, and sends guarded set-points to the driver. An image
+    is processed in the tick in which it arrives: perception, planner and law then determine new
+    joint rates. An `InnerLaw` is asked for rates at each inner tick; those of any other law are
+    held until the next image is due. If no image arrives, they fade to zero. With an `ExactDriver`,
+    ticks in which nothing can happen are taken together, with the same result.
 
     Args:
         driver: the cell.
-        arm: name of the arm that is moved; the others hold their place.
-        perception: looks at the images.
-        planner: says what is desired.
-        law: says how to get there.
-        outer_rate_hz: how often an image is due.
-        listeners: hear of every turn and event.
-        timeouts: how long to hold before the run ends.
-        following: how far the arm may be from its set-points.
-        goal: when the task counts as reached, and whether it ends there; not judged if None.
-        next_stages: is told how a task ended; returns what the next one is done by, or None to end
-            the run as that task did. From one to the next the arm is braked, and continues from the
-            set-points where it is.
-        clearance: distances between what the arm must not bring together; None for nothing.
+        arm: name of the arm that is moved; the others hold their position.
+        perception: processes the images.
+        planner: provides the desired features.
+        law: computes the command.
+        outer_rate_hz: rate at which images are due.
+        listeners: are notified of every turn and event.
+        timeouts: longest holds before the run ends.
+        following: largest allowed distance of the arm from its set-points.
+        goal: when the task counts as reached, and whether it ends there; not evaluated if None.
+        next_stages: receives a task's outcome; returns the stages of the next task, or None to end
+            the run with that outcome. Between tasks the arm is braked, and continues from its
+            present set-points.
+        clearance: distances between bodies that must not collide; None for no check.
     """
 
     def __init__(
@@ -92,23 +92,24 @@ class Loop:
         self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
         self._tick, self._now, self._end = 0, 0.0, np.inf
         self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
-        self._held = ""  # kind of what the arm is held for, as it was reported last
+        self._held = ""  # kind of the last reported hold
         self.take_up(Stages(perception, planner, law, self._timeouts, goal))
 
     def take_up(self, stages: Stages) -> None:
-        """Begin a task; until an image has come the arm is held."""
+        """Begin a task; the arm is held until an image arrives."""
         self._perception, self._planner, self._law = stages.perception, stages.planner, stages.law
         self._inner_law = stages.law if isinstance(stages.law, InnerLaw) else None
         self._timeouts, rate_max = stages.timeouts, self._driver.arms[self._arm].rate_max
         self._task = TaskWatch(stages, self._now, rate_max, self._listeners)
-        self._last_image = self._last_seen = self._now  # s, when one came, and with the target
-        self._command: JointCommand | None = None  # what the arm goes by; None while it is held
+        self._last_image = self._last_seen = self._now  # s, of the last image, and with the target
+        self._command: JointCommand | None = None  # that the arm executes; None while it is held
 
     def run(self, duration_s: float) -> Outcome:
-        """Run until the time is over, the task has failed, or a signal; then stop the arm.
+        """Run until the time is over, the task has failed, or a signal arrives; then stop the arm.
 
-        Whatever a part raises, the arm is braked and the outcome says so; the traceback goes to the
-        log. If the driver does not even take set-points, the robot's watchdog has to stop the arm.
+        If a part raises, the arm is braked and the outcome states the error; the traceback goes to
+        the log. If the driver does not accept set-points either, the robot's watchdog must stop the
+        arm.
         """
         with self._interrupt:
             try:
@@ -132,14 +133,14 @@ class Loop:
 
     @property
     def law(self) -> Law:
-        """The parts of the present task."""
+        """The present law."""
         return self._law
 
     def replace_law(self, law: Law) -> None:
-        """Go on with another law from the next image.
+        """Continue with another law from the next image.
 
-        Until then the arm is held, unless the law can take over from the one before. To be called
-        from the thread that runs the loop, such as by its driver.
+        Until then the arm is held, unless the new law can take over from the old one. Must be
+        called from the thread that runs the loop, for example by its driver.
         """
         if not (isinstance(law, Successor) and law.take_over(self._law)):
             self._command = None
@@ -153,7 +154,7 @@ class Loop:
             return self._stopped()
         except DriverSilent as silence:
             return Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
-        except VergenceError as error:  # says what to do; a traceback would add nothing
+        except VergenceError as error:  # its message suffices; a traceback would add nothing
             return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
         except Exception as error:
             _LOG.exception("the %s raised", self._part)
@@ -178,7 +179,7 @@ class Loop:
                 return outcome
 
     def _begin(self, sample: Sample) -> Outcome | None:
-        """Take the set-points from the measured joints; refuse a start far outside the limits."""
+        """Start set-points at the measured joints; reject a start far outside the limits."""
         dt, timeouts = 1.0 / self._driver.inner_rate_hz, self._timeouts
         command_share(0.0, self._period_s, timeouts.decay_s)  # compiles or loads it
         for name, arm in self._driver.arms.items():
@@ -197,7 +198,7 @@ class Loop:
         return None
 
     def _turn(self, sample: Sample, duration_s: float) -> Outcome | None:
-        """Process what arrived and decide how to continue; return how the run ends, if it does."""
+        """Process what arrived and decide how to continue; return the outcome if the run ends."""
         turns = self._schedule.turns(self._tick, bool(sample.frames))
         if self._schedule.period_over:
             stuck, self._stuck[:] = self._stuck.copy(), True
@@ -227,7 +228,7 @@ class Loop:
     def _concluded(
         self, sample: Sample, observation: Observation, reference: Reference
     ) -> Outcome | None:
-        """Return how the task ends, if it does by its planner or its `until`."""
+        """Return the outcome if the task ends by its planner or its `until`."""
         self._part = "planner"
         if outcome := self._task.planned_end(self._now):
             return outcome
@@ -236,7 +237,7 @@ class Loop:
         return self._task.asked_end(self._now, q, observation, reference)
 
     def _wait(self, sample: Sample) -> Outcome | None:
-        """Go on without an image, for a while."""
+        """Continue without an image, for a limited time."""
         waited = self._now - self._last_image
         if waited > self._timeouts.image_s:
             return endings.image_late(waited, self._now)
@@ -268,7 +269,7 @@ class Loop:
         return None if command.fault is None else Outcome(*command.fault, self._now)
 
     def _step(self, sample: Sample) -> Outcome | None:
-        """Hand the next set-points to the driver; return how the run ends, if it does."""
+        """Send the next set-points to the driver; return the outcome if the run ends."""
         for name, follower in self._followers.items():
             robot = sample.robots.get(name)
             if name == self._arm or robot is not None:
@@ -292,7 +293,7 @@ class Loop:
         return endings.collision(hindrance, self._now) if hindrance else None
 
     def _advanced(self, rates: FloatArray) -> bool:
-        """Take all ticks until the next event at once, where nothing can happen in them."""
+        """Take all ticks until the next event together, if nothing can happen in them."""
         if self._exact is None or self._inner_law is not None:
             return False
         until_end = int((self._end - self._now) * self._driver.inner_rate_hz)
@@ -310,7 +311,7 @@ class Loop:
         return True
 
     def _rates(self) -> FloatArray | Fault:
-        """Return the rates to move at: the command's, less what its age has taken from them."""
+        """Return the rates to execute: the command's, reduced according to its age."""
         share = self._share_at(self._now)
         self._part = "law"
         if share == 0.0:
@@ -327,7 +328,7 @@ class Loop:
         return rates if share == 1.0 else share * rates
 
     def _share_at(self, time: float) -> float:
-        """Return how much is left of the command at a time."""
+        """Return the fraction of the command that remains at a time."""
         if self._command is None:
             return 0.0
         return command_share(time - self._last_image, self._period_s, self._timeouts.decay_s)
@@ -364,7 +365,7 @@ class Loop:
         return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)
 
     def _braked(self, outcome: Outcome) -> Outcome:
-        """Brake every arm; a driver that falls silent meanwhile is the outcome instead."""
+        """Brake every arm; if the driver becomes silent meanwhile, that is the outcome."""
         failure = self._brake()
         if not failure or outcome.kind is OutcomeKind.DRIVER_SILENT:
             return outcome

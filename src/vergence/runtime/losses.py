@@ -1,4 +1,4 @@
-"""Events of features and targets that are lost and found again, once each."""
+"""Events of features and targets that are lost or found again, each reported once."""
 
 import numpy as np
 
@@ -13,12 +13,12 @@ def shows_target(observation: Observation) -> bool:
 
 
 def may_move(observation: Observation) -> bool:
-    """Return whether an observation shows all that the law needs."""
+    """Return whether an observation contains everything that the law needs."""
     return shows_target(observation) or not observation.needs_target
 
 
 def reasons(observation: Observation) -> list[str]:
-    """Return why features were not found, of every view."""
+    """Return the reasons why features were not found, over all views."""
     return [reason for view in observation.views for reason in view.reasons]
 
 
@@ -35,7 +35,7 @@ class LossReports:
         self._target_lost = False
 
     def report(self, time: float, observation: Observation) -> None:
-        """Tell what has changed since the last observation; nothing where no target is needed."""
+        """Report changes since the last observation; nothing if no target is needed."""
         if not observation.needs_target:
             return
         lost = not shows_target(observation)

@@ -1,4 +1,4 @@
-"""What has to be known of a run to read its numbers."""
+"""The information about a run that is needed to interpret its numbers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ class _CameraData(BaseModel):
 
 
 class _RunData(BaseModel):
-    """What a recording says of its run, in ranges that any run is in."""
+    """The information about a run in a recording, within plausible ranges."""
 
     cell: _Name
     seed: int | None
@@ -52,7 +52,7 @@ class _RunData(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class ArmInfo:
-    """The joints of an arm and what they may do; an unlimited joint has infinite limits."""
+    """The joints of an arm with their limits; an unlimited joint has infinite limits."""
 
     names: tuple[str, ...]  # (n,)
     q_min: FloatArray  # (n,) rad or m
@@ -65,7 +65,7 @@ class ArmInfo:
 
     @classmethod
     def of(cls, arm: Arm) -> Self:
-        """Keep names and limits of an arm."""
+        """Return names and limits of an arm."""
         return cls(tuple(arm.names), arm.q_min, arm.q_max, arm.rate_max)
 
     def as_json(self) -> dict[str, Any]:
@@ -88,13 +88,13 @@ class RunInfo:
     """The cell that was run, its seed, and the arms and cameras in it."""
 
     cell: str  # name of the cell
-    text: str = ""  # the cell file, word for word
+    text: str = ""  # text of the cell file
     seed: int | None = None
     arms: Mapping[str, ArmInfo] = field(default_factory=dict)
     cameras: Mapping[str, Camera] = field(default_factory=dict)
-    task_camera: str = ""  # the one whose points the reference speaks of; the first if empty
-    path: str = ""  # where the cell file was, with the models beside it
-    targets: tuple[str, ...] = ()  # names of the targets; none are known of old recordings
+    task_camera: str = ""  # the camera that the reference refers to; the first if empty
+    path: str = ""  # path of the cell file, with the models beside it
+    targets: tuple[str, ...] = ()  # names of the targets; empty for old recordings
 
     def __post_init__(self) -> None:
         if not self.task_camera:
@@ -111,7 +111,7 @@ class RunInfo:
         path: str = "",
         targets: tuple[str, ...] = (),
     ) -> Self:
-        """Keep what a driver and a cell file say."""
+        """Collect the information from a driver and a cell file."""
         arms = {name: ArmInfo.of(arm) for name, arm in driver.arms.items()}
         return cls(cell, text, seed, arms, dict(driver.cameras), task_camera, path, targets)
 
@@ -129,10 +129,10 @@ class RunInfo:
 
     @classmethod
     def from_json(cls, data: str, text: str) -> Self:
-        """Read what `as_json` returned, which may come from anybody.
+        """Read what `as_json` returned, which is untrusted.
 
         Raises:
-            ValueError: if it says anything else.
+            ValueError: if it is not valid.
         """
         given = _RunData.model_validate_json(data)
         return cls(

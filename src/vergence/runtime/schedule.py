@@ -1,4 +1,4 @@
-"""When the loop looks, and how much of an ageing command is left."""
+"""When the loop turns, and how an ageing command fades."""
 
 from numba import njit
 
@@ -7,25 +7,25 @@ from vergence.camera import image_tick
 
 @njit(cache=True)
 def command_share(age_s: float, period_s: float, decay_s: float) -> float:
-    """Return the share of the commanded rates that is left at an age of their image.
+    """Return the fraction of the commanded rates that remains at a given age of their image.
 
-    All of it until the next image is due, then ever less, and nothing after `decay_s`.
+    1 until the next image is due, then decreasing to 0 over `decay_s`.
 
     Args:
         age_s: since the image arrived.
         period_s: between images.
-        decay_s: from when the next image is due until nothing is left.
+        decay_s: time from when the next image is due until the rates are zero.
     """
     left: float = (period_s + decay_s - age_s) / decay_s
     return min(max(left, 0.0), 1.0)
 
 
 class Schedule:
-    """Counts inner ticks; the loop turns on every image, and once a period where none arrives.
+    """Counts inner ticks; the loop turns on every image, and once per period if none arrives.
 
     Args:
-        inner_rate_hz: of the ticks.
-        outer_rate_hz: of the images.
+        inner_rate_hz: rate of the ticks.
+        outer_rate_hz: rate of the images.
     """
 
     def __init__(self, inner_rate_hz: float, outer_rate_hz: float) -> None:
@@ -36,11 +36,11 @@ class Schedule:
         self.period_over = False  # whether a period of the camera ends with this tick
 
     def ticks_left(self, tick: int) -> int:
-        """Return how many ticks it is until the next period begins."""
+        """Return the number of ticks until the next period begins."""
         return self._due - tick
 
     def turns(self, tick: int, images: bool) -> bool:
-        """Return whether the loop turns at a tick, which may bring images."""
+        """Return whether the loop turns at a tick, given whether it brings images."""
         overdue = self._last_image <= self._last_due
         self.period_over = tick >= self._due
         if self.period_over:

@@ -1,4 +1,4 @@
-"""Where joints will be when a command is felt: their servos follow set-points late."""
+"""Predicts the joints to when a command takes effect: servos follow set-points with a lag."""
 
 from collections import deque
 
@@ -7,17 +7,17 @@ from vergence.signals import JointState, Setpoint
 
 
 class ServoLag:
-    """Adds to measured joints the commanded motion that their servos have not yet executed.
+    """Adds to the measured joints the commanded motion that their servos have not executed yet.
 
-    A servo with lag T follows as q(t + T) = s(t) + b, with an offset b that changes slowly. So
+    A servo with lag T follows as q(t + T) = s(t) + b, with a slowly varying offset b, so
     q(t + T) = q(t) + s(t) - s(t - T), whatever b is.
 
     Args:
-        ticks: of lag.
+        ticks: the lag.
         dt: inner period, s.
 
     Attributes:
-        ticks: of lag.
+        ticks: the lag.
     """
 
     def __init__(self, ticks: int, dt: float) -> None:
@@ -26,13 +26,13 @@ class ServoLag:
         self._told: deque[FloatArray] = deque(maxlen=ticks + 1)
 
     def add(self, setpoint: Setpoint) -> None:
-        """Take note of the set-point of this tick."""
+        """Store the set-point of this tick."""
         if self._lag_s:
             self._newest = setpoint
             self._told.append(setpoint.position)
 
     def ahead(self, joints: JointState) -> JointState:
-        """Return the joints as they will be one lag from now, by the set-points so far."""
+        """Return the joints predicted one lag ahead, from the set-points so far."""
         if not self._told:
             return joints
         position = joints.position + self._told[-1] - self._told[0]

@@ -1,4 +1,4 @@
-"""Several perceptions beside each other, each with a camera of its own."""
+"""Combines several perceptions, each with its own camera."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from vergence.signals import Frame, Observation
 
 
 class SeveralCameras:
-    """Observes with each of several perceptions, and passes on what all have seen.
+    """Runs each of several perceptions, and merges their views into one observation.
 
     Args:
         perceptions: one per camera.

@@ -1,4 +1,4 @@
-"""The stages of the loop that users may replace, as the loop sees them."""
+"""The replaceable stages of the loop, as the loop uses them."""
 
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -15,15 +15,15 @@ class Perception(Protocol):
     """Turns images into an observation."""
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return what the frames show, or None if none of them concerns it."""
+        """Return the observation in the frames, or None if none of them is relevant."""
         ...
 
 
 class Planner(Protocol):
-    """Knows what is desired when."""
+    """Provides the desired features over time."""
 
     def reference(self, time: float) -> Reference:
-        """Return what the law should aim at.
+        """Return the reference for the law.
 
         Args:
             time: exposure of the image that the law compares it with, s.
@@ -42,44 +42,44 @@ class Tells(Protocol):
 
 @runtime_checkable
 class PlansAgain(Protocol):
-    """A planner that finds another way where the arm stalls."""
+    """A planner that finds another path when the arm stalls."""
 
     def stalled(self, time: float, points_px: FloatArray, q: FloatArray) -> None:
-        """Hear that the arm is at rest away from its goal.
+        """Receive the information that the arm is at rest away from its goal.
 
         Args:
             time: s.
-            points_px: where the features are, (M, 2).
-            q: where the joints are, (n,).
+            points_px: positions of the features, (M, 2).
+            q: joint positions, (n,).
         """
         ...
 
     @property
     def added_s(self) -> float:
-        """By how much the task takes longer for it, s."""
+        """The additional time that the task takes because of it, s."""
         ...
 
 
 @runtime_checkable
 class EndsTask(Tells, Protocol):
-    """A planner that knows when its task is done."""
+    """A planner that determines when its task is done."""
 
     def conclusion(self, time: float) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         ...
 
     def unfinished(self, time: float) -> Outcome:
-        """Return how the task ends if its time is over."""
+        """Return the outcome of the task if its time is over."""
         ...
 
 
 class Stages(NamedTuple):
-    """What one task is done by."""
+    """The parts that perform one task."""
 
-    perception: Perception  # looks at the images
-    planner: Planner  # says what is desired
-    law: Law  # says how to get there
+    perception: Perception  # processes the images
+    planner: Planner  # provides the desired features
+    law: Law  # computes the command
     timeouts: Timeouts = Timeouts()
-    goal: Goal | None = None  # when it counts as reached, and whether it ends there
-    until: Until | None = None  # ends it as well
-    duration_s: float = float("inf")  # after which its time is over
+    goal: Goal | None = None  # when the task counts as reached, and whether it ends there
+    until: Until | None = None  # an additional end of the task
+    duration_s: float = float("inf")  # time after which the task is over

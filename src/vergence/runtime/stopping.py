@@ -1,4 +1,4 @@
-"""Bringing every arm to rest, whatever else has happened."""
+"""Brings every arm to rest, whatever else has happened."""
 
 import logging
 from collections.abc import Mapping
@@ -8,18 +8,18 @@ from vergence.errors import DriverSilent
 from vergence.runtime.driver import Driver
 
 _LOG = logging.getLogger(__name__)
-_TRIES = 3  # set-points that a driver may refuse one after the other
+_TRIES = 3  # consecutive set-points that a driver may reject
 
 
 def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
     """Brake every arm to rest within its acceleration limits.
 
     Args:
-        driver: takes the set-points.
-        guards: by arm, with the set-points that were handed over last.
+        driver: receives the set-points.
+        guards: by arm, with the last set-points sent.
 
     Returns:
-        Why an arm could not be braked from here; empty if all are at rest.
+        Why an arm could not be braked; empty if all are at rest.
     """
     refused = 0
     while any(guard.moving for guard in guards.values()):
@@ -29,7 +29,7 @@ def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
         except DriverSilent as silence:
             return str(silence)
         except Exception as error:
-            _LOG.exception("the driver refuses set-points while it is braked")
+            _LOG.exception("the driver rejects set-points during braking")
             refused += 1
             if refused == _TRIES:
                 return raised("driver", error)
@@ -39,7 +39,7 @@ def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
 
 
 def raised(part: str, error: BaseException) -> str:
-    """Return in one sentence what a part raised."""
+    """Return a sentence that states which error a part raised."""
     first = next(iter(str(error).splitlines()), "")
     text = f"{type(error).__name__}: {first}" if first else type(error).__name__
     return f"the {part} raised {text[:200]}"

@@ -1,4 +1,4 @@
-"""How far the task of a loop is: what is lost, what holds the arm, and when the task is over."""
+"""Progress of the loop's task: what is lost, what holds the arm, and when the task is over."""
 
 from vergence.arrays import FloatArray
 from vergence.runtime import endings
@@ -11,12 +11,12 @@ from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Re
 
 
 class TaskWatch:
-    """Watches one task, and notifies listeners of changes.
+    """Monitors one task, and notifies listeners of changes.
 
     Args:
-        stages: what the task is done by.
+        stages: the parts that perform the task.
         begun: when it began, s since the start of the run.
-        rate_max: of the joints, (n,).
+        rate_max: rate limits of the joints, (n,).
         listeners: to notify.
     """
 
@@ -24,7 +24,7 @@ class TaskWatch:
         self, stages: Stages, begun: float, rate_max: FloatArray, listeners: Listeners
     ) -> None:
         planner = stages.planner
-        # Asked here once: to ask it of a protocol costs as much as a short tick's law.
+        # Checked here once: an isinstance check of a protocol takes as long as a short tick's law.
         self._plans_again = planner if isinstance(planner, PlansAgain) else None
         self._tells = planner if isinstance(planner, Tells) else None
         self._ends = planner if isinstance(planner, EndsTask) else None
@@ -32,15 +32,15 @@ class TaskWatch:
         self._begun, self._duration_s = begun, stages.duration_s
         self._listeners, self._losses = listeners, LossReports(listeners)
         self._arrival = None if stages.goal is None else Arrival(stages.goal, rate_max)
-        self._stalled = False  # as it was reported last
+        self._stalled = False  # as last reported
 
     def end(self, duration_s: float) -> float:
-        """Return when the time of the task is over, s, in a run of so many."""
+        """Return when the time of the task is over, s, in a run of the given duration."""
         added = self._plans_again.added_s if self._plans_again else 0.0
         return min(duration_s, self._begun + self._duration_s + added)
 
     def see(self, time: float, observation: Observation) -> None:
-        """Tell what is lost and found again."""
+        """Report what is lost and found again."""
         self._losses.report(time, observation)
 
     def judge(
@@ -51,7 +51,7 @@ class TaskWatch:
         command: JointCommand,
         q: FloatArray,
     ) -> None:
-        """Check the distance from the goal; report where the arm comes to rest before it."""
+        """Check the distance from the goal; report if the arm comes to rest before it."""
         self._tell_of_plans()
         if self._arrival is None:
             return
@@ -70,20 +70,20 @@ class TaskWatch:
                 self._listeners.event(*event)
 
     def planned_end(self, time: float) -> Outcome | None:
-        """Report the planner's events; return how it ends the task, once it does."""
+        """Report the planner's events; return the outcome if the planner ends the task."""
         self._tell_of_plans()
         return None if self._ends is None else self._ends.conclusion(time)
 
     def asked_end(
         self, time: float, q: FloatArray, observation: Observation, reference: Reference
     ) -> Outcome | None:
-        """Return how the task ends by its `until`, once it does."""
+        """Return the outcome of the task if its `until` ends it."""
         if self._until is None:
             return None
         return self._until.over(Moment(time, time - self._begun, q, observation, reference))
 
     def time_over(self, end: float, time: float) -> Outcome:
-        """Return how the task ends whose time is over."""
+        """Return the outcome of a task whose time is over."""
         if self._ends is not None:
             return self._ends.unfinished(time)
         if self._until is not None:

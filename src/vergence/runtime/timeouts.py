@@ -1,11 +1,11 @@
-"""How long the loop waits for what."""
+"""The longest holds of the loop."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Timeouts:
-    """How long the loop holds the arm before it ends the run, and how fast an old command fades."""
+    """How long the loop holds the arm before it ends the run, and how fast a command decays."""
 
     image_s: float = 0.5  # without a new image
     target_s: float = 0.2  # with images in which no feature is found

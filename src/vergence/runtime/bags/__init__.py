@@ -1,4 +1,4 @@
-"""ROS 2 bags: a recording written as one, and images and joints read from any."""
+"""ROS 2 bags: exports of a recording, and images and joints from any bag."""
 
 from vergence.runtime.bags.bag import COMPRESSED, IMAGE, Bag, BagImage, BagJoints, is_bag
 from vergence.runtime.bags.bag_recording import BagRecording, read_bag

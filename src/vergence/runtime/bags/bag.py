@@ -1,4 +1,4 @@
-"""A ROS 2 bag that is read: its images and its joints."""
+"""Reading images and joints from a ROS 2 bag."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,28 +17,28 @@ JOINTS, CAMERA_INFO = "sensor_msgs/msg/JointState", "sensor_msgs/msg/CameraInfo"
 METADATA = "metadata.yaml"
 _MOST_MESSAGES = 5_000_000
 _MOST_JOINTS = 1000
-_LATEST_S = 1e11  # of a stamp, which is a time since 1970
+_LATEST_S = 1e11  # largest stamp, as time since 1970
 
 
 class BagImage(NamedTuple):
-    """An image as a bag has it; it is decoded when it is asked for."""
+    """An image in a bag; it is decoded on demand."""
 
-    time: float  # s, its stamp; when it was recorded if it has none
+    time: float  # s, its stamp, or the time of recording if it has none
     name: str  # of the topic, with a number
     message: Any  # sensor_msgs/Image or CompressedImage
 
     def raw(self) -> np.ndarray:
-        """Return the pixels as OpenCV reads a file: grey or BGR, of 8 or 16 bits.
+        """Return the pixels as OpenCV reads a file: grey or BGR, 8 or 16 bits per channel.
 
         Raises:
-            InputError: if its encoding is not known, or it is no whole image.
+            InputError: if its encoding is not supported, or it is incomplete.
         """
         if hasattr(self.message, "format"):
             return decoded_image(self.message.data, self.name)
         return pixel_array(self.message, self.name)
 
     def jpeg(self) -> bytes:
-        """Return it as JPEG; as it was recorded where it is one.
+        """Return the image as JPEG, unchanged if it was recorded as JPEG.
 
         Raises:
             InputError: as `raw`.
@@ -54,13 +54,13 @@ class BagJoints(NamedTuple):
     names: tuple[str, ...]  # (n,)
     time: FloatArray  # (N,) s, increasing
     position: FloatArray  # (N, n) rad or m
-    velocity: FloatArray  # (N, n) rad/s or m/s; NaN where not told
+    velocity: FloatArray  # (N, n) rad/s or m/s; NaN where not recorded
 
     def of(self, names: tuple[str, ...], source: str) -> "BagJoints":
-        """Return those of some names, in their order.
+        """Return the joints of the given names, in that order.
 
         Raises:
-            InputError: if one is not in the bag.
+            InputError: if a joint is not in the bag.
         """
         for name in names:
             if name not in self.names:
@@ -70,13 +70,13 @@ class BagJoints(NamedTuple):
 
 
 class Bag:
-    """A bag that is open; use it in a `with` statement.
+    """An open bag; use it in a `with` statement.
 
     Args:
-        path: its folder, with `metadata.yaml` in it.
+        path: its folder, which contains `metadata.yaml`.
 
     Raises:
-        InputError: if it is no bag or cannot be read, or rosbags is not installed.
+        InputError: if it is not a bag or cannot be read, or rosbags is not installed.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -90,7 +90,7 @@ class Bag:
         try:
             self._reader = rosbag2.Reader(self.path)
             self._reader.open()
-        except Exception as error:  # damage can look like anything to a parser
+        except Exception as error:  # damaged data may make the parser raise anything
             raise _damaged(self.path, error) from None
 
     def __enter__(self) -> Self:
@@ -101,12 +101,12 @@ class Bag:
 
     @property
     def about(self) -> dict[str, str]:
-        """Words that its writer left in it, by key."""
+        """Return the metadata that the bag's writer stored, by key."""
         custom = getattr(self._reader.storage.metadata, "custom", None)
         return {str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {}
 
     def topics(self, *kinds: str) -> dict[str, int]:
-        """Return the topics of some message types, and how many messages each has."""
+        """Return the topics of the given message types, with the number of messages of each."""
         counts: dict[str, int] = {}
         for one in self._reader.connections:
             if one.msgtype in kinds:
@@ -114,36 +114,36 @@ class Bag:
         return {topic: count for topic, count in counts.items() if count}
 
     def image_topic(self, given: str | None, option: str = "--topic") -> str:
-        """Return the topic of the images that are meant.
+        """Return the topic of the images to read.
 
         Raises:
-            InputError: if the bag has no images there, or several topics of which none is given.
+            InputError: if the topic has no images, or there are several topics and none is given.
         """
         return self._topic(given, option, "images", IMAGE, COMPRESSED)
 
     def joint_topic(self, given: str | None, option: str = "--joints") -> str:
-        """Return the topic of the joints that are meant.
+        """Return the topic of the joints to read.
 
         Raises:
-            InputError: if the bag has no joints there, or several topics of which none is given.
+            InputError: if the topic has no joints, or there are several topics and none is given.
         """
         return self._topic(given, option, "joint states", JOINTS)
 
     def images(self, topic: str) -> Iterator[BagImage]:
-        """Yield the images of a topic in the order in which they were recorded.
+        """Yield the images of a topic in the order of recording.
 
         Raises:
-            InputError: if the bag is damaged, or a stamp is no time.
+            InputError: if the bag is damaged, or a stamp is not a valid time.
         """
         for number, (recorded, message) in enumerate(self._messages(topic)):
             name = f"{self.path}{topic}#{number}"
             yield BagImage(_stamp(message, recorded, name), name, message)
 
     def joints(self, topic: str) -> BagJoints:
-        """Return the joints of a topic; a message that lacks some of the first one's is left out.
+        """Return the joints of a topic; messages that lack a joint of the first one are ignored.
 
         Raises:
-            InputError: if there is none that can be used, or the bag is damaged.
+            InputError: if no message is usable, or the bag is damaged.
         """
         names: tuple[str, ...] = ()
         rows: list[tuple[float, list[float], list[float]]] = []
@@ -164,7 +164,7 @@ class Bag:
         return BagJoints(names, time_s, position_of, velocity_of)
 
     def camera(self, topic: str) -> Camera | None:
-        """Return the camera whose `camera_info` is beside a topic of images, if there is one."""
+        """Return the camera from the `camera_info` beside an image topic; None if there is none."""
         folder = topic.removesuffix("/compressed").rpartition("/")[0]
         beside = f"{folder}/camera_info"
         if beside not in self.topics(CAMERA_INFO):
@@ -191,7 +191,7 @@ class Bag:
         return given or next(iter(there))
 
     def _messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield the messages of a topic and when each was recorded, ns."""
+        """Yield the messages of a topic with the time of recording of each, ns."""
         chosen = [one for one in self._reader.connections if one.topic == topic]
         try:
             for number, (of, recorded, data) in enumerate(self._reader.messages(chosen)):
@@ -219,4 +219,4 @@ def _stamp(message: Any, recorded_ns: int, name: str) -> float:
 
 def _damaged(path: Path, error: Exception) -> InputError:
     given = f"a bag that cannot be read ({type(error).__name__}: {str(error)[:200]})"
-    return InputError(str(path), "", given, "a whole bag; `ros2 bag reindex` mends some")
+    return InputError(str(path), "", given, "an intact bag; `ros2 bag reindex` may repair it")

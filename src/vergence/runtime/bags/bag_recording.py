@@ -1,4 +1,4 @@
-"""A bag as a recording that can be watched: images and joints, whoever wrote it."""
+"""A bag as a recording that can be watched: images and joints from any source."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,14 +15,14 @@ from vergence.runtime.results import ArmTrace, CameraTrace, Columns
 from vergence.runtime.run_info import ArmInfo, RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
-_MOST_IMAGES = 3000  # of a topic, evenly spread: they are kept in memory
+_MOST_IMAGES = 3000  # per topic, evenly spread: they are kept in memory
 _ENDINGS = ("compressed", "image_raw", "image_rect", "image_color", "image", "raw")
 _Images = Mapping[str, tuple[tuple[float, bytes], ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BagRecording(Recording):
-    """What a bag has of a run."""
+    """The data of a bag."""
 
     kept: _Images = field(default_factory=dict)  # JPEGs by camera, with their time of exposure
 
@@ -32,14 +32,14 @@ class BagRecording(Recording):
 
 
 def read_bag(path: str | Path, topic: str | None = None) -> BagRecording:
-    """Read the images and joints of a bag; its time begins with the first of them.
+    """Read the images and joints of a bag; time zero is the first of them.
 
     Args:
         path: the bag's folder.
-        topic: the only topic of images that is read; all if None.
+        topic: the only image topic to read; all if None.
 
     Raises:
-        InputError: if it has neither, or cannot be read.
+        InputError: if the bag has neither images nor joints, or cannot be read.
     """
     with Bag(path) as bag:
         topics = [bag.image_topic(topic)] if topic else list(bag.topics(IMAGE, COMPRESSED))
@@ -59,7 +59,7 @@ def read_bag(path: str | Path, topic: str | None = None) -> BagRecording:
 
 
 def _known(bag: Bag) -> RunInfo | None:
-    """Return what vergence left in a bag of its own."""
+    """Return the run information that vergence stored in a bag of its own."""
     try:
         return RunInfo.from_json(bag.about[INFO], bag.about[TEXT])
     except (KeyError, ValueError):
@@ -87,7 +87,7 @@ def _jpegs(bag: Bag, topic: str) -> list[tuple[float, bytes]]:
 
 
 def _camera_name(topic: str) -> str:
-    """Return a short name of a topic's camera: wrist of /wrist/image_raw/compressed."""
+    """Return a short name for a topic's camera, such as wrist for /wrist/image_raw/compressed."""
     parts = topic.strip("/").split("/")
     while len(parts) > 1 and parts[-1] in _ENDINGS:
         parts.pop()
@@ -95,7 +95,7 @@ def _camera_name(topic: str) -> str:
 
 
 def _camera(bag: Bag, topic: str) -> Camera:
-    """Return a topic's camera; one of a usual field of view where the bag does not tell."""
+    """Return a topic's camera; one with a common field of view if the bag has no intrinsics."""
     told = bag.camera(topic)
     if told is not None:
         return told

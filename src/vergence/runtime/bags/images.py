@@ -1,4 +1,4 @@
-"""Images of ROS's messages."""
+"""Images in ROS messages."""
 
 from io import BytesIO
 from typing import Any
@@ -16,10 +16,10 @@ _QUALITY = 90
 
 
 def pixel_array(message: Any, name: str) -> np.ndarray:
-    """Return the pixels of `sensor_msgs/Image` (height, width), grey: bytes, or of 16 bits.
+    """Return the grey pixels of a `sensor_msgs/Image` (height, width), 8 or 16 bits.
 
     Raises:
-        InputError: if its encoding is not known, it is too large, or it has too few bytes.
+        InputError: if its encoding is not supported, it is too large, or it has too few bytes.
     """
     width, height, encoding = int(message.width), int(message.height), str(message.encoding)
     require_size(width, height, name)
@@ -46,7 +46,7 @@ def decoded_image(data: Any, name: str) -> np.ndarray:
     """Return a JPEG or PNG file as OpenCV reads it.
 
     Raises:
-        InputError: if it is no whole image, or too large.
+        InputError: if it is incomplete, not an image, or too large.
     """
     import cv2
     from PIL import Image
@@ -65,7 +65,7 @@ def decoded_image(data: Any, name: str) -> np.ndarray:
 
 
 def jpeg_of(raw: np.ndarray, name: str) -> bytes:
-    """Return an image in grey as JPEG."""
+    """Return a grey image as JPEG."""
     import cv2
 
     values = grey_values(raw, name)

@@ -1,10 +1,10 @@
-"""What the topics of a bag that vergence writes are called."""
+"""Topic names in the bags that vergence writes."""
 
-INFO, TEXT = "vergence.info", "vergence.text"  # keys of what it says of the run
+INFO, TEXT = "vergence.info", "vergence.text"  # keys of the run information
 
 
 def joint_states(arm: str, count: int) -> str:
-    """Return the topic of an arm's joints, as ROS calls it where there is only one arm."""
+    """Return the topic of an arm's joints, which has ROS's usual name if there is only one arm."""
     return "/joint_states" if count == 1 else f"/{arm}/joint_states"
 
 

@@ -1,4 +1,4 @@
-"""A recording as a ROS 2 bag."""
+"""Writes a recording as a ROS 2 bag."""
 
 import json
 import shutil
@@ -19,12 +19,12 @@ from vergence.runtime.bags.bag import CAMERA_INFO, COMPRESSED, JOINTS
 from vergence.runtime.recording import Recording
 
 _TF = "tf2_msgs/msg/TFMessage"
-_BEGIN_S = 1.0  # of the bag's clock: ROS takes a stamp of zero for none
-_VERSION = 9  # of rosbag2's format
+_BEGIN_S = 1.0  # on the bag's clock: ROS treats a stamp of zero as unset
+_VERSION = 9  # of the rosbag2 format
 
 
 class _Message(NamedTuple):
-    """One message on its way into the bag."""
+    """A message to be written into the bag."""
 
     time: float  # s, of the run
     topic: str
@@ -35,24 +35,24 @@ class _Message(NamedTuple):
 def write_bag(recording: Recording, path: str | Path) -> int:
     """Write images, camera parameters, joints, set-points and poses as a ROS 2 bag (MCAP).
 
-    The bag's clock begins so that every stamp is at least 1 s. Poses are those of a simulation's
-    truth, in TF's frame `world`.
+    The bag's clock is offset so that every stamp is at least 1 s. Poses are the simulation's ground
+    truth, relative to TF's frame `world`.
 
     Args:
         recording: of a run.
-        path: the folder to make.
+        path: the folder to create.
 
     Returns:
-        How many messages were written.
+        The number of messages written.
 
     Raises:
-        InputError: if the folder is there already, or rosbags is not installed.
+        InputError: if the folder already exists, or rosbags is not installed.
     """
     rosbag2 = optional_package("a bag", "rosbags.rosbag2", "bags", "vergence export")
     typesys = optional_package("a bag", "rosbags.typesys", "bags", "vergence export")
     where = Path(path)
     if where.exists():
-        raise InputError("vergence export", "--out", f"{where}, which is there already", "another")
+        raise InputError("vergence export", "--out", f"{where}, which already exists", "another")
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     messages = _Messages(store.types, recording)
     begin, count = _BEGIN_S - messages.earliest, 0
@@ -78,14 +78,14 @@ def write_bag(recording: Recording, path: str | Path) -> int:
 
 
 class _Messages:
-    """Makes messages of a recording, their stamps still empty."""
+    """Creates the messages of a recording; their stamps are set later."""
 
     def __init__(self, types: Any, recording: Recording) -> None:
         self._types, self._recording = types, recording
 
     @property
     def earliest(self) -> float:
-        """When the first image was exposed, if that was before the run began; s."""
+        """Exposure time of the first image if that was before the start of the run, else 0, s."""
         cameras = self._recording.cameras.values()
         return min([0.0, *(float(trace.time.min(initial=0.0)) for trace in cameras)])
 
@@ -134,7 +134,7 @@ class _Messages:
 
     def _poses(self, name: str) -> Iterator[_Message]:
         trace = self._recording.cameras[name]
-        task = name == self._recording.info.task_camera  # another may look at a tool
+        task = name == self._recording.info.task_camera  # other cameras may observe a tool
         for time, camera, target in zip(
             trace.time.tolist(), trace.T_world_camera, trace.T_world_target, strict=True
         ):
@@ -162,6 +162,6 @@ class _Messages:
 
 
 def _stamp(content: Any, nanoseconds: int) -> None:
-    """Stamp a message, or each transform of one."""
+    """Stamp a message, or every transform in it."""
     for each in getattr(content, "transforms", (content,)):
         each.header.stamp.sec, each.header.stamp.nanosec = divmod(nanoseconds, 10**9)

@@ -1,6 +1,6 @@
-"""Building blocks of drivers for real hardware: a watchdog, a clock, a camera, a history of joints.
+"""Components for drivers of real hardware: watchdog, clock, camera, joint history.
 
-They do not depend on the make of the robot; see `docs/drivers.md`.
+They are independent of the robot's make; see `docs/drivers.md`.
 """
 
 from vergence.runtime.hardware.device_clock import DeviceClock

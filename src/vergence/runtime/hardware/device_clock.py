@@ -1,36 +1,36 @@
-"""A device's time stamps on this computer's clock."""
+"""Converts a device's time stamps to this computer's clock."""
 
 from collections import deque
 
-_DRIFT = 2e-3  # s a second by which two clocks may run apart
-_KNOWN_S = 2.0  # of stamps from which a drift is believed
-_RESTART_S = 2.0  # a stamp so far from where it should be begins a clock anew
+_DRIFT = 2e-3  # s per second, the largest drift between two clocks
+_KNOWN_S = 2.0  # of stamps, after which an estimated drift is used
+_RESTART_S = 2.0  # a stamp this far from its expected value restarts the clock
 
 
 class DeviceClock:
     """Maps the stamps of a device to the time at which they were made, by offset and drift.
 
-    A message arrives after its stamp was made, by a delay that varies and is never below zero. Of
-    all lines ``host = offset + rate * stamp`` that no arrival is before, the one with the least
-    mean delay is taken [Moon1999]: the edge of the arrivals' lower convex hull in the middle of the
-    window. So neither a stall nor a burst recently messages moves it. The least delay itself stays
-    in the result, since nobody can tell it from an offset.
+    A message arrives after its stamp was made, with a varying delay that is never negative. Of all
+    lines ``host = offset + rate * stamp`` that lie below every arrival, the one with the least mean
+    delay is used [Moon1999]: the edge of the arrivals' lower convex hull in the middle of the
+    window. Stalls and bursts of messages therefore do not affect it. The smallest delay remains in
+    the result, since it cannot be distinguished from an offset.
 
     Args:
-        window_s: over which offset and drift are fitted.
+        window_s: length of the window to which offset and drift are fitted.
     """
 
     def __init__(self, window_s: float = 30.0) -> None:
         self._window_s = window_s
-        self._hull: deque[tuple[float, float]] = deque()  # (stamp, arrival), from below
-        self._stamp = self._time = float("-inf")  # the last stamp, and what it was mapped to
+        self._hull: deque[tuple[float, float]] = deque()  # (stamp, arrival), lower hull
+        self._stamp = self._time = float("-inf")  # the last stamp and its mapped time
 
     def time(self, stamp: float, arrival: float) -> float:
         """Return when a stamp was made, s, never after its arrival and never before the last one.
 
         Args:
-            stamp: the device's, s; of one that goes backwards a new clock is made.
-            arrival: when it came, s.
+            stamp: the device's, s; one that goes backwards restarts the clock.
+            arrival: when it arrived, s.
         """
         if stamp <= self._stamp or (self._hull and abs(self._ahead(stamp, arrival)) > _RESTART_S):
             self._hull.clear()
@@ -41,7 +41,7 @@ class DeviceClock:
         return self._time
 
     def _ahead(self, stamp: float, arrival: float) -> float:
-        """Return by how much an arrival is later than the last ones say."""
+        """Return how much later an arrival is than predicted."""
         last_stamp, last_arrival = self._hull[-1]
         return (arrival - last_arrival) - (stamp - last_stamp)
 
@@ -70,5 +70,5 @@ class DeviceClock:
 
 
 def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    """Return whether the way from a over b to c turns left, so that b is on the lower hull."""
+    """Return whether the path from a over b to c turns left, so that b is on the lower hull."""
     return (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])

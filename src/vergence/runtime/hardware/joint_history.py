@@ -1,4 +1,4 @@
-"""Where an arm stood a moment ago."""
+"""Recent joint positions of an arm."""
 
 from collections import deque
 
@@ -7,27 +7,28 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.signals import JointState
 
-_AHEAD_S = 0.1  # how far beyond the states that are remembered a velocity is believed
+_AHEAD_S = 0.1  # the longest extrapolation by a velocity
 
 
 class JointHistory:
-    """Remembers an arm's joints, to say where they were when an image was exposed.
+    """Stores an arm's joint states, to look up the positions at the exposure of an image.
 
     Args:
-        length: how many states to keep; the oldest go first.
+        length: number of states to keep; the oldest are dropped.
     """
 
     def __init__(self, length: int = 1000) -> None:
         self._states: deque[JointState] = deque(maxlen=length)
 
     def add(self, state: JointState) -> None:
-        """Remember a state; times must not go backwards."""
+        """Add a state; times must not go backwards."""
         self._states.append(state)
 
     def at(self, time: float) -> FloatArray:
-        """Return the positions (n,) at a time, between two states on the line that joins them.
+        """Return the positions (n,) at a time, interpolated linearly between two states.
 
-        Beyond the first and the last state, the joints continue at its velocity, for 0.1 s at most.
+        Before the first and after the last state they are extrapolated by its velocity, by 0.1 s at
+        most.
         """
         assert self._states, "a state is added before one is asked for"
         later = None

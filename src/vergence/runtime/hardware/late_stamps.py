@@ -1,4 +1,4 @@
-"""Images whose stamps are late."""
+"""Corrects images whose time stamps are late."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,11 +10,11 @@ from vergence.signals import Sample
 
 
 class LateStamps(DriverWrapper):
-    """Passes on to a driver, and dates its images back to their exposure.
+    """Forwards to a driver, and dates its images back to their exposure.
 
     Args:
         driver: of arms and cameras.
-        latency_s: by camera name, how much later than the exposure its images are stamped, s.
+        latency_s: by camera name, delay of the images' stamps after exposure, s.
     """
 
     def __init__(self, driver: Driver, latency_s: Mapping[str, float]) -> None:
@@ -23,7 +23,7 @@ class LateStamps(DriverWrapper):
         self._history = {name: JointHistory(round(driver.inner_rate_hz)) for name in driver.arms}
 
     def read(self) -> Sample:
-        """Return joints now and the images that arrived, at the times of their exposure."""
+        """Return the joints now and the images that arrived, with their times of exposure."""
         sample = self.driver.read()
         for name, state in sample.joints.items():
             self._history[name].add(state)

@@ -1,4 +1,4 @@
-"""The wall clock, for hardware that has none of its own."""
+"""Wall-clock ticks, for hardware without a clock of its own."""
 
 from time import monotonic, sleep
 
@@ -6,11 +6,11 @@ from time import monotonic, sleep
 class Metronome:
     """Wakes its caller at a steady rate.
 
-    A tick that was missed by more than a period is not made up for: the next one comes a period
-    after the late one, so that an arm never gets set-points in a rush.
+    If a tick is late by more than a period, the next one follows a full period later instead of
+    catching up, so that an arm never receives set-points in a burst.
 
     Args:
-        rate_hz: ticks a second.
+        rate_hz: ticks per second.
     """
 
     def __init__(self, rate_hz: float) -> None:

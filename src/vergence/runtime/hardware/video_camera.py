@@ -16,25 +16,26 @@ from vergence.runtime.hardware.metronome import Metronome
 from vergence.signals import Frame
 
 _LOG = logging.getLogger(__name__)
-_FRESH_S = 5e-4  # an image that had to be waited for so long has just arrived
+_FRESH_S = 5e-4  # an image that had to be waited for this long has just arrived
 
 
 class VideoCamera:
-    """Takes images in a thread of its own, as fast as they come, and tells when each was exposed.
+    """Captures images in a thread of its own as fast as they arrive, with their times of exposure.
 
-    Where the source stamps its images, the stamps count, mapped to the run's clock by offset and
-    drift (`DeviceClock`). Where it does not, an image is stamped on arrival; one that has waited
-    already, while this thread was held up, comes a period after the one before.
+    If the source stamps its images, the stamps are mapped to the run's clock by offset and drift
+    (`DeviceClock`). If not, an image is stamped on arrival; one that was already waiting, because
+    this thread was delayed, is stamped one period after the one before.
 
-    When the camera is unplugged or the file ends, no more images come, and the loop ends the run
-    as it does whenever images stay away: image late.
+    When the camera is unplugged or the file ends, no more images arrive, and the loop ends the run
+    as for any missing images, with the outcome image late.
 
     Args:
         name: the camera's name.
-        source: number of a device, or a file or address.
-        clock: the run's time now, s; images are stamped with it.
-        latency_s: from exposure to arrival; measure it, for a moving arm feels every millisecond.
-        keep: how many images wait to be fetched; the oldest go first.
+        source: index of a device, or a file or address.
+        clock: returns the run's present time, s; used to stamp images.
+        latency_s: from exposure to arrival. Measure it: every millisecond of error affects a moving
+            arm.
+        keep: number of images that wait to be fetched; the oldest are dropped.
 
     Raises:
         InputError: if OpenCV cannot open the source.
@@ -72,13 +73,13 @@ class VideoCamera:
         """Return the images that arrived since the last call, oldest first.
 
         Args:
-            joints_at: gives the arms' joint positions at an exposure, such as a `JointHistory`.
+            joints_at: returns the arms' joint positions at an exposure, such as `JointHistory.at`.
         """
         arrived = [self._waiting.popleft() for _ in range(len(self._waiting))]
         return tuple(Frame(self.name, time, image, joints_at(time)) for time, image in arrived)
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Release the camera."""
         self._closing.set()
         self._thread.join()
         self._capture.release()
@@ -102,10 +103,10 @@ class VideoCamera:
 
 
 class _Stamps:
-    """Says when images were exposed, by their own stamps where they have some.
+    """Determines when images were exposed, by their own stamps if they have any.
 
     Args:
-        period_s: between images; infinite if not known.
+        period_s: between images; infinite if unknown.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -114,12 +115,12 @@ class _Stamps:
         self._stamp = self._time = float("-inf")
 
     def time(self, stamp: float, arrival: float, fresh: bool) -> float:
-        """Return the time of an image that arrived, s.
+        """Return the time of exposure of an image that arrived, s.
 
         Args:
-            stamp: the source's, s; one that does not advance is none.
-            arrival: by the run's clock, s.
-            fresh: whether the image was waited for; else it may have waited.
+            stamp: the source's, s; ignored if it does not advance.
+            arrival: on the run's clock, s.
+            fresh: whether the thread waited for the image; if not, the image may have waited.
         """
         stamped, self._stamp = stamp > self._stamp > float("-inf"), stamp
         if stamped:
@@ -131,7 +132,7 @@ class _Stamps:
 
 
 def _pace_of(source: int | str, rate_hz: float) -> Metronome | None:
-    """Return the pace of a file; a device and an address have their own."""
+    """Return a metronome for a file; a device or an address sets its own pace."""
     if isinstance(source, int) or not Path(source).is_file():
         return None
     return Metronome(rate_hz if rate_hz > 0.0 else 25.0)

@@ -1,4 +1,4 @@
-"""On the robot's side: follow set-points, and stop when they no longer arrive."""
+"""Runs on the robot's side: follows set-points, and stops when they no longer arrive."""
 
 import numpy as np
 
@@ -11,16 +11,16 @@ from vergence.signals import Setpoint
 class Watchdog:
     """Sits between a link that may fail and an arm's servo, and is stepped by the servo's clock.
 
-    Between two set-points the arm continues at the speed of the last one, so a late message has
-    no effect. After `timeout_s` without one the arm is braked to rest, and stays there: only a new
-    watchdog moves it again. No set-point passes a limit of the arm. The first set-point may come at
-    any time.
+    Between two set-points the arm continues at the speed of the last one, so a late message has no
+    effect. After `timeout_s` without one the arm is braked to rest and stays there; moving it again
+    takes a new watchdog. No set-point exceeds a limit of the arm. There is no timeout before the
+    first set-point.
 
     Args:
         arm: the arm with its limits.
         start: joint positions now, (n,), rad or m.
         dt: period of the servo, s.
-        timeout_s: how long the arm may continue without a set-point.
+        timeout_s: longest time for which the arm may continue without a set-point.
     """
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float, timeout_s: float = 0.1) -> None:
@@ -37,11 +37,11 @@ class Watchdog:
         return not self._guard.moving
 
     def hear(self, setpoint: Setpoint, age_s: float = 0.0) -> None:
-        """Take a set-point; one that is not finite or not of the arm's length is ignored.
+        """Process a set-point; one that is not finite or not of the arm's length is ignored.
 
         Args:
-            setpoint: where the arm should be, and how fast it should move there.
-            age_s: how long ago it was meant for; beyond the timeout it is ignored, too.
+            setpoint: desired position and rate of the arm.
+            age_s: time since it was due; beyond the timeout it is ignored as well.
         """
         position, velocity = (
             np.asarray(part, dtype=np.float64) for part in (setpoint.position, setpoint.velocity)
@@ -54,7 +54,7 @@ class Watchdog:
         self._silent_s = 0.0
 
     def step(self) -> Setpoint:
-        """Return what to hand to the servo in this tick."""
+        """Return the set-point for the servo at this tick."""
         if self._desired is None:
             return self._guard.step(np.zeros(self._guard.joint_count))
         self.tripped |= self._silent_s > self._timeout_s
@@ -67,6 +67,6 @@ class Watchdog:
         return out
 
     def _rates(self, desired: Setpoint) -> FloatArray:
-        """Return rates that keep the arm on the set-point, or bring it there as it can brake."""
+        """Return rates that keep the arm on the set-point, or bring it there with safe braking."""
         gap = desired.position - self._dt * desired.velocity - self._guard.position
         return desired.velocity + closing_rates(gap, self._limits, self._dt)

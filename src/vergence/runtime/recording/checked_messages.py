@@ -1,6 +1,6 @@
-"""Messages of the numeric streams as they may come out of any file: checked against their schema.
+"""Messages of the numeric streams from untrusted files, checked against their schema.
 
-What does not fit is left out, so that nothing behind it has to expect anything but rows.
+Anything that does not match is dropped, so that later stages receive valid rows only.
 """
 
 import json
@@ -10,21 +10,21 @@ from typing import Any, TypeAlias
 
 Message: TypeAlias = dict[str, Any]  # of a numeric stream
 
-_LARGEST = 1e15  # of a number; no unit of ours needs more
-_LATEST_S = 1e7  # four months
+_LARGEST = 1e15  # largest magnitude of a number; no unit in use needs more
+_LATEST_S = 1e7  # largest time: four months
 _MOST_POINTS = 1000
-_LONGEST = 4 * _MOST_POINTS  # of a list: covariances of the points
+_LONGEST = 4 * _MOST_POINTS  # length of a list: covariances of the points
 _LONGEST_TEXT = 300  # characters
-_MOST_NUMBERS = 20_000_000  # of the widest list, over all messages of a stream
+_MOST_NUMBERS = 20_000_000  # of the longest list, over all messages of a stream
 _TIMES = ("time", "received")
 
 
 def checked_messages(messages: Sequence[bytes], schema: Mapping[str, Any]) -> list[Message]:
-    """Return the messages that are what their schema says, as far as there is room for them.
+    """Return the messages that match their schema, up to a limit on their total size.
 
     Args:
         messages: of one stream.
-        schema: of its messages; each needs the times that are in it.
+        schema: of its messages; the times in it are required.
     """
     times = [key for key in _TIMES if key in schema["properties"]]
     kept: list[Message] = []
@@ -41,7 +41,7 @@ def checked_messages(messages: Sequence[bytes], schema: Mapping[str, Any]) -> li
 
 
 def _row(message: bytes, properties: Mapping[str, Any]) -> Message | None:
-    """Return what a message says of the known keys; None if it is no message of this kind."""
+    """Return the values of the known keys of a message; None if it is not of this kind."""
     try:
         values = json.loads(message)
     except (ValueError, RecursionError):
@@ -65,14 +65,14 @@ def _row(message: bytes, properties: Mapping[str, Any]) -> Message | None:
 
 
 def _list(values: Any, kind: str) -> list[Any] | None:
-    """Return the values of a list, each of one kind; None if it is no list, or too long."""
+    """Return the values of a list, all of one kind; None if it is not a list, or too long."""
     if not isinstance(values, list) or len(values) > _LONGEST:
         return None
     return [_value(value, kind) for value in values]
 
 
 def _value(value: Any, kind: str) -> Any:
-    """Return a value if it is of a kind, else what represents an unknown one."""
+    """Return a value if it is of the given kind, else the one that represents an unknown value."""
     match kind:
         case "number":
             known = isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,8 +1,8 @@
-"""Reads an MCAP file from front to back, and as far as it goes where it was cut or damaged.
+"""Reads an MCAP file from front to back, up to the point where it is cut off or damaged.
 
-No size that the file states is trusted: no record is longer than what is left of
-the file, no chunk is unpacked to more than it says, and all of them to no more than a recording
-of that length can hold.
+No size in the file is trusted: no record is longer than the rest of the file, no chunk is
+decompressed to more than its stated size, and all of them together to no more than a recording of
+that length can hold.
 """
 
 import logging
@@ -14,24 +14,24 @@ from typing import IO, Any, Self
 _LOG = logging.getLogger(__name__)
 
 _MOST_RECORD = 1 << 28  # bytes
-_MOST_UNPACKED = 1 << 28  # bytes of one chunk; the writer's are of 1 MB
-_MOST_RATIO = 200  # unpacked to packed, of the whole file: numbers as JSON are packed to a tenth
-_SPARE = 1 << 24  # bytes that a short file may be unpacked to in any case
+_MOST_UNPACKED = 1 << 28  # bytes of one chunk; the writer makes chunks of 1 MB
+_MOST_RATIO = 200  # decompressed to compressed size of the file; JSON numbers shrink to a tenth
+_SPARE = 1 << 24  # bytes to which a short file may be decompressed in any case
 _MOST_METADATA = 1 << 22  # characters
 _MOST_MESSAGES = 5_000_000  # ten arms and cameras for some hours
 
 
 @dataclass(slots=True)
 class McapContents:
-    """All of a file but its images."""
+    """The contents of a file except its images."""
 
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)  # by name
     messages: dict[str, list[bytes]] = field(default_factory=dict)  # by topic, in order
-    complete: bool = False  # whether the file ends as it should
+    complete: bool = False  # whether the file has a proper end
 
     @classmethod
     def read(cls, path: Path, leave_out: str) -> Self:
-        """Read a file, leaving out topics that end in `leave_out`."""
+        """Read a file except the topics that end in `leave_out`."""
         from mcap.records import Footer, Metadata
 
         contents = cls()
@@ -57,7 +57,7 @@ class _DamagedError(Exception):
 
 
 class _RestOfFile:
-    """A file that is never read beyond its end, whatever lengths it states."""
+    """Limits reads to the size of a file, whatever lengths the file states."""
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file, self._left = file, size
@@ -69,7 +69,7 @@ class _RestOfFile:
 
 
 def _records(path: Path) -> Iterator[tuple[str | None, Any]]:
-    """Yield every record, messages with their topic; the first that cannot be read is the end."""
+    """Yield every record, messages with their topic, up to the first that cannot be read."""
     from mcap.records import Channel, Message
 
     topics: dict[int, str] = {}
@@ -85,12 +85,12 @@ def _records(path: Path) -> Iterator[tuple[str | None, Any]]:
                 if messages > _MOST_MESSAGES:
                     raise _DamagedError(f"more than {_MOST_MESSAGES} messages")
                 yield topic, record
-        except Exception as error:  # a cut can look like anything to a parser
+        except Exception as error:  # data that is cut off may make the parser raise anything
             _LOG.info("%s cannot be read to its end: %r", path, error)
 
 
 def _unpacked(stream: Any, size: int) -> Iterator[Any]:
-    """Yield the records of a file of so many bytes, those in chunks too."""
+    """Yield the records of a file of a given size, including those in chunks."""
     from mcap.records import Chunk, Metadata
     from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -114,8 +114,8 @@ def _decompressed(chunk: Any, most: int) -> bytes:
     """Return the data of a chunk.
 
     Raises:
-        _DamagedError: if it would be more than that many bytes, or is compressed by other means
-            than a recording of ours.
+        _DamagedError: if it would exceed `most` bytes, or has a compression that recordings do not
+            use.
     """
     import zstandard
 

@@ -1,4 +1,4 @@
-"""An MCAP file being written: a channel for each topic, opened when it is first used."""
+"""Writes an MCAP file, with a channel per topic that is opened on first use."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,12 +13,12 @@ from vergence.runtime.recording.messages import nanoseconds
 
 
 class McapFile:
-    """Writes messages by topic; `flush` makes everything before it readable."""
+    """Writes messages by topic; `flush` makes all previous ones readable."""
 
     def __init__(self, path: Path) -> None:
         self._context = foxglove.Context()
         self._channels: dict[str, Any] = {}
-        # Chunks are small: handing them to other threads would cost more than compressing them.
+        # Chunks are small: compressing them in other threads would cost more than it saves.
         options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
         self._writer = foxglove.open_mcap(
             path, allow_overwrite=True, context=self._context, writer_options=options
@@ -35,7 +35,7 @@ class McapFile:
         channel.log(dumps(message), log_time=nanoseconds(time))
 
     def typed(self, topic: str, time: float, message: object) -> None:
-        """Write one of Foxglove's own messages."""
+        """Write a message of one of Foxglove's types."""
         channel = self._channels.get(topic)
         if channel is None:
             kind = getattr(foxglove.channels, f"{type(message).__name__}Channel")
@@ -44,11 +44,11 @@ class McapFile:
         channel.log(message, log_time=nanoseconds(time))
 
     def metadata(self, name: str, words: dict[str, str]) -> None:
-        """Write named words about the file."""
+        """Write named metadata of the file."""
         self._writer.write_metadata(name, words)
 
     def flush(self) -> None:
-        """Finish the current chunk and hand it to the operating system."""
+        """Finish the current chunk and pass it to the operating system."""
         self._writer.flush()
 
     def close(self) -> None:

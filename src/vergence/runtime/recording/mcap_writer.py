@@ -1,4 +1,4 @@
-"""What is written of a run, and where in the file."""
+"""The contents of a recording and their topics."""
 
 import json
 from collections.abc import Mapping
@@ -27,15 +27,15 @@ from vergence.signals import Frame, ImagePoints, Outcome
 
 SUMMARY = "summary.json"
 
-_FLUSH_PERIOD = 1.0  # s of the run that a killed process may lose
+_FLUSH_PERIOD = 1.0  # s of the run that are lost if the process is killed
 
 
 class McapWriter:
     """The open recording of one run.
 
-    Numbers go to JSON streams of our own (`streams`), images, marks, joints, poses and events
-    to Foxglove's types (`messages`). Every second of the run the file is brought up to date, so
-    that it can be read up to there whatever happens to the process.
+    Numbers go to JSON streams (`streams`), images, annotations, joints, poses and events to
+    Foxglove's types (`messages`). The file is flushed once per second of the run, so that it can be
+    read up to there whatever happens to the process.
     """
 
     def __init__(self, folder: Path, info: RunInfo, image_every: int, jpeg_quality: int) -> None:
@@ -45,7 +45,7 @@ class McapWriter:
         self._jpeg_quality = jpeg_quality
         self._images = dict.fromkeys(info.cameras, 0)
         self._flushed = 0.0
-        self.now = 0.0  # s, of the last thing recorded
+        self.now = 0.0  # s, of the last record
         folder.mkdir(parents=True, exist_ok=True)
         (folder / SUMMARY).unlink(missing_ok=True)  # of an earlier run
         (folder / CELL).write_text(info.text, encoding="utf-8")
@@ -68,12 +68,12 @@ class McapWriter:
             self._flushed = record.time
 
     def event(self, time: float, name: str, text: str) -> None:
-        """Record something that happened once."""
+        """Record a single event."""
         self.now = max(self.now, time)
         self._file.typed("/events", self.now, messages.log(time, name, text))
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
-        """Record the end and close the file; the summary also says it where the file is cut."""
+        """Record the end and close the file; the summary repeats it in case the file is cut off."""
         end, values = outcome_json(outcome), finite(summary)
         result = {"cell": self._info.cell, "outcome": end, "summary": values}
         text = json.dumps(result, indent=2) + "\n"
@@ -102,7 +102,7 @@ class McapWriter:
         self._file.typed(f"/arm/{arm}/joints", self.now, joints)
 
     def _record_seen(self, record: TickRecord, name: str, at: str) -> None:
-        """Record what was seen of a target, under a topic of its own if it is not the task's."""
+        """Record what was observed of a target, under its own topic if it is not the task's."""
         for frame, view in images_of(record):
             self._record_points(record, frame, view, name, at)
         target = record.observation.target if record.observation else None
@@ -125,7 +125,7 @@ class McapWriter:
         self._file.typed(f"{topic}/annotations", self.now, marks)
         if "T_world_camera" in row:
             poses = {camera: row["T_world_camera"]}
-            if camera == self._info.task_camera:  # another may look at a tool
+            if camera == self._info.task_camera:  # other cameras may observe a tool
                 poses[name] = row["T_world_target"]
             self._file.typed("/tf", self.now, messages.transforms(time, poses))
 
@@ -139,7 +139,7 @@ class McapWriter:
 
 
 def _warm_up() -> None:
-    """Load and compile what the first tick would otherwise wait for."""
+    """Load and compile everything that would otherwise delay the first tick."""
     messages.transforms(0.0, {"": np.eye(4)})
     _jpeg(np.zeros((8, 8), dtype=np.uint8), 50)
 

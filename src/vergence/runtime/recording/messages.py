@@ -1,4 +1,4 @@
-"""The same things as Foxglove's own message types, which viewers show without configuration."""
+"""The same data in Foxglove's message types, which viewers display without configuration."""
 
 from collections.abc import Mapping, Sequence
 
@@ -29,7 +29,7 @@ from vergence.signals import ImagePoints, SearchWindows
 
 NANOSECONDS = 1_000_000_000
 
-# Okabe and Ito's palette: distinguished by colour-blind readers too.
+# Okabe and Ito's palette, which colour-blind readers can distinguish.
 FOUND = Color(r=0.0, g=0.62, b=0.45, a=1.0)
 LOST = Color(r=0.84, g=0.37, b=0.0, a=1.0)
 DESIRED = Color(r=0.94, g=0.89, b=0.26, a=1.0)
@@ -42,18 +42,18 @@ _AROUND = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # corn
 
 
 def nanoseconds(time: float) -> int:
-    """Return a time of the run as MCAP counts it."""
+    """Return a time of the run in MCAP's unit, ns."""
     return max(round(time * NANOSECONDS), 0)
 
 
 def stamp(time: float) -> Timestamp:
-    """Return a time of the run as Foxglove writes it."""
+    """Return a time of the run as a Foxglove time stamp."""
     seconds, rest = divmod(nanoseconds(time), NANOSECONDS)
     return Timestamp(sec=seconds, nsec=rest)
 
 
 def image(camera: str, time: float, jpeg: bytes) -> CompressedImage:
-    """Return an image at its time of exposure."""
+    """Return an image with its time of exposure."""
     return CompressedImage(timestamp=stamp(time), frame_id=camera, data=jpeg, format="jpeg")
 
 
@@ -78,7 +78,7 @@ def annotations(
     desired_px: FloatArray | None,
     true_px: FloatArray | None,
 ) -> ImageAnnotations:
-    """Return windows, true, desired and tracked points to be drawn over the image."""
+    """Return windows and true, desired and tracked points as annotations of the image."""
     layers = []
     if points is not None and points.windows is not None:
         layers.append(_frames(time, points.windows))
@@ -98,28 +98,28 @@ def annotations(
 def joints(
     time: float, names: Sequence[str], position: FloatArray, velocity: FloatArray
 ) -> JointStates:
-    """Return an arm's joints under their names."""
+    """Return an arm's joints by name."""
     rows = zip(names, position.tolist(), velocity.tolist(), strict=True)
     named = [NamedJoint(name=name, position=q, velocity=rate) for name, q, rate in rows]
     return JointStates(timestamp=stamp(time), joints=named)
 
 
 def transforms(time: float, poses: Mapping[str, FloatArray]) -> FrameTransforms:
-    """Return poses T_world_x (4, 4) under the names of their frames."""
+    """Return poses T_world_x (4, 4) with the names of their frames."""
     return FrameTransforms(
         transforms=[_transform(time, frame, pose) for frame, pose in poses.items()]
     )
 
 
 def log(time: float, name: str, text: str) -> Log:
-    """Return an event as a line of a log."""
+    """Return an event as a log entry."""
     return Log(timestamp=stamp(time), level=LogLevel.Info, name=name, message=text)
 
 
 def _dots(
     time: float, points_px: FloatArray, colors: list[Color], thickness: float
 ) -> PointsAnnotation:
-    # Foxglove puts the image's corner at (0, 0), we put the first pixel's centre there.
+    # Foxglove has the image's corner at (0, 0), we have the centre of the first pixel there.
     places = [Point2(x=u + 0.5, y=v + 0.5) for u, v in points_px.tolist()]
     return PointsAnnotation(
         timestamp=stamp(time),

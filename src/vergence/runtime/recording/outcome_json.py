@@ -1,4 +1,4 @@
-"""How a run ended, as JSON values: for its recording, its summary and other readers."""
+"""The outcome of a run as JSON, for its recording, its summary and other readers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -25,7 +25,7 @@ _TASKS: TypeAdapter[list[_TaskData]] = TypeAdapter(Annotated[list[_TaskData], Fi
 
 
 def outcome_json(outcome: Outcome) -> dict[str, Any]:
-    """Return the outcome as JSON values; with `tasks` where there were several."""
+    """Return the outcome as JSON values, with `tasks` if there were several."""
     values: dict[str, Any] = {
         "kind": outcome.kind.value,
         "reason": outcome.reason,
@@ -40,10 +40,10 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
 
 
 def read_outcome(words: Mapping[str, str], tasks: str = "[]") -> Outcome:
-    """Read kind, reason and time as text, and tasks as JSON, all of which is untrusted.
+    """Read kind, reason and time as text, and tasks as JSON, all of which are untrusted.
 
     Raises:
-        KeyError, ValueError: if they say anything else.
+        KeyError, ValueError: if they are not valid.
     """
     each = tuple(
         TaskOutcome(task.name, task.begun, Outcome(task.kind, task.reason, task.time))

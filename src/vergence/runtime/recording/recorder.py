@@ -13,11 +13,11 @@ class Recorder:
     """A listener that records the run as MCAP; `Recording` reads it back."""
 
     def __init__(self, folder: str | Path, image_every: int = 2, jpeg_quality: int = 85) -> None:
-        """Choose what to keep and where; nothing is written before the run begins.
+        """Set what to record and where; nothing is written before the run begins.
 
         Args:
-            folder: the run folder; it may exist, a recording in it is replaced.
-            image_every: keep every n-th image of each camera; 0 keeps none.
+            folder: the run folder; if it exists, a recording in it is replaced.
+            image_every: record every n-th image of each camera; 0 records none.
             jpeg_quality: 0 to 100.
         """
         self.folder = Path(folder)
@@ -32,7 +32,7 @@ class Recorder:
 
     @property
     def now(self) -> float:
-        """Time of the last thing recorded, s."""
+        """Time of the last record, s."""
         return self._writer.now if self._writer else 0.0
 
     def begin(self, info: RunInfo) -> None:
@@ -45,7 +45,7 @@ class Recorder:
         self._writer.tick(record)
 
     def event(self, time: float, name: str, text: str) -> None:
-        """Record something that happened once."""
+        """Record a single event."""
         assert self._writer is not None, "a run begins before anything happens in it"
         self._writer.event(time, name, text)
 

@@ -30,7 +30,7 @@ from vergence.runtime.results.columns import Table
 from vergence.runtime.run_info import RunInfo
 from vergence.signals import Outcome, OutcomeKind
 
-_IMAGES = "/image"  # how the topics end that are read one by one
+_IMAGES = "/image"  # suffix of the topics that are read one by one
 _MOST_EVENTS = 100_000
 _Text = Annotated[str, StringConstraints(max_length=1000)]
 _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
@@ -41,25 +41,25 @@ _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording(Run):
-    """A run read from its folder, with the images that were kept; `Recording.open` reads one.
+    """A run read from its folder, with the recorded images; `Recording.open` reads one.
 
-    The outcome of a run that was cut off before it could say is *cut off*.
+    The outcome of a recording that ends without one is *cut off*.
     """
 
     path: Path  # of the file
-    version: str  # of the vergence that wrote it
-    complete: bool  # whether the file ends as it should
+    version: str  # of vergence at the time of recording
+    complete: bool  # whether the file has a proper end
     skipped: int  # messages that could not be read
 
     @classmethod
     def open(cls, run: str | Path) -> Self:
-        """Read a recording, up to the cut if it was cut off.
+        """Read a recording, up to where it was cut off if it was.
 
         Args:
-            run: the run folder, or the recording alone.
+            run: the run folder, or the recording itself.
 
         Raises:
-            InputError: if there is no recording, or it is not one of ours.
+            InputError: if there is no recording, or it was not written by vergence.
         """
         path = find_recording(run)
         contents = McapContents.read(path, leave_out=_IMAGES)
@@ -94,17 +94,17 @@ class Recording(Run):
         return self.path.parent
 
     def image_times(self, camera: str) -> FloatArray:
-        """Return when the kept images of a camera were exposed, (P,) s."""
+        """Return when the recorded images of a camera were exposed, (P,) s."""
         return np.array([time for time, _ in self.jpegs(camera)])
 
     def images(
         self, camera: str, only: Container[int] | None = None
     ) -> Iterator[tuple[float, ImageArray]]:
-        """Yield the kept images of a camera with their time of exposure, in order.
+        """Yield the recorded images of a camera with their times of exposure, in order.
 
         Args:
             camera: its name.
-            only: which of them, counted from 0; all if None. The others are not decoded.
+            only: indices of the images to yield; all if None. The others are not decoded.
         """
         size = self.info.cameras[camera]
         for number, (time, jpeg) in enumerate(self.jpegs(camera)):
@@ -114,7 +114,7 @@ class Recording(Run):
                     yield time, image
 
     def jpegs(self, camera: str) -> Iterator[tuple[float, bytes]]:
-        """Yield the kept images of a camera with their time of exposure, in order, as JPEG."""
+        """Yield the recorded images of a camera with their times of exposure, in order, as JPEG."""
         for message in messages_on(self.path, f"/camera/{camera}{_IMAGES}"):
             try:
                 parts = wire.fields(message)
@@ -126,7 +126,7 @@ class Recording(Run):
 
 
 def _decoded(jpeg: bytes, width: int, height: int) -> ImageArray | None:
-    """Return an image of a camera; None if it is none, or of another size."""
+    """Return an image of a camera; None if it cannot be decoded or has another size."""
     import cv2
     from PIL import Image
 
@@ -142,7 +142,7 @@ def _decoded(jpeg: bytes, width: int, height: int) -> ImageArray | None:
 
 
 class _Messages:
-    """The messages of a file, and how many of them could not be read."""
+    """The messages of a file, and the number of those that could not be read."""
 
     def __init__(self, contents: McapContents) -> None:
         self._messages = contents.messages
@@ -161,10 +161,10 @@ class _Messages:
         return columns.table()
 
     def seen(self, at: str, info: RunInfo) -> tuple[dict[str, CameraTrace], TargetTrace | None]:
-        """Return what was seen of a target, and as a filter believed it; see `OtherTarget`.
+        """Return what was observed of a target, and its filter estimate; see `OtherTarget`.
 
         Args:
-            at: the topic of a target that the task was not about; empty for its own.
+            at: the topic of a target other than the task's; empty for the task's.
             info: of the run.
         """
         cameras = {
@@ -175,7 +175,7 @@ class _Messages:
         return cameras, target if len(target.time) else None
 
     def events(self) -> tuple[Event, ...]:
-        """Return what happened, in order."""
+        """Return the events, in order."""
         kept = []
         for message in self._messages.get("/events", ())[:_MOST_EVENTS]:
             try:
@@ -192,7 +192,7 @@ def _any(cameras: Mapping[str, CameraTrace], target: TargetTrace | None) -> bool
 
 
 def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
-    """Return what the file says about the run, and the version that wrote it."""
+    """Return the run information in the file, and the version that wrote it."""
     about = contents.metadata.get("vergence")
     if about is None:
         raise InputError(str(path), "", "a file that does not begin as one", "a run's recording")
@@ -205,7 +205,7 @@ def _introduction(path: Path, contents: McapContents) -> tuple[RunInfo, str]:
 
 
 def _end(end: Mapping[str, str] | None) -> tuple[Outcome | None, dict[str, Any]]:
-    """Return how the run ended and its summary, if the file has them and they can be read."""
+    """Return the outcome and the summary of the run, if the file has them and they can be read."""
     try:
         if end is None:
             return None, {}

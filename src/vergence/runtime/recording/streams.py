@@ -1,8 +1,8 @@
-"""The numeric streams: one JSON message a tick and arm, an image and camera, a target estimate.
+"""The numeric streams: a JSON message per tick and arm, per image and camera, per estimate.
 
 A message is a row of a trace (`vergence.runtime.results`). Each field is a number or a flat list,
 because that is what plotting tools can address (``/camera/wrist/features.u[0]``): points are split
-into u and v, matrices go row by row. A field that is not known is left out.
+into u and v, matrices are flattened by rows. A field that is not known is omitted.
 """
 
 import math
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vergence.runtime.json_numbers import array, numbers
 from vergence.runtime.results import ArmTrace, CameraTrace, Row, TargetTrace
 
-# What the u and v of points are called in a message.
+# Names of the u and v coordinates of points in a message.
 _POINTS = {
     "points_px": ("u", "v"),
     "window_center_px": ("window_u", "window_v"),
@@ -24,7 +24,7 @@ _POINTS = {
     "desired_px": ("desired_u", "desired_v"),
     "true_px": ("true_u", "true_v"),
 }
-_COUNTED = ("u", "desired_u", "true_u")  # say how many points there are
+_COUNTED = ("u", "desired_u", "true_u")  # these determine the number of points
 _NUMBER = {"type": "number"}
 _NUMBERS = {"type": "array", "items": _NUMBER}
 _WORDS = {"type": "array", "items": {"type": "string"}}
@@ -81,15 +81,15 @@ def message_of(row: Row) -> dict[str, Any]:
 
 
 def row_of(message: Mapping[str, Any], trace: type, joints: int = 0) -> Row:
-    """Return the row that `message_of` made JSON values of.
+    """Return the row that `message_of` converted to JSON values.
 
-    A list may have any length, since it is untrusted: what is too much is left out, and
-    what is missing is not known.
+    A list may have any length, since it is untrusted: excess values are dropped, missing ones are
+    unknown.
 
     Args:
         message: of a numeric stream.
-        trace: whose row it is.
-        joints: of the arm.
+        trace: the class of the row's trace.
+        joints: number of the arm's joints.
     """
     sizes = {"n": joints, "M": max(len(message.get(key, ())) for key in _COUNTED)}
     row: dict[str, Any] = {}
@@ -115,7 +115,7 @@ def row_of(message: Mapping[str, Any], trace: type, joints: int = 0) -> Row:
 
 
 def _padded(values: Sequence[Any], size: int, kind: type) -> NDArray[Any]:
-    """Return so many values, the last not known if there are fewer."""
+    """Return this many values, the last ones unknown if there are fewer."""
     padded: NDArray[Any] = np.full(size, np.nan if kind is float else False, dtype=kind)
     padded[: len(values)] = np.array(values[:size], dtype=kind)
     return padded

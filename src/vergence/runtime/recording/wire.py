@@ -1,7 +1,7 @@
-"""Just enough of protobuf's wire format to read our own images and events back.
+"""The part of protobuf's wire format that is needed to read back images and events.
 
-The viewers' message types are protobuf; three fields of two of them are all we need again, so
-this replaces a protobuf library.
+The viewers' message types are protobuf; only three fields of two of them are needed again, so this
+replaces a protobuf library.
 """
 
 from typing import TypeAlias
@@ -14,7 +14,7 @@ _FIXED_SIZES = {_FIXED64: 8, _FIXED32: 4}
 
 
 def fields(message: bytes) -> Fields:
-    """Split a message into its fields by number; of a repeated one the last is kept.
+    """Split a message into its fields by number; of a repeated field the last one is returned.
 
     Raises:
         ValueError: if it is not a protobuf message.
@@ -32,14 +32,14 @@ def fields(message: bytes) -> Fields:
         elif kind in _FIXED_SIZES:
             size = _FIXED_SIZES[kind]
         else:
-            raise ValueError(f"no protobuf message: wire type {kind} at byte {at}")
+            raise ValueError(f"not a protobuf message: wire type {kind} at byte {at}")
         out[number] = message[at : at + size]
         at += size
     return out
 
 
 def bytes_of(message: Fields, number: int) -> bytes:
-    """Return a field of bytes; protobuf leaves an empty one out."""
+    """Return a field of bytes; protobuf omits empty ones."""
     value = message.get(number, b"")
     return value if isinstance(value, bytes) else b""
 
@@ -61,7 +61,7 @@ def _number(message: Fields, number: int) -> int:
 
 
 def _varint(message: bytes, at: int) -> tuple[int, int]:
-    """Return the number that starts at a byte, and where the next thing starts."""
+    """Return the number that starts at a byte, and the position after it."""
     value = shift = 0
     while at < len(message):
         byte = message[at]
@@ -71,5 +71,5 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
             return value, at
         shift += 7
         if shift > _LONGEST_VARINT:
-            raise ValueError("no protobuf message: a number of more than 64 bits")
-    raise ValueError("no protobuf message: it ends in the middle of a number")
+            raise ValueError("not a protobuf message: a number of more than 64 bits")
+    raise ValueError("not a protobuf message: it ends within a number")

@@ -1,4 +1,4 @@
-"""What a run was: one object, in memory or read from a recording, and what is computed from it."""
+"""The result of a run: one object, in memory or read from a recording, and derived numbers."""
 
 from vergence.runtime.results.columns import Columns, Row
 from vergence.runtime.results.other_target import OtherTarget, about_other, other_names

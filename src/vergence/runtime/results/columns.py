@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-Row: TypeAlias = Mapping[str, Any]  # values of some columns, by name; the others are not known
+Row: TypeAlias = Mapping[str, Any]  # values of some columns, by name; the others are unknown
 Table = TypeVar("Table")
 
 _FIRST = 16  # rows to begin with
@@ -14,7 +14,7 @@ _BLANKS: Mapping[type, Any] = {float: np.nan, bool: False, int: 0, tuple: (), di
 
 
 def column(*shape: int | str, kind: type = float) -> Any:
-    """Declare a column of a table, a dataclass with nothing but columns.
+    """Declare a column of a table, which is a dataclass of columns only.
 
     Args:
         shape: of one row's value: numbers, "n" for the joints, "M" for points, however many.
@@ -24,19 +24,19 @@ def column(*shape: int | str, kind: type = float) -> Any:
 
 
 class Columns(Generic[Table]):
-    """Collects rows of a table; memory is taken in chunks, each half as large as all before.
+    """Collects rows of a table; memory grows by half each time it is full.
 
     Args:
         table: the class of the table, its fields declared by `column`.
-        joints: what "n" means.
-        most: how many rows to keep; the older half is dropped where there would be more.
+        joints: the value of "n".
+        most: number of rows to keep; the older half is dropped if there would be more.
     """
 
     def __init__(self, table: type[Table], joints: int = 0, most: int | None = None) -> None:
         self._table, self._most = table, most
         self._shapes: dict[str, tuple[int, ...]] = {}
         self._kinds: dict[str, type] = {}
-        self._wide: set[str] = set()  # columns with a value a point
+        self._wide: set[str] = set()  # columns with a value per point
         for one in fields(table):  # type: ignore[arg-type]
             shape = one.metadata["shape"]
             self._shapes[one.name] = tuple(joints if s == "n" else s for s in shape if s != "M")
@@ -47,7 +47,7 @@ class Columns(Generic[Table]):
         self._arrays = {name: self._blank(name, _FIRST) for name in self._shapes}
 
     def append(self, row: Row) -> None:
-        """Add a row; what is not in it is not known, and what is no column is left out."""
+        """Add a row; columns missing from it are unknown, and unknown columns are ignored."""
         if self._count == len(next(iter(self._arrays.values()))):
             self._make_room()
         for name, value in row.items():
@@ -64,7 +64,7 @@ class Columns(Generic[Table]):
         self._count += 1
 
     def table(self) -> Table:
-        """Return what was collected; what is not a finite number is NaN."""
+        """Return the collected table; numbers that are not finite are NaN."""
         return self._table(**{name: self._finished(name) for name in self._shapes})
 
     def _finished(self, name: str) -> Any:

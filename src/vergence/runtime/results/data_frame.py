@@ -32,10 +32,10 @@ def data_frame(run: "Run", of: str | None) -> "pd.DataFrame":
 
 
 def tick_columns(run: "Run") -> dict[str, Any]:
-    """Return all but matrices with a value a tick, by names such as ``puma.position.joint1``.
+    """Return all values per tick except matrices, by names such as ``puma.position.joint1``.
 
-    What came with an image has its value at the tick in which the loop had the image, and is not
-    known at the others.
+    Values of an image are given at the tick in which the loop received it, and are unknown at the
+    others.
     """
     table: dict[str, Any] = {"time": run.times}
     for name, trace in _traces(run).items():
@@ -48,7 +48,7 @@ def tick_columns(run: "Run") -> dict[str, Any]:
 
 
 def _at(values: Any, rows: IntArray, known: BoolArray) -> Any:
-    """Return the values at some rows, NaN where they are not known."""
+    """Return the values at some rows, NaN where unknown."""
     if known.all():
         return [values[row] for row in rows] if isinstance(values, list) else values[rows]
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
@@ -57,7 +57,7 @@ def _at(values: Any, rows: IntArray, known: BoolArray) -> Any:
 
 
 def named_arrays(run: "Run") -> dict[str, Any]:
-    """Return every array of a run by a name such as ``puma.position``; of texts none."""
+    """Return every numeric array of a run by a name such as ``puma.position``."""
     return {
         f"{name}.{one.name}": getattr(trace, one.name)
         for name, trace in _traces(run).items()
@@ -67,7 +67,7 @@ def named_arrays(run: "Run") -> dict[str, Any]:
 
 
 def _traces(run: "Run") -> dict[str, AnyTrace]:
-    """Return everything with rows by its name; a camera called as an arm is distinguished."""
+    """Return every trace by its name; a camera with the name of an arm is distinguished."""
     cameras = {f"camera {n}" if n in run.arms else n: one for n, one in run.cameras.items()}
     target: Mapping[str, AnyTrace] = {} if run.target is None else {"target": run.target}
     others = {
@@ -90,7 +90,7 @@ def _joints(run: "Run", name: str) -> tuple[str, ...]:
 def _columns(
     trace: AnyTrace, joints: tuple[str, ...], matrices: bool = True
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the columns of a trace but its time, each number by itself."""
+    """Yield the columns of a trace except its time, each number separately."""
     for one in fields(trace):
         values = getattr(trace, one.name)
         shape = one.metadata["shape"]
@@ -108,7 +108,7 @@ def _columns(
 
 
 def _label(size: int | str, index: int, joints: tuple[str, ...]) -> str:
-    """Return what a place along an axis of a given size is called."""
+    """Return the label of an index along an axis of a given size."""
     if size == "n":
         return joints[index]
     if size == 2:

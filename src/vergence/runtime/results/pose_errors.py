@@ -1,4 +1,4 @@
-"""Pose errors of a filter's estimate and of a camera against the truth that a simulation knows."""
+"""Pose errors of a filter's estimate and of a camera, against the ground truth of a simulation."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -15,9 +15,9 @@ from vergence.runtime.tick import TickRecord
 
 
 class PoseErrors(NamedTuple):
-    """Errors at the exposures of K images; no rows where no pose was estimated or no truth known.
+    """Errors at the exposures of K images; no rows if there is no pose estimate or no ground truth.
 
-    Those of the camera are NaN where it took no image then, or no pose is desired in it.
+    Errors of the camera are NaN where it took no image at that time, or no pose is desired in it.
     """
 
     time: FloatArray  # (K,) s, of exposure
@@ -28,7 +28,7 @@ class PoseErrors(NamedTuple):
     camera_rad: FloatArray  # (K,) angle between its true and desired orientation in the camera
 
     def between(self, start: float, end: float = np.inf) -> "PoseErrors":
-        """Return the rows from a start to an end, s."""
+        """Return the rows from a start to an end time, s."""
         rows = (self.time >= start) & (self.time <= end)
         return PoseErrors(*(values[rows] for values in self))
 
@@ -36,10 +36,10 @@ class PoseErrors(NamedTuple):
 def pose_errors(
     target: TargetTrace | None, cameras: Mapping[str, CameraTrace], camera: str
 ) -> PoseErrors:
-    """Compare what a filter believed with what was so when its newest image was exposed.
+    """Compare a filter's estimates with the ground truth at the exposure of its newest image.
 
     Args:
-        target: the beliefs, if a filter ran.
+        target: the estimates, if a filter ran.
         cameras: every camera's trace, by name.
         camera: the one whose pose relative to the target is desired.
     """
@@ -63,7 +63,7 @@ def pose_errors(
 
 
 def tick_pose_errors(record: TickRecord, info: RunInfo) -> PoseErrors:
-    """Return the pose errors of one tick, a row or none.
+    """Return the pose errors of one tick, in at most one row.
 
     Args:
         record: of the tick.
@@ -105,7 +105,7 @@ def _camera_errors(trace: CameraTrace | None, time: FloatArray) -> tuple[FloatAr
 
 
 def _exposed_at(trace: CameraTrace, time: FloatArray) -> tuple[BoolArray, IntArray]:
-    """Return at which times an image was exposed whose truth is known, and in which row, (K,)."""
+    """Return which times have an image with ground truth, and in which row, (K,)."""
     known = np.flatnonzero(np.isfinite(trace.T_world_target[:, 0, 0]))
     if not len(known):
         return np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.int64)

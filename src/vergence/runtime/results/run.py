@@ -1,4 +1,4 @@
-"""What a run was."""
+"""The result of a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from vergence.signals import Outcome
 if TYPE_CHECKING:
     import pandas as pd
 
-UNDER_ACTUATED = "under-actuated"  # the event that tells which directions an arm cannot serve
-FREE_DIRECTIONS = "free directions"  # the event that tells what the objectives leave free
-POOR_AXES = "poor axes"  # the event that tells which axes of a law hardly move its features
-# Events that advise a person, and what the table of a run calls them.
+UNDER_ACTUATED = "under-actuated"  # event that names the directions in which an arm cannot move
+FREE_DIRECTIONS = "free directions"  # event that names what the objectives leave undetermined
+POOR_AXES = "poor axes"  # event that names axes along which the features hardly change
+# Events that advise the user, with their names in the table of a run.
 ADVICE = {
     UNDER_ACTUATED: "unserved directions",
     POOR_AXES: POOR_AXES,
@@ -30,25 +30,25 @@ ADVICE = {
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened once."""
+    """A single event."""
 
     time: float  # s since the start of the run
     name: str  # the same for every event of a kind
-    text: str  # one sentence for a person
+    text: str  # one sentence for the user
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What a run was: how it ended and all its numbers; images are not kept."""
+    """The result of a run: its outcome and all its numbers; images are not kept."""
 
     info: RunInfo  # the cell, its seed, and the arms and cameras in it
     arms: Mapping[str, ArmTrace]  # arms, by name
     cameras: Mapping[str, CameraTrace]  # cameras, by name
-    target: TargetTrace | None  # as a filter believed it; None where no filter ran
+    target: TargetTrace | None  # filter estimates; None if no filter ran
     events: tuple[Event, ...]  # in order of time
     outcome: Outcome
-    summary: Mapping[str, float]  # the few numbers that say how it went
-    # Targets that the task was not about, by name.
+    summary: Mapping[str, float]  # the key figures of the run
+    # Targets other than the task's, by name.
     others: Mapping[str, OtherTarget]
 
     @property
@@ -72,12 +72,12 @@ class Run:
         """Return the numbers as a pandas table; needs pandas.
 
         Args:
-            of: the name of an arm or a camera, "target", or "target NAME" of another: all that is
-                known of it, one row per tick, image or estimate. Without it, one row per tick,
-                with everything but matrices.
+            of: the name of an arm or a camera, "target", or "target NAME" for another target: all
+                its data, one row per tick, image or estimate. If None, one row per tick with
+                everything but matrices.
 
         Raises:
-            InputError: if there is nothing of that name, or pandas is not installed.
+            InputError: if nothing has that name, or pandas is not installed.
         """
         from vergence.runtime.results.data_frame import data_frame
 

@@ -17,7 +17,7 @@ from vergence.signals import Outcome
 
 
 class _Seen:
-    """What was seen of one target.
+    """The observations of one target.
 
     Args:
         info: of the run.
@@ -30,7 +30,7 @@ class _Seen:
         self._target: Columns[TargetTrace] | None = None
 
     def add(self, record: TickRecord) -> None:
-        """Keep what a tick tells of it."""
+        """Add what a tick contains about it."""
         for frame, view in images_of(record):
             row = camera_row(record, self._info, frame, view)
             self._cameras[row["camera"]].append(row)
@@ -40,7 +40,7 @@ class _Seen:
             self._target.append(target_row(record, record.observation.target))
 
     def tables(self) -> tuple[dict[str, CameraTrace], TargetTrace | None]:
-        """Return its traces: in the images by camera, and as a filter believed it."""
+        """Return its traces: in the images by camera, and its filter estimates."""
         cameras = {name: columns.table() for name, columns in self._cameras.items()}
         return cameras, None if self._target is None else self._target.table()
 
@@ -49,15 +49,15 @@ class RunRecorder:
     """A listener that keeps all numbers of a run in memory; images are not kept.
 
     Args:
-        most_ticks: how many to keep of a run without an end; the older half is dropped where there
-            would be more. All if None.
+        most_ticks: number of ticks to keep of a run without an end; the older half is dropped if
+            there would be more. All if None.
     """
 
     def __init__(self, most_ticks: int | None = None) -> None:
         self._most = most_ticks
 
     def begin(self, info: RunInfo) -> None:
-        """Start with nothing."""
+        """Start empty."""
         self._info = info
         self._arms = {
             name: Columns(ArmTrace, len(arm.names), self._most) for name, arm in info.arms.items()
@@ -65,7 +65,7 @@ class RunRecorder:
         self._served = _Seen(info, self._most)
         self._others: dict[str, _Seen] = {}
         self._events: deque[Event] = deque(maxlen=self._most)
-        self._first: tuple[float, float] | None = None  # time in the run and on the wall, s
+        self._first: tuple[float, float] | None = None  # in the run and on the wall clock, s
         self._pace = float("nan")
         self._outcome: Outcome | None = None
 
@@ -82,11 +82,11 @@ class RunRecorder:
             self._keep_pace(record.time)
 
     def event(self, time: float, name: str, text: str) -> None:
-        """Keep something that happened once."""
+        """Keep an event."""
         self._events.append(Event(time, name, text))
 
     def close(self, outcome: Outcome, summary: Mapping[str, float | str]) -> None:
-        """Keep how it ended."""
+        """Keep the outcome and the summary."""
         self._outcome = outcome
 
     def run(self) -> Run:
@@ -107,7 +107,7 @@ class RunRecorder:
         return replace(run, summary=values)
 
     def _keep_pace(self, time: float) -> None:
-        """Count the real-time factor from the first image worked on: by then all is compiled."""
+        """Measure the real-time factor from the first image on, when everything is compiled."""
         now = perf_counter()
         if self._first is None:
             self._first = (time, now)

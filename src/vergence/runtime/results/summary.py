@@ -1,4 +1,4 @@
-"""The few numbers that say how a run went."""
+"""The key figures of a run."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from vergence.runtime.results.traces import ArmTrace, CameraTrace, largest
 
 
 def summarise(run: Run) -> dict[str, float]:
-    """Return the final and the extreme values of a run; what is not known is left out."""
+    """Return final and extreme values of a run; unknown ones are omitted."""
     values: dict[str, float] = {}
     for arm in run.arms.values():
         values |= _of_arm(arm)

@@ -1,4 +1,4 @@
-"""What one tick adds to the traces of a run."""
+"""The rows that one tick adds to the traces of a run."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -15,7 +15,7 @@ from vergence.signals import Frame, ImagePoints, TargetState
 
 
 def arm_row(record: TickRecord, arm: str) -> Row:
-    """Return how an arm moves and was commanded, a row of `ArmTrace`."""
+    """Return the motion and the command of an arm, a row of `ArmTrace`."""
     state = record.sample.joints[arm]
     row: dict[str, Any] = {
         "time": record.time,
@@ -37,15 +37,15 @@ def arm_row(record: TickRecord, arm: str) -> Row:
 def camera_row(
     record: TickRecord, info: RunInfo, frame: Frame | None, view: ImagePoints | None
 ) -> Row:
-    """Return what one image showed, what was desired, and what was true.
+    """Return the measured, desired and true values of one image.
 
     It is a row of `CameraTrace`, with the name of the camera.
 
     Args:
         record: of the tick that brought the image.
         info: of the run.
-        frame: the image; None if the points come from elsewhere.
-        view: what was measured in it; None if nothing was.
+        frame: the image; None if the points have another source.
+        view: the measurements in it; None if there are none.
     """
     taken = frame if frame is not None else view
     assert taken is not None
@@ -78,7 +78,7 @@ def camera_row(
 
 
 def target_row(record: TickRecord, target: TargetState) -> Row:
-    """Return where a filter believes the target to be, a row of `TargetTrace`."""
+    """Return a filter's estimate of the target's pose, a row of `TargetTrace`."""
     return {
         "time": target.time,
         "received": record.time,
@@ -90,7 +90,7 @@ def target_row(record: TickRecord, target: TargetState) -> Row:
 
 
 def images_of(record: TickRecord) -> Iterator[tuple[Frame | None, ImagePoints | None]]:
-    """Yield each image of a tick with what was measured in it; either may be missing."""
+    """Yield each image of a tick with its measurements; either may be None."""
     views = record.observation.views if record.observation else ()
     measured = {(view.camera, view.time): view for view in views}
     for frame in record.sample.frames:
@@ -107,15 +107,15 @@ def points_at_pose(
     true_px: FloatArray,
     true_depth_m: FloatArray,
 ) -> FloatArray:
-    """Return where points of the target would be seen, if it were at a pose in the camera, (M, 2).
+    """Return the image points of the target if it were at a given pose in the camera, (M, 2).
 
     Args:
-        camera: that sees them.
-        T_camera_target: (4, 4) the pose.
-        T_world_camera: (4, 4) where the camera is.
-        T_world_target: (4, 4) where the target is.
-        true_px: (M, 2) where the points are seen now.
-        true_depth_m: (M,) and at which depth.
+        camera: the camera.
+        T_camera_target: (4, 4) the given pose.
+        T_world_camera: (4, 4) the camera's present pose.
+        T_world_target: (4, 4) the target's present pose.
+        true_px: (M, 2) present image points.
+        true_depth_m: (M,) their depths.
     """
     points_px = np.full_like(true_px, np.nan)
     ahead = np.isfinite(true_px).all(axis=1)
@@ -140,7 +140,7 @@ def _measured(view: ImagePoints) -> Row:
 def _desired(
     record: TickRecord, info: RunInfo, camera: str
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return the desired points and the desired pose of the target that a camera is about."""
+    """Return the desired points and the desired pose of the target for a camera."""
     if record.reference is None:
         return None, None
     if camera != info.task_camera:

@@ -1,4 +1,4 @@
-"""How a run went over time, as arrays: a row a tick, NaN where nothing is known."""
+"""Time series of a run as arrays: one row per tick or image, NaN for unknown values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -11,12 +11,12 @@ from vergence.runtime.results.columns import column
 
 
 class Trace:
-    """What all traces can do; `time` (K,) s is their first field."""
+    """Base of all traces; `time` (K,) s is their first field."""
 
     __slots__ = ()
 
     def at(self, rows: BoolArray | IntArray) -> Self:
-        """Return some of the rows, by a mask (K,) or by their numbers."""
+        """Return some of the rows, by a mask (K,) or by indices."""
         numbers = np.arange(len(self.time))[rows]  # type: ignore[attr-defined]
         return type(self)(**{one.name: self._picked(one.name, numbers) for one in fields(self)})  # type: ignore[arg-type]
 
@@ -29,39 +29,39 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmTrace(Trace):
-    """How an arm with n joints moved in K ticks."""
+    """The motion of an arm with n joints over K ticks."""
 
     time: FloatArray = column()  # (K,) s
     position: FloatArray = column("n")  # (K, n) measured, rad or m
     velocity: FloatArray = column("n")  # (K, n) measured, rad/s or m/s
     setpoint: FloatArray = column("n")  # (K, n) the last set-points, rad or m
-    setpoint_rate: FloatArray = column("n")  # (K, n) and how fast to move there, rad/s or m/s
-    command: FloatArray = column("n")  # (K, n) rates the law asked for; NaN while the arm held
-    v_camera: FloatArray = column(6)  # (K, 6) camera twist the command was made from, m/s, rad/s
+    setpoint_rate: FloatArray = column("n")  # (K, n) their rates, rad/s or m/s
+    command: FloatArray = column("n")  # (K, n) rates asked for by the law; NaN while the arm held
+    v_camera: FloatArray = column(6)  # (K, 6) camera twist of the command, m/s, rad/s
     manipulability: FloatArray = column()  # (K,) w' of [Nelson1995] eq. (26)
     penalty: FloatArray = column()  # (K,) P of [Nelson1995] eq. (27)
-    active: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) limits that shaped the command
-    slack: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) limits relaxed, and how far
-    clearance: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) m, least, to what is near
+    active: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) limits that were active
+    slack: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) relaxed limits, by how much
+    clearance: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) m, smallest, by kind
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraTrace(Trace):
-    """What a camera saw in K images of up to M points."""
+    """The observations of a camera in K images of up to M points."""
 
     time: FloatArray = column()  # (K,) s, of exposure
-    received: FloatArray = column()  # (K,) s, the tick in which the loop had the image
+    received: FloatArray = column()  # (K,) s, the tick in which the loop received the image
     points_px: FloatArray = column("M", 2)  # (K, M, 2) measured
     covariance_px: FloatArray = column("M", 2, 2)  # (K, M, 2, 2) px²
     found: BoolArray = column("M", kind=bool)  # (K, M)
     reasons: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) of M: why not found
     asked: BoolArray = column("M", kind=bool)  # (K, M) whether it was searched for
-    window_center_px: FloatArray = column("M", 2)  # (K, M, 2) predicted places; NaN without window
+    window_center_px: FloatArray = column("M", 2)  # (K, M, 2) predicted; NaN if no window
     window_half_px: FloatArray = column("M", 2)  # (K, M, 2) half the sizes of the windows
     joined: IntArray = column("M", kind=int)  # (K, M) see `ImagePoints`: points of curves
     desired_px: FloatArray = column("M", 2)  # (K, M, 2)
     desired_by_pose: BoolArray = column(kind=bool)  # (K,) whether they follow from a desired pose
-    T_camera_target_desired: FloatArray = column(4, 4)  # (K, 4, 4) where the task desires a pose
+    T_camera_target_desired: FloatArray = column(4, 4)  # (K, 4, 4) if the task desires a pose
     true_px: FloatArray = column("M", 2)  # (K, M, 2) truly projected; this and the rest only from
     true_depth_m: FloatArray = column("M")  # (K, M) a simulated camera
     visible: BoolArray = column("M", kind=bool)  # (K, M) whether truly in view
@@ -70,12 +70,12 @@ class CameraTrace(Trace):
 
     @property
     def error_px(self) -> FloatArray:
-        """Distance of each found point from where it should be, (K, M)."""
+        """Distance of each found point from its desired position, (K, M)."""
         return self._where_found(self.points_px - self.desired_px)
 
     @property
     def drift_px(self) -> FloatArray:
-        """Distance of each found point from where it truly is, (K, M)."""
+        """Distance of each found point from its true position, (K, M)."""
         return self._where_found(self.points_px - self.true_px)
 
     def _where_found(self, difference_px: FloatArray) -> FloatArray:
@@ -85,10 +85,10 @@ class CameraTrace(Trace):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetTrace(Trace):
-    """Where a filter believed the target to be, K times."""
+    """A filter's K estimates of the target's pose."""
 
     time: FloatArray = column()  # (K,) s, of exposure
-    received: FloatArray = column()  # (K,) s, the tick in which the loop had the image
+    received: FloatArray = column()  # (K,) s, the tick in which the loop received the image
     T_world_target: FloatArray = column(4, 4)  # (K, 4, 4)
     velocity: FloatArray = column(6)  # (K, 6) m/s and rad/s, world axes
     covariance: FloatArray = column(12, 12)  # (K, 12, 12)

@@ -1,4 +1,4 @@
-"""When a task is over: one part a file, by the name that `until` has in a cell file."""
+"""Conditions that end a task: one part per file, by its name as `until` in a cell file."""
 
 from vergence.runtime.task_ends.camera_position import CameraPosition
 from vergence.runtime.task_ends.joint_position import JointPosition

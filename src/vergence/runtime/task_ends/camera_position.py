@@ -1,4 +1,4 @@
-"""Where the camera comes near a place."""
+"""Ends a task at a camera position."""
 
 import numpy as np
 
@@ -12,10 +12,10 @@ class CameraPosition:
     """Ends the task when the camera, or the object that the arm holds, is near a position."""
 
     position_m: tuple[float, float, float] = knob(..., "m")  # x, y, z of the camera
-    tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # distance that counts as there
+    tolerance_m: float = knob(5e-3, "m", above=0, upto=10)  # distance at which the task ends
 
     def bind(self, setting: EndSetting) -> Until:
-        """Return what watches the camera."""
+        """Return the monitor of the camera."""
         return _Watch(self, setting)
 
 
@@ -24,10 +24,10 @@ class _Watch:
         self._end, self._camera_pose = end, setting.camera_pose
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         away = self._camera_pose(now.joints)[:3, 3] - np.array(self._end.position_m)
         distance = float(np.linalg.norm(away))
         if distance > self._end.tolerance_m:
             return None
-        reason = f"the camera is {1e3 * distance:.1f} mm from its place"
+        reason = f"the camera is {1e3 * distance:.1f} mm from its end position"
         return Outcome(OutcomeKind.REACHED, reason, now.time)

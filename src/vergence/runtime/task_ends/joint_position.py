@@ -1,4 +1,4 @@
-"""Where a joint passes a position."""
+"""Ends a task at a joint position."""
 
 import numpy as np
 from pydantic import model_validator
@@ -26,7 +26,7 @@ class JointPosition:
         return self
 
     def bind(self, setting: EndSetting) -> Until:
-        """Return what watches the joint.
+        """Return the monitor of the joint.
 
         Raises:
             InputError: if the arm has no joint of that name.
@@ -43,7 +43,7 @@ class _Watch:
         self._end, self._number, self._unit = end, number, unit
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         end, position = self._end, float(now.joints[self._number]) / self._unit
         above = end.above_deg is not None and position >= end.above_deg
         below = end.below_deg is not None and position <= end.below_deg

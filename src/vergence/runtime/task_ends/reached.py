@@ -1,4 +1,4 @@
-"""At the goal, and at rest."""
+"""Ends a task at its goal, at rest."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from vergence.signals import Outcome, OutcomeKind
 
 @part("task_end", "reached")
 class Reached:
-    """Ends the task when features or pose have been as desired for some time.
+    """Ends the task when the features or the pose have been as desired for some time.
 
-    A task that knows its goal by itself, such as `reach` or `advance`, ends there whatever these
-    tolerances say.
+    A task that determines its own goal, such as `reach` or `advance`, ends there regardless of
+    these tolerances.
     """
 
     # Largest error of every feature, for image points.
@@ -26,17 +26,17 @@ class Reached:
     time_s: float = knob(0.5, "s", least=0, upto=60)  # time for which this must hold
 
     def bind(self, setting: EndSetting) -> Until:
-        """Return what watches the error."""
+        """Return the monitor of the error."""
         return _Watch(self, setting)
 
 
 class _Watch:
     def __init__(self, end: Reached, setting: EndSetting) -> None:
         self._end, self._camera_pose = end, setting.camera_pose
-        self._since = float("nan")  # s, since when every image was within the tolerance
+        self._since = float("nan")  # s, since when every image has been within the tolerance
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         where = self._off(now)
         if not where:
             self._since = float("nan")
@@ -47,7 +47,7 @@ class _Watch:
         return Outcome(OutcomeKind.REACHED, where, now.time)
 
     def _off(self, now: Moment) -> str:
-        """Return how far the target is from where it should be; empty if that is too far."""
+        """Return the remaining error as text; empty if it exceeds the tolerance."""
         if now.reference.T_camera_target is not None:
             return self._off_pose(now, now.reference.T_camera_target)
         views = [v for v in now.observation.views if v.camera not in now.reference.elsewhere_px]

@@ -1,4 +1,4 @@
-"""Once the target is seen."""
+"""Ends a task once the target is seen."""
 
 from typing import ClassVar
 
@@ -12,12 +12,12 @@ class TargetSeen:
     """Ends the task when features of the target were found in several consecutive images."""
 
     images: int = knob(3, least=1, upto=1000)  # number of consecutive images
-    looks_for_target: ClassVar[bool] = True  # so that a task without images has to
+    looks_for_target: ClassVar[bool] = True  # makes tasks without images search for it
 
     features: int = knob(4, least=1, upto=1000)  # features found in each of them, over all cameras
 
     def bind(self, setting: EndSetting) -> Until:
-        """Return what counts."""
+        """Return the counter of images."""
         return _Watch(self)
 
 
@@ -26,7 +26,7 @@ class _Watch:
         self._end, self._images = end, 0
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         found = sum(int(view.found.sum()) for view in now.observation.views)
         self._images = self._images + 1 if found >= self._end.features else 0
         if self._images < self._end.images:

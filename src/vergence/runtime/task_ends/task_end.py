@@ -1,4 +1,4 @@
-"""What ends a task, as the loop sees it."""
+"""The protocol of conditions that end a task."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -9,9 +9,9 @@ from vergence.signals import Observation, Outcome, Reference
 
 
 class EndSetting(NamedTuple):
-    """What the end of a task may know of its cell."""
+    """What the end of a task may use of its cell."""
 
-    arm: Arm  # that moves
+    arm: Arm  # the arm that moves
     # From its joint positions (n,) to the pose (4, 4) of the task's camera in the world.
     camera_pose: Callable[[FloatArray], FloatArray]
 
@@ -22,20 +22,20 @@ class Moment(NamedTuple):
     time: float  # s since the start of the run
     since_s: float  # since the task began
     joints: FloatArray  # (n,) measured, rad or m
-    observation: Observation  # what the image shows
-    reference: Reference  # what was desired
+    observation: Observation  # of the image
+    reference: Reference  # for the image
 
 
 def looks_for_target(end: object) -> bool:
-    """Return whether an end needs the target to be searched for, even by a task that needs none."""
+    """Return whether an end requires searching for the target, even in a task that needs none."""
     return bool(getattr(end, "looks_for_target", False))
 
 
 class Until(Protocol):
-    """Watches one task."""
+    """Monitors one task."""
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         ...
 
 
@@ -43,9 +43,9 @@ class TaskEnd(Protocol):
     """A part that a task may name as its `until`."""
 
     def bind(self, setting: EndSetting) -> Until:
-        """Return what watches a task that is about to begin.
+        """Return the monitor of a task that is about to begin.
 
         Raises:
-            InputError: if it does not fit the task's arm.
+            InputError: if it does not suit the task's arm.
         """
         ...

@@ -1,4 +1,4 @@
-"""After some time."""
+"""Ends a task after some time."""
 
 from vergence.parts import knob, part
 from vergence.runtime.task_ends.task_end import EndSetting, Moment
@@ -16,7 +16,7 @@ class TimeOver:
         return self
 
     def over(self, now: Moment) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         if now.since_s < self.time_s:
             return None
         return Outcome(OutcomeKind.COMPLETED, f"ran for {self.time_s:g} s", now.time)
