@@ -1,4 +1,4 @@
-"""Planning: what the features or the target's pose should be, and when."""
+"""Planning: the desired features or target pose over time."""
 
 from vergence.planning.failure import Obstacle, PlanFailure
 from vergence.planning.fixed_reference import FixedReference

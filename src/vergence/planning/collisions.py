@@ -1,4 +1,4 @@
-"""Whether a path of the joints keeps an arm's bodies apart."""
+"""Collision checks of joint paths."""
 
 from itertools import pairwise
 
@@ -7,21 +7,21 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.robot import Clearance
 
-_LEAST = 1e-4  # rad or m: shorter stretches of a path are not halved
+_LEAST = 1e-4  # rad or m: shorter segments of a path are not subdivided
 _ROUNDING_M = 1e-9
 
 
 def collision_at(bodies: Clearance, q: FloatArray) -> str:
-    """Return which bodies are nearer than their margin with the joints at q (n,); else nothing."""
+    """Return which bodies are closer than their margin at joint positions q (n,), else ""."""
     return _too_near(bodies, bodies.distances(q))
 
 
 def collision_along(bodies: Clearance, path: FloatArray) -> str:
-    """Return which bodies are nearer than their margin somewhere on a path (K, n); else nothing.
+    """Return which bodies are closer than their margin anywhere on a path (K, n), else "".
 
-    Between two waypoints, where the joints go straight, a pair keeps half its margin if what is
-    left of it at both exceeds what the joints can change, see `ClearBraking`; else the stretch is
-    halved.
+    On the straight joint segment between two waypoints, a pair keeps half its margin if what
+    remains of its distance at both ends exceeds the change that the joints can cause, see
+    `ClearBraking`; otherwise the segment is halved.
     """
     places = [(q, bodies.distances(q)) for q in path]
     reasons = (_too_near(bodies, distance) for _, distance in places)
@@ -30,7 +30,7 @@ def collision_along(bodies: Clearance, path: FloatArray) -> str:
 
 
 def _too_near(bodies: Clearance, distance: FloatArray) -> str:
-    """Return which pair is nearer than its margin, of distances (P,); else nothing."""
+    """Return which pair is closer than its margin, given distances (P,), else ""."""
     room = distance - bodies.margin
     if not len(room) or room.min() >= -_ROUNDING_M:
         return ""
@@ -41,7 +41,7 @@ def _too_near(bodies: Clearance, distance: FloatArray) -> str:
 def _between(
     bodies: Clearance, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray]
 ) -> str:
-    """Return which bodies are too near between two places with the distances there, (P,)."""
+    """Return which bodies collide between two positions, given the distances (P,) there."""
     change = np.abs(end[0] - start[0])
     room = start[1] + end[1] - bodies.margin
     if change.max() < _LEAST or (bodies.reach @ change < room).all():

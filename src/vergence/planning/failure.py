@@ -1,4 +1,4 @@
-"""Why there is no plan."""
+"""The reason why planning failed."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -19,20 +19,20 @@ class Obstacle(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PlanFailure:
-    """No plan: false in a condition, with the constraint that stood in the way."""
+    """A failed plan, which is false as a condition, with the constraint that prevents a path."""
 
     obstacle: Obstacle
-    reason: str  # one sentence for a person
-    proved: bool = False  # whether there is no path at all, as against none found
+    reason: str  # one sentence for the user
+    proved: bool = False  # true if no path exists, false if none was found
 
     def __bool__(self) -> bool:
         """A failure is false."""
         return False
 
     def __str__(self) -> str:
-        """Obstacle and reason on one line."""
+        """Return obstacle and reason on one line."""
         return f"{self.obstacle.value}: {self.reason}"
 
     def outcome(self, time: float) -> Outcome:
-        """Return the end of a run that this failure is."""
+        """Return this failure as the outcome of a run."""
         return Outcome(OutcomeKind.INFEASIBLE, str(self), time)

@@ -1,16 +1,16 @@
-"""The planner of the paper: a potential field over scaled camera poses, as kernels.
+"""The planner of [Mezouar2001]: a potential field over scaled camera poses, as kernels.
 
-[Mezouar2001] sections 2 and 3, with these corrections and choices:
+Sections 2 and 3, with these corrections and choices:
 
 - Υ = (t_d, uθ) of the camera in the goal frame; L_w⁻¹ is the right Jacobian of SO(3), which has a
   minus before its first-order term (the printed plus gives ω along the axes of F*).
-- After (6) the joints are closed on the pose of Υ, so that linearisation leaves no drift.
+- After (6) the joints are corrected to the pose of Υ, so that linearisation causes no drift.
 - V_rq is available as printed, see `printed_joint_barrier`. By default it uses joint positions
-  normalised to [-1, 1] and, as does V_rs, is a C¹ barrier: half the square of what the printed
-  1/((1 - q)(1 + q)) exceeds its value at the border of the free zone.
+  normalised to [-1, 1] and is a C¹ barrier, like V_rs: half the square of the amount by which the
+  printed 1/((1 - q)(1 + q)) exceeds its value at the border of the free zone.
 - V_rs = ½ Σ (1/w - 1)², w the distance to a side of the image over the width of its zone, w < 1.
-- A zone that holds the goal shrinks to the goal's own clearance.
-- The step is clipped at the goal and halved when the force turns back.
+- A zone that contains the goal shrinks to the goal's own clearance.
+- The step is clipped at the goal, and halved when the force reverses.
 """
 
 from typing import NamedTuple
@@ -24,13 +24,13 @@ from vergence.geometry import se3, se3_compose, se3_inverse, se3_log, so3_exp, s
 from vergence.robot import Chain, forward_kinematics, jacobian
 
 ARRIVED, STUCK, UNFINISHED = 0, 1, 2
-NEAREST = 0.02  # of a zone: where the barriers stop growing, so that forces stay finite
+NEAREST = 0.02  # relative to a zone: where the barriers stop growing, so that forces remain finite
 
 
 class Field(NamedTuple):
-    """The world of the potential field, all lengths but d* and the joints' in units of d*."""
+    """The potential field; all lengths except d* and those of the joints are in units of d*."""
 
-    m_star: FloatArray  # (N, 2) the points in the goal view
+    m_star: FloatArray  # (N, 2) the points in the goal image
     normal: FloatArray  # (3,) n*
     delta: FloatArray  # (N,) distance to the reference plane over Z*
     distance: float  # d*, m
@@ -39,14 +39,14 @@ class Field(NamedTuple):
     image_zone: FloatArray  # (4,) width of the zone along each side
     q_min: FloatArray  # (n,)
     q_max: FloatArray  # (n,)
-    joint_zone: FloatArray  # (n,) width of the zone at both limits, of half the range
+    joint_zone: FloatArray  # (n,) width of the zone at both limits, relative to half the range
     gain_image: float  # γ
     gain_joint: float  # χ
     printed: bool  # V_rq as the paper prints it
 
 
 class FieldPath(NamedTuple):
-    """What came of the walk down the field."""
+    """The result of the descent."""
 
     upsilon: FloatArray  # (K, 6)
     q: FloatArray  # (K, n)
@@ -143,7 +143,7 @@ def printed_joint_barrier(field: Field, q: FloatArray) -> tuple[float, FloatArra
 
 @njit(cache=True)
 def damped_solve(J: FloatArray, twist: FloatArray) -> FloatArray:
-    """Return J⁺ twist, damped a little so that it stays bounded at a singularity."""
+    """Return J⁺ twist, slightly damped so that it remains bounded at a singularity."""
     A = J @ J.T
     for i in range(6):
         A[i, i] += 1e-8
@@ -179,7 +179,7 @@ def repulsion(
 def follow(
     field: Field, chain: Chain, q: FloatArray, before: FloatArray, after: FloatArray
 ) -> FloatArray:
-    """Return the joints after a step of Υ: eq. (6), then one Newton step onto the pose of Υ."""
+    """Return the joints after a step of Υ: eq. (6), then one Newton step towards the pose of Υ."""
     twist = parameter_jacobian(before, field.distance) @ (after - before)
     q = q + damped_solve(jacobian(chain, q), twist)
     T_star = se3(so3_exp(after[3:]), field.distance * after[:3])
@@ -192,7 +192,7 @@ def follow(
 def descend(
     field: Field, chain: Chain, upsilon: FloatArray, q: FloatArray, step: float, steps_max: int
 ) -> FieldPath:
-    """Walk down the potential from Υ to 0: Υ ← Υ + ε F/‖F‖, eq. (1).
+    """Descend the potential from Υ to 0: Υ ← Υ + ε F/‖F‖, eq. (1).
 
     Args:
         field: potentials and object.
@@ -200,7 +200,7 @@ def descend(
         upsilon: Υ at the start, (6,).
         q: joint positions at the start, (n,).
         step: ε, in units of Υ.
-        steps_max: when to give up.
+        steps_max: largest number of steps.
     """
     count = len(field.m_star)
     upsilons, joints = np.empty((steps_max + 1, 6)), np.empty((steps_max + 1, len(q)))
@@ -219,7 +219,7 @@ def descend(
             end = STUCK
             break
         direction = force / size
-        if np.sum(before**2) > 0.0:  # half of the last direction: force alone flutters at a wall
+        if np.sum(before**2) > 0.0:  # half of the last direction: the force alone oscillates
             direction = 0.5 * (direction + before)
             direction /= max(np.sqrt(np.sum(direction**2)), 1e-12)
         if np.sum(force * before) < 0.0:

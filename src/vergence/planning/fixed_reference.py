@@ -1,4 +1,4 @@
-"""A goal that stays."""
+"""A constant goal."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ from vergence.signals import Reference
 
 
 class FixedReference:
-    """Hands out the same reference at every instant.
+    """Returns the same reference at every time.
 
     Args:
         reference: the goal; its time is replaced.
@@ -16,5 +16,5 @@ class FixedReference:
         self._goal = reference
 
     def reference(self, time: float) -> Reference:
-        """Return the goal, stamped with the time."""
+        """Return the goal with the given time."""
         return replace(self._goal, time=time)

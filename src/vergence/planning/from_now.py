@@ -1,4 +1,4 @@
-"""A path that begins when it is asked for."""
+"""A path that begins at the first request."""
 
 from dataclasses import replace
 
@@ -7,10 +7,10 @@ from vergence.signals import Reference
 
 
 class FromNow:
-    """Hands out a path as if it began with the first question.
+    """Returns a path as if it began at the first request.
 
     Args:
-        trajectory: whose time begins at 0.
+        trajectory: a path whose time begins at 0.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:

@@ -5,7 +5,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 
-_CLOSE = 1e-9  # by how much a point may be outside
+_CLOSE = 1e-9  # distance by which a point may be outside
 _PARALLEL = 1e-12
 
 
@@ -13,8 +13,9 @@ _PARALLEL = 1e-12
 def halfspaces_meet(G: FloatArray, h: FloatArray) -> bool:
     """Return whether G x ≥ h (rows, 3) has a solution x.
 
-    The half-spaces are added one by one. If those so far meet in a point that the next one leaves
-    out, they meet the next one on its plane or not at all: two dimensions are left, then one.
+    The half-spaces are added one by one. If those so far meet in a point that violates the next
+    one, they meet it on its plane or not at all, which reduces the problem to two dimensions, then
+    to one.
     """
     x0 = x1 = x2 = 0.0
     for r in range(len(h)):

@@ -1,4 +1,4 @@
-"""The planner to use: an optimised continuous path, and a tree search behind it."""
+"""The default planner: an optimised continuous path, with tree search as fallback."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,18 +21,18 @@ from vergence.planning.visibility import View
 from vergence.planning.wrist_search import wrist_path
 from vergence.robot.inverse_kinematics import goal_configurations, nearest_configuration
 
-_LIKELY = 3.0  # standard deviations within which a goal in reach may be the true one
-_TREE_GOALS = 24  # goal postures in which a tree may begin
-PROOF_CELLS = (32, 128)  # of the grid that shows problems to have no path: at first, and at last
-WRIST_CELLS = (64, 128)  # of the search over a wrist, along each joint: at first, and at last
-MARGINS = (0.2, 0.0)  # shares of the margins that do where no path keeps them whole
-_DETOURS, _ASIDE = 150, 0.15  # random postures to go through, and how far aside, of the ranges
-SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims at, some four pixels
+_LIKELY = 3.0  # standard deviations within which a reachable pose may be the true goal
+_TREE_GOALS = 24  # goal postures used as tree roots
+PROOF_CELLS = (32, 128)  # cells of the grid that proves that there is no path: first and last
+WRIST_CELLS = (64, 128)  # cells of the wrist search, along each joint: first and last
+MARGINS = (0.2, 0.0)  # fractions of the margins that are tried if no path keeps them entirely
+_DETOURS, _ASIDE = 150, 0.15  # random postures to pass, and their offset relative to the ranges
+SOFT_MARGIN = 0.006  # sine beyond the strict margin that the optimiser aims for, about four pixels
 
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A spline that keeps every constraint."""
+    """A spline that satisfies every constraint."""
 
     controls: FloatArray  # (K, n)
     basis: SplineBasis
@@ -45,8 +45,8 @@ class OptimisedPlanner:
 
     The cost is ∫ |q'/q̇_max|² + smoothing ∫ |q''/q̇_max|² over the path. Guesses: straight in joint
     space to every inverse-kinematics branch, the same pulled into view, and the camera's straight
-    line turned in both senses; behind them, for arms that slide first, a search over the wrist cell
-    by cell, and a bidirectional tree. The same problem always has the same answer.
+    line with rotation in both directions. Fallbacks: for arms whose first joints are prismatic, a
+    cell-by-cell search over the wrist, then a bidirectional tree. The planner is deterministic.
     """
 
     # Control points of the spline; twice as many for a path of the tree.
@@ -57,14 +57,14 @@ class OptimisedPlanner:
     # Number of inverse kinematics solutions of the goal to try; if none leads there, as many again.
     branches: int = knob(3, least=1, upto=16)
     waypoints: int = knob(121, least=8, upto=10000)  # way-points of the resulting path
-    # Samples before the tree search gives up; 0 for no tree.
+    # Samples before the tree search gives up; 0 disables it.
     tree_samples: int = knob(4000, least=0, upto=1000000)
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
-        """Return the smoothest path found that keeps every constraint, or what stood in the way.
+        """Return the smoothest path that satisfies all constraints, or which one prevents it.
 
-        Where none keeps the margins, a part of them will do before there is no plan. A goal out of
-        reach by no more than what images leave open of it is replaced by the nearest pose in reach.
+        If no path keeps the margins, fractions of them are tried. An unreachable goal is replaced
+        by the nearest reachable pose if that is within the goal's uncertainty.
         """
         failure = _ends_refused(problem)
         if failure is not None:
@@ -92,7 +92,7 @@ class OptimisedPlanner:
         if separation.proves_no_path(PROOF_CELLS[1]):
             return _proved(failure)
         if separation.bars_wrist(goals):
-            return failure  # without margins there is no way either
+            return failure  # no path without margins either
         for share in MARGINS:
             px, joint = share * problem.margin_px, share * problem.margin_joint
             nearer = replace(problem, margin_px=px, margin_joint=joint)
@@ -103,7 +103,7 @@ class OptimisedPlanner:
         return failure
 
     def _goals(self, problem: PlanningProblem) -> FloatArray:
-        """Return goal configurations without collisions, nearest first, (G, n)."""
+        """Return collision-free goal configurations, nearest first, (G, n)."""
         bodies = problem.bodies
         return goal_configurations(
             problem.arm, problem.T_world_goal, problem.q_start, max(_TREE_GOALS, 2 * self.branches),
@@ -111,7 +111,7 @@ class OptimisedPlanner:
         )  # fmt: skip
 
     def _direct(self, problem: PlanningProblem, goals: FloatArray) -> Path | None:
-        """Return the best of what guesses come to, or of detours where bodies are in the way."""
+        """Return the best result from the guesses, or from detours if bodies collide."""
         view = _view(problem)
         many = self.branches
         for some in filter(len, (goals[:many], goals[many : 2 * many])):
@@ -124,7 +124,7 @@ class OptimisedPlanner:
     def _searched(
         self, problem: PlanningProblem, goals: FloatArray, wrist_cells: int, trees: TreeSearch
     ) -> Path | None:
-        """Return what a search over the wrist finds, or else one by trees."""
+        """Return the path that a search over the wrist finds, or else one by trees."""
         view = _view(problem)
         guess = wrist_path(problem, view, goals[: 2 * self.branches], wrist_cells)
         best = self._smoothest(problem, view, [guess]) if len(guess) else None
@@ -135,11 +135,11 @@ class OptimisedPlanner:
         return Path.through(problem, self._waypoints(best.controls), "optimised")
 
     def _waypoints(self, controls: FloatArray) -> FloatArray:
-        """Return the path of a spline's control points (K, n) as it comes out, (W, n)."""
+        """Return the final path of a spline's control points (K, n), (W, n)."""
         return spline_basis(len(controls), self.waypoints).values @ controls
 
     def _collision(self, problem: PlanningProblem, controls: FloatArray) -> str:
-        """Return which bodies come too near on the path of control points; else nothing."""
+        """Return which bodies collide on the path of control points, else ""."""
         if problem.bodies is None:
             return ""
         return collision_along(problem.bodies, self._waypoints(controls))
@@ -177,7 +177,7 @@ class OptimisedPlanner:
         guess: FloatArray,
         limited: bool = True,
     ) -> _Candidate | None:
-        """Optimise one guess; None where it stays out of view."""
+        """Optimise one guess; None if it does not come into view."""
         arm, goal = problem.arm, guess[-1]
         low, high = problem.joint_range(goal)
         if not limited:
@@ -199,9 +199,9 @@ class OptimisedPlanner:
     def _from_detours(
         self, problem: PlanningProblem, view: View, goals: FloatArray
     ) -> _Candidate | None:
-        """Return the least rough of the splines through a random posture that keep everything.
+        """Return the smoothest spline through a random posture that satisfies every constraint.
 
-        They are not smoothed further: that would pull them straight, into what they go around.
+        Further smoothing would pull it straight, into the obstacle that it avoids.
         """
         if problem.bodies is None:
             return None
@@ -243,7 +243,7 @@ class OptimisedPlanner:
     def _smoothest(
         self, problem: PlanningProblem, view: View, guesses: Sequence[FloatArray]
     ) -> _Candidate | None:
-        """Return what comes of the first guess that can be smoothed, by as few controls as do."""
+        """Return the first guess that can be smoothed, with the fewest controls that suffice."""
         for controls in (2 * self.controls, 4 * self.controls):
             basis = spline_basis(controls, 4 * controls, self.smoothing)
             for guess in guesses:
@@ -253,7 +253,7 @@ class OptimisedPlanner:
         return None
 
     def _obstacle(self, problem: PlanningProblem, goals: FloatArray) -> PlanFailure:
-        """Name the constraint without which there would be a path."""
+        """Return the constraint without which there would be a path."""
         view, goals = _view(problem), goals[: self.branches]
         if problem.bodies is not None:
             free = self._from_guesses(replace(problem, bodies=None), view, goals)
@@ -279,7 +279,7 @@ def _proved(failure: PlanFailure) -> PlanFailure:
 
 
 def _pulled(problem: PlanningProblem, view: View, waypoints: FloatArray) -> FloatArray:
-    """Return waypoints (P, n), each pulled into view, its predecessor's shift taken along."""
+    """Return waypoints (P, n), each pulled into view after applying its predecessor's shift."""
     low, high = problem.joint_range(waypoints[-1])
     result, shift = waypoints.copy(), np.zeros(waypoints.shape[1])
     for k in range(1, len(waypoints) - 1):
@@ -291,7 +291,7 @@ def _pulled(problem: PlanningProblem, view: View, waypoints: FloatArray) -> Floa
 
 
 def _end_margins_px(problem: PlanningProblem) -> tuple[float, float]:
-    """Return the distance of the points to the image border at start and goal, px."""
+    """Return the distances of the points from the image border at start and goal, px."""
     ends = (problem.arm.forward_kinematics(problem.q_start), problem.T_world_goal)
     start, goal = (_image_margin_px(problem, T) for T in ends)
     return start, goal
@@ -307,7 +307,7 @@ def _image_margin_px(problem: PlanningProblem, T_world_camera: FloatArray) -> fl
 
 
 def _margin_kept(problem: PlanningProblem) -> float:
-    """Return the margin to the image border: the desired one, or less where the ends have less."""
+    """Return the margin to the image border: the desired one, or that of the ends if smaller."""
     return max(0.0, min(problem.margin_px, *(0.8 * m - 0.1 for m in _end_margins_px(problem))))
 
 
@@ -332,7 +332,7 @@ def _ends_refused(problem: PlanningProblem) -> PlanFailure | None:
 
 
 def _nearest_in_reach(problem: PlanningProblem) -> PlanningProblem | None:
-    """Return the problem with the pose in reach that is nearest to the goal, if that is likely."""
+    """Return the problem with the reachable pose nearest to the goal, if that pose is likely."""
     if problem.goal_deviation <= 0.0:
         return None
     q, missing = nearest_configuration(problem.arm, problem.T_world_goal, problem.q_start)
@@ -342,7 +342,7 @@ def _nearest_in_reach(problem: PlanningProblem) -> PlanningProblem | None:
 
 
 def _unreachable(problem: PlanningProblem) -> PlanFailure:
-    """Return whether collisions, limits or the arm's reach keep it from the goal."""
+    """Return whether collisions, limits or the arm's reach make the goal unreachable."""
     if problem.bodies is not None:
         touching = goal_configurations(problem.arm, problem.T_world_goal, problem.q_start, 1)
         if len(touching):

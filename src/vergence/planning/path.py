@@ -1,4 +1,4 @@
-"""A path: where joints, camera and image points go, without time."""
+"""A path of joints, camera and image points, without time."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -12,22 +12,22 @@ from vergence.planning.problem import PlanningProblem
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Waypoints close enough to each other for splines through them."""
+    """Waypoints that are dense enough for interpolating splines."""
 
     problem: PlanningProblem
     q: FloatArray  # (K, n) joint positions
     T_world_camera: FloatArray  # (K, 4, 4)
-    points_px: FloatArray  # (K, N, 2) where the camera sees the points
+    points_px: FloatArray  # (K, N, 2) image of the points
     depth_m: FloatArray  # (K, N) of the points along the optical axis
-    planner: str  # which planner found it
+    planner: str  # name of the planner that found it
 
     def __bool__(self) -> bool:
-        """A path is a success."""
+        """A path is true as a condition."""
         return True
 
     @classmethod
     def through(cls, problem: PlanningProblem, q: FloatArray, planner: str) -> Self:
-        """Make the path of given joint waypoints (K, n), images by the arm's kinematics."""
+        """Return the path through joint waypoints (K, n), with images from the arm's kinematics."""
         poses = np.array([problem.arm.forward_kinematics(waypoint) for waypoint in q])
         points = np.array([transform_points(se3_inverse(T), problem.points_world) for T in poses])
         pixels = np.array([problem.camera.project(seen) for seen in points])
@@ -43,7 +43,7 @@ class Path:
         depths: FloatArray,
         planner: str,
     ) -> Self:
-        """Make a path of waypoints whose images the planner already knows."""
+        """Return a path of waypoints whose images the planner already knows."""
         count = len(q)
         return cls(
             problem,
@@ -55,7 +55,7 @@ class Path:
         )
 
     def in_view(self, margin_px: float = 0.0) -> BoolArray:
-        """Return at which waypoints every point is in the image, (K,)."""
+        """Return at which waypoints all points are in the image, (K,)."""
         camera, count = self.problem.camera, self.points_px.shape[1]
         inside = camera.contains(self.points_px.reshape(-1, 2), margin_px).reshape(-1, count)
         return np.asarray((inside & (self.depth_m > 0)).all(axis=1))
@@ -68,12 +68,12 @@ class Path:
 
     @property
     def joints_normalized(self) -> FloatArray:
-        """Joint positions with their limits at -1 and 1, (K, n)."""
+        """Joint positions scaled so that the limits are -1 and 1, (K, n)."""
         return self.problem.arm.normalized(self.q)
 
     @property
     def joint_margin(self) -> float:
-        """Smallest distance to a joint limit, part of half the joint's range; negative beyond."""
+        """Smallest distance to a joint limit relative to half the range; negative beyond it."""
         return float(1.0 - np.abs(self.joints_normalized).max())
 
     @property

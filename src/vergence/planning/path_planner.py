@@ -1,4 +1,4 @@
-"""What a planner of a user's own must offer."""
+"""The protocol of path planners, including a user's own."""
 
 from typing import Protocol, runtime_checkable
 
@@ -9,11 +9,11 @@ from vergence.planning.problem import PlanningProblem
 
 @runtime_checkable
 class PathPlanner(Protocol):
-    """Finds where joints, camera and image points go."""
+    """Finds a path of joints, camera and image points."""
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
-        """Return a path from the start to the goal, or what stood in the way.
+        """Return a path from the start to the goal, or the constraint that prevents one.
 
-        The path begins at `problem.q_start`; `Path.through` makes one of joint waypoints.
+        The path begins at `problem.q_start`; `Path.through` makes a path from joint waypoints.
         """
         ...

@@ -1,4 +1,4 @@
-"""The planner of the paper, in front of its kernels."""
+"""The planner of [Mezouar2001], in front of its kernels."""
 
 from typing import Literal
 
@@ -17,8 +17,8 @@ from vergence.planning.problem import PlanningProblem
 class PotentialFieldPlanner:
     """Image and joint trajectories down a potential field; [Mezouar2001] sections 2 and 3.
 
-    The camera goes straight where nothing repels it. The walk is greedy: it can end in a local
-    minimum where a path exists, and says so; `OptimisedPlanner` finds more.
+    Without repulsion the camera moves in a straight line. The descent is greedy: it may end in a
+    local minimum although a path exists, and reports that; `OptimisedPlanner` finds more paths.
     """
 
     step: float = knob(0.02, above=0, upto=1)  # ε, step length in Υ
@@ -34,15 +34,15 @@ class PotentialFieldPlanner:
     joint_potential: Literal["smooth", "printed"] = knob("smooth")
 
     def plan(self, problem: PlanningProblem) -> Path | PlanFailure:
-        """Return a path that keeps every constraint, or what stood in the way.
+        """Return a path that satisfies every constraint, or the one that prevents it.
 
-        Both senses of rotation are tried, the shorter turn first.
+        Both directions of rotation are tried, the shorter one first.
         """
         arm, failures = problem.arm, []
         aside = ~((arm.q_min < 0.0) & (arm.q_max > 0.0))
         if self.joint_potential == "printed" and aside.any():
             joint = arm.names[int(np.argmax(aside))]
-            reason = f"V_rq as printed needs limits on both sides of 0, which {joint} has not"
+            reason = f"V_rq as printed needs limits on both sides of 0, which {joint} does not have"
             return PlanFailure(Obstacle.JOINT_LIMIT, reason)
         for long_way in (False, True):
             path, end = self._walk(problem, long_way)
@@ -53,7 +53,7 @@ class PotentialFieldPlanner:
         return failures[0]
 
     def walk(self, problem: PlanningProblem, long_way: bool = False) -> Path:
-        """Return the path as it comes, whatever it breaks; to show what the potentials are for."""
+        """Return the path even if it violates constraints, to show what the potentials do."""
         return self._walk(problem, long_way)[0]
 
     def _walk(self, problem: PlanningProblem, long_way: bool) -> tuple[Path, int]:
@@ -67,7 +67,7 @@ class PotentialFieldPlanner:
         return _as_path(problem, field, walked), walked.end
 
     def with_zones(self, problem: PlanningProblem, field: Field, q_goal: FloatArray) -> Field:
-        """Switch the potentials on, their zones no wider than the goal's own clearance."""
+        """Return the field with repulsion, its zones no wider than the goal's own clearance."""
         low, high = field.m_star.min(axis=0), field.m_star.max(axis=0)
         x_min, x_max, y_min, y_max = field.bounds
         clearance = np.array([low[0] - x_min, x_max - high[0], low[1] - y_min, y_max - high[1]])
@@ -102,7 +102,7 @@ class PotentialFieldPlanner:
 def make_field(
     planner: PotentialFieldPlanner, problem: PlanningProblem, long_way: bool = False
 ) -> tuple[Field, FloatArray]:
-    """Return the field a planner walks down, with Υ at the start; for those who time its kernel."""
+    """Return the field that a planner descends, with Υ at the start; used to time its kernel."""
     field, upsilon = _pose_free_field(problem, long_way)
     q = problem.q_start.copy()
     straight = descend(field, problem.arm.chain, upsilon, q, planner.step, planner.steps_max)

@@ -1,4 +1,4 @@
-"""What a planner is asked."""
+"""The input of a planner."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -18,20 +18,20 @@ from vergence.vision.two_view import TwoView
 
 @dataclass(frozen=True, slots=True)
 class PlanningProblem:
-    """Bring a camera from where it is to where it should see the points as desired."""
+    """Move a camera from its present pose to one where it sees the points as desired."""
 
     arm: Arm  # up to the camera
     camera: Camera
     q_start: FloatArray  # (n,)
     T_world_goal: FloatArray  # (4, 4) desired pose of the camera
-    points_world: FloatArray  # (N, 3) what must stay in view, m
+    points_world: FloatArray  # (N, 3) points that must stay in view, m
     margin_px: float = 10.0  # distance to keep from the border of the image
-    margin_joint: float = 0.01  # distance to keep from the joint limits, part of half the range
-    margin_face_deg: float = 1.0  # least angle between a line of sight and a face of the object
+    margin_joint: float = 0.01  # distance to keep from the joint limits, relative to half the range
+    margin_face_deg: float = 1.0  # smallest angle between a line of sight and a face of the object
     surface: FeatureFaces | None = None  # around the points, in the world; None if not known
-    # Standard deviation of the goal, m and rad together: what images leave open of it.
+    # Standard deviation of the goal, m and rad combined: its uncertainty from images.
     goal_deviation: float = 0.0
-    bodies: Clearance | None = None  # distances of what must not touch; None for nothing
+    bodies: Clearance | None = None  # distances of bodies that must not collide; None for no check
 
     def __post_init__(self) -> None:
         q = frozen(self.q_start, (self.arm.joint_count,), "q_start")
@@ -62,12 +62,12 @@ class PlanningProblem:
         """Take the goal and the object from two views, given d*.
 
         Args:
-            two_view: the reconstruction; matches that were dropped are left out.
-            distance: d*, of the desired camera from the reference plane, m. An estimate will do:
-                it cancels in the image path, joints and depths need it.
+            two_view: the reconstruction; rejected matches are left out.
+            distance: d*, of the desired camera from the reference plane, m. An estimate suffices:
+                it cancels in the image path; only joints and depths depend on it.
             arm: up to the camera.
-            camera: that took both views, the current one at q_start.
-            q_start: joint positions now, (n,).
+            camera: that took both images, the current one at q_start.
+            q_start: present joint positions, (n,).
             margin_px: see the fields.
             margin_joint: see the fields.
         """
@@ -88,15 +88,15 @@ class PlanningProblem:
         q_start: FloatArray,
         **further: Any,
     ) -> Self:
-        """Take the goal and the object from the poses of known features, now and as desired.
+        """Take the goal and the object from the present and desired poses of known features.
 
         Args:
             now: pose of the target in the camera at q_start.
-            goal: as it should be there.
+            goal: desired pose of the target in the camera.
             features: in the target's frame, (N, 3), m.
             arm: up to the camera.
             camera: its intrinsics.
-            q_start: joint positions now, (n,).
+            q_start: present joint positions, (n,).
             further: fields of the problem.
         """
         T_world_target = arm.forward_kinematics(q_start) @ now.T_world_target
@@ -123,24 +123,24 @@ class PlanningProblem:
 
     @property
     def depth_min(self) -> float:
-        """Least depth to keep, m: a fifth of the smaller one of start and goal."""
+        """Smallest depth to keep, m: a fifth of the smaller of those at start and goal."""
         T_camera_world = se3_inverse(self.arm.forward_kinematics(self.q_start))
         depths = transform_points(T_camera_world, self.points_world)[:, 2]
         return 0.2 * float(min(depths.min(), self.points_goal[:, 2].min()))
 
     @property
     def faces(self) -> FloatArray:
-        """The faces that show the points to start and goal, (F, 7), as `View` has them.
+        """The faces that are visible from start and goal, (F, 7), as in `View`.
 
-        Where an end sees one of them at less than twice the margin, half of that is kept. A flat
-        object of unknown surface has one, unless the start sees one side of it, and the goal the
-        other; other points have none unless their surface is known.
+        If an end sees one of them at less than twice the margin, half of that angle is kept. A flat
+        object of unknown surface has one face, unless start and goal see opposite sides; other
+        points have none unless their surface is known.
         """
         return self._kept(self._surface)
 
     @property
     def faces_needed(self) -> FloatArray:
-        """Those of the faces without which a point is not seen, (F, 7)."""
+        """Those of the faces without which a point is not visible, (F, 7)."""
         known = self._surface
         return self._kept(known.only(known.sole))
 
@@ -168,18 +168,18 @@ class PlanningProblem:
 
     @property
     def _eyes(self) -> FloatArray:
-        """Where the camera is at the start and at the goal, (2, 3)."""
+        """Positions of the camera at the start and at the goal, (2, 3)."""
         start = self.arm.forward_kinematics(self.q_start)
         return np.array([start[:3, 3], self.T_world_goal[:3, 3]])
 
     def view(self, margin_px: float | None = None) -> View:
-        """Return what the camera must see, with the problem's margin or another."""
+        """Return the view constraint, with the problem's margin or another."""
         margin = self.margin_px if margin_px is None else margin_px
         depth = max(self.depth_min, 1e-6)
         return make_view(self.camera, self.points_world, margin, depth, self.faces)
 
     def joint_range(self, q_goal: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return the joint limits less the margin; less of it where start or goal have less."""
+        """Return the joint limits less the margin, which is reduced if start or goal have less."""
         q_min, q_max = self.arm.q_min, self.arm.q_max
         span = np.where(np.isfinite(q_max - q_min), q_max - q_min, 0.0)
         margin = 0.5 * self.margin_joint * span
@@ -189,12 +189,12 @@ class PlanningProblem:
         return np.maximum(low, q_min), np.minimum(high, q_max)
 
     def clearance(self, q: FloatArray, margin_px: float | None = None) -> float:
-        """Return the sine of the least angle to a side of the view or to a face at q (n,)."""
+        """Return the sine of the smallest angle to a side of the view or to a face at q (n,)."""
         return float(clearance_at(self.arm.chain, np.asarray(q), self.view(margin_px)))
 
 
 def _worst_variance(covariance: FloatArray, lever: float) -> float:
-    """Return the largest variance of a pose (6, 6) for a point a lever away, and of its angle."""
+    """Return the largest variance of a pose (6, 6) for a point at a lever, and of its angle."""
     position, angle = (
         float(np.linalg.eigvalsh(covariance[k : k + 3, k : k + 3])[-1]) for k in (0, 3)
     )

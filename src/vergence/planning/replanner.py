@@ -1,4 +1,4 @@
-"""A path that is planned again from where the arm stalls."""
+"""A path that is replanned when the arm stalls."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -9,10 +9,10 @@ from vergence.planning.from_now import FromNow
 from vergence.planning.trajectory import Trajectory
 from vergence.signals import Reference
 
-# A path from the features (M, 2), px, and joints (n,) where the arm is; or why there is none.
+# A path from the features (M, 2), px, and joints (n,) at a stall, or why there is none.
 PlanFromHere = Callable[[FloatArray, FloatArray], Trajectory | str]
 
-MOST_PLANS = 3  # after the first, before a stall is how the run ends
+MOST_PLANS = 3  # after the first, before a stall ends the run
 
 
 class _References(Protocol):
@@ -20,12 +20,12 @@ class _References(Protocol):
 
 
 class Replanner:
-    """Hands out references, and those of another path once the arm has come to rest before its end.
+    """Returns the references of a path, and of another one after the arm stalls before its end.
 
     Args:
-        first: what to begin with: a path, or the goal itself.
+        first: initial references: a path, or the goal itself.
         plan: finds a path from where the arm stalled.
-        worker: does it, which may take longer than an image.
+        worker: runs it, since it may take longer than an image.
     """
 
     def __init__(self, first: _References, plan: PlanFromHere, worker: Worker) -> None:
@@ -36,12 +36,12 @@ class Replanner:
         self._told: list[tuple[float, str, str]] = []
 
     def begin_later(self) -> None:
-        """Let the first path begin with the first question rather than at time 0."""
+        """Let the first path begin at the first request rather than at time 0."""
         if isinstance(self._references, Trajectory):
             self._references = FromNow(self._references)
 
     def reference(self, time: float) -> Reference:
-        """Return what is desired at a time, s."""
+        """Return the reference at a time, s."""
         answer = self._worker.answer()
         if isinstance(answer, Trajectory):
             self._references = FromNow(answer)
@@ -54,12 +54,12 @@ class Replanner:
         return self._references.reference(time)
 
     def stalled(self, time: float, points_px: FloatArray, q: FloatArray) -> None:
-        """Plan again, if that was not done too often.
+        """Replan, unless that has been done too often.
 
         Args:
             time: s.
-            points_px: where the features are, (M, 2).
-            q: where the joints are, (n,).
+            points_px: positions of the features, (M, 2).
+            q: joint positions, (n,).
         """
         if self._plans >= MOST_PLANS or self._worker.busy:
             return
@@ -70,10 +70,10 @@ class Replanner:
 
     @property
     def added_s(self) -> float:
-        """Time that stalls and the paths planned after them take, s."""
+        """The time spent on stalls and the paths planned after them, s."""
         return self._added_s
 
     def events(self) -> list[tuple[float, str, str]]:
-        """Return what happened since the last call: time in s, name, and a sentence."""
+        """Return the events since the last call: time in s, name, and a sentence."""
         told, self._told = self._told, []
         return told

@@ -1,16 +1,16 @@
-"""Proof that some problems have no path, for arms that slide first and turn last.
+"""Proof that some problems have no path, for arms with prismatic joints first and a wrist last.
 
-On such an arm (a gantry with a wrist) the turning joints alone decide the camera's orientation, and
-for a given orientation the places of the camera that see all points form a convex cone, which the
-sliding joints reach or do not. The orientations that see at all are therefore known cell by cell of
-a grid over the turning joints. A path in joint space is a path through neighbouring cells; if start
-and goal lie in different islands of cells, there is no path, whatever a planner tries. The goal is
-every cell that may turn the camera as the goal does, so no branch of the inverse kinematics is
-forgotten.
+On such an arm (a gantry with a wrist) the revolute joints alone determine the camera's
+orientation. For a given orientation, the camera positions from which all points are visible form a
+convex cone, which the prismatic joints either reach or not. The orientations with a valid position
+are therefore known for every cell of a grid over the revolute joints. A path in joint space is a
+path through neighbouring cells; if start and goal lie in different connected components of cells,
+no path exists. The goal includes every cell that may orient the camera as the goal does, so no
+branch of the inverse kinematics is missed.
 
-The test of a cell is on the safe side: it asks for a place that sees the points from the cell's
-middle with every side of the view, and every sliding limit, eased by as much as the cell's half
-width can matter. Cells it rejects hold no valid configuration.
+The test of a cell is conservative: it looks for a position that sees the points from the cell's
+centre, with every side of the view and every prismatic limit relaxed by as much as the cell's
+half width can matter. Rejected cells contain no valid configuration.
 """
 
 import numpy as np
@@ -23,11 +23,11 @@ from vergence.robot import Arm, Chain, chain_state
 
 
 class Separation:
-    """Whether the start and everything that brings the camera to the goal are separated.
+    """Whether the start is separated from everything that brings the camera to the goal.
 
     Args:
-        problem: of an arm whose first three joints slide and whose others, three at most, turn;
-            of another arm, nothing but a goal behind a flat object is proved impossible.
+        problem: of an arm with three prismatic joints first and at most three revolute joints after
+            them; for other arms, only a goal behind a flat object is proved impossible.
         margin_px: to the border of the image.
     """
 
@@ -38,7 +38,7 @@ class Separation:
         if self._proved or not slides_then_turns(arm):
             return
         view = problem.view(margin_px)
-        # In front of the camera, and before faces that nothing replaces, is all that is asked.
+        # Only points in front of the camera, and faces that nothing replaces, are required.
         faces = problem.faces_needed
         faces[:, 6] = 0.0
         view = view._replace(offsets=np.zeros(5), faces=faces)
@@ -46,10 +46,10 @@ class Separation:
         self._turned = np.ones_like(self._grid.seen)
 
     def proves_no_path(self, cells_max: int) -> bool:
-        """Return whether there is no path, by a grid as fine as it takes; False means nothing.
+        """Return whether no path exists, refining the grid as needed; False proves nothing.
 
         Args:
-            cells_max: of the finest grid along each turning joint; finer proves more.
+            cells_max: of the finest grid along each revolute joint; finer grids prove more.
         """
         grid = self._grid
         while grid is not None and not self._proved:
@@ -63,9 +63,10 @@ class Separation:
         return self._proved
 
     def bars_wrist(self, goals: FloatArray) -> bool:
-        """Return whether no chain of cells of the finest grid yet leads to one of goals (G, n).
+        """Return whether no chain of cells of the finest grid so far leads to one of goals (G, n).
 
-        It is no proof, since a cell counts by its middle. No search of cells finds a way then.
+        This is not a proof, since a cell is judged by its centre; but no search of cells finds a
+        path then.
         """
         grid = self._grid
         if grid is None or not len(goals):
@@ -76,7 +77,7 @@ class Separation:
         return not len(shortest_way(seen, grid.shape, start, np.array(ends)))
 
     def _judge(self) -> None:
-        """See whether the start's island of cells holds one that is turned as the goal."""
+        """Check whether the start's connected cells include one with the goal's orientation."""
         grid, problem = self._grid, self._problem
         assert grid is not None
         grid.sharpen()
@@ -95,7 +96,7 @@ def proves_no_path(problem: PlanningProblem, cells_max: int = 128, margin_px: fl
 
 
 def slides_then_turns(arm: Arm) -> bool:
-    """Return whether three sliding joints at right angles come first, then one to three turning."""
+    """Return whether an arm has three orthogonal prismatic joints, then one to three revolute."""
     sliding = arm.sliding
     limited = np.isfinite(arm.q_max - arm.q_min).all()
     if len(sliding) < len(arm.chain.sliding):
@@ -115,10 +116,10 @@ def cells_turned_to(
     shape: IntArray,
     asked: BoolArray,
 ) -> BoolArray:
-    """Return which of the cells asked for may turn the camera to an orientation R (3, 3).
+    """Return which of the given cells may orient the camera by R (3, 3).
 
-    Somewhere in a cell the camera is turned from where it is in the middle by half the cell's
-    widths together, at most.
+    Anywhere in a cell, the orientation differs from the one at the centre by at most half the sum
+    of the cell's widths.
     """
     result = np.zeros(len(asked), np.bool_)
     most = np.cos(min(0.5 * width.sum(), np.pi))
@@ -133,7 +134,7 @@ def cells_turned_to(
 
 @njit(cache=True)
 def reaches(seen: BoolArray, shape: IntArray, start: int, ends: BoolArray) -> bool:
-    """Return whether a chain of seen cells, corners included, leads from one to one of the ends."""
+    """Return whether visible cells, corners included, connect one cell to one of the ends."""
     if not seen[start]:
         return False
     left, stack = seen.copy(), np.empty(np.sum(seen) + 1, np.int64)

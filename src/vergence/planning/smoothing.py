@@ -1,8 +1,8 @@
 """The optimiser's kernel: a joint-space spline under visibility and joint limits.
 
 Unknowns are the inner control points. The curve lies in the convex hull of its control points, so
-joint limits on these hold along all of it; the box is kept by projection. Visibility enters as
-squared hinges at many samples, with exact slopes, and a weight that grows until none is short.
+joint limits on these hold all along it; they are enforced by projection. Visibility enters as
+squared hinges at many samples, with exact gradients, and a weight that grows until none is active.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from vergence.robot import Chain
 
 
 class SplineProblem(NamedTuple):
-    """What the optimiser minimises."""
+    """The optimisation problem of a spline."""
 
     sight: View
     margin: float  # sine to keep from the sides of the view
@@ -70,7 +70,7 @@ def spline_gradient(
 
 @njit(cache=True)
 def spline_cost(chain: Chain, problem: SplineProblem, C: FloatArray, weight: float) -> float:
-    """Return the cost alone."""
+    """Return only the cost."""
     K, n = C.shape
     cost = 0.0
     for a in range(K):
@@ -121,9 +121,9 @@ def banded_solve(H: FloatArray, g: FloatArray, band: int) -> FloatArray:
 def spline_step(
     problem: SplineProblem, C: FloatArray, gradient: FloatArray, H: FloatArray, damping: float
 ) -> FloatArray:
-    """Return control points after one damped step inside the box; the ends do not move.
+    """Return control points after one damped step within the box; the ends do not move.
 
-    A control point at a limit that the gradient pushes outwards is held there.
+    A control point at a limit is held there if the gradient pushes it outwards.
     """
     K, n = C.shape
     A = H[n : (K - 1) * n, n : (K - 1) * n].copy()

@@ -11,7 +11,7 @@ class SplineBasis(NamedTuple):
     """Values and roughness of a spline with K control points at M samples."""
 
     values: FloatArray  # (M, K) samples = values @ control points; four entries a row
-    first: FloatArray  # (M, K) first derivative by the parameter
+    first: FloatArray  # (M, K) first derivative with respect to the parameter
     roughness: FloatArray  # (K, K) ∫ |q'|² + smoothing ∫ |q''|² as a quadratic form
 
 
@@ -40,7 +40,7 @@ def _gauss(spans: int) -> tuple[FloatArray, FloatArray]:
 
 
 def fit_controls(basis: SplineBasis, waypoints: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return control points (K, n) of the spline nearest to waypoints (P, n), ends exact.
+    """Return control points (K, n) of the spline closest to waypoints (P, n), exact at the ends.
 
     Args:
         basis: of the spline.

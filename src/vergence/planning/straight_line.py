@@ -1,4 +1,4 @@
-"""A straight motion of an arm's tip that keeps its orientation, in time."""
+"""A timed straight motion of an arm's tip that keeps its orientation."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
 
 _STEP_M = 4e-3  # between waypoints
 _FEWEST, _MOST = 9, 500  # waypoints
-_CLOSE = 1e-6  # m and rad, of a pose that is reached
-_JUMP = 0.25  # rad or m from one waypoint to the next, above which the line meets a singularity
+_CLOSE = 1e-6  # m and rad, error of a pose that counts as reached
+_JUMP = 0.25  # rad or m between two waypoints, above which the line passes a singularity
 _ITERATIONS = 40
 _AT_LIMIT = 1e-6  # rad or m
 
 
 @dataclass(frozen=True, slots=True)
 class StraightLine:
-    """Joints along a line from rest to rest; between waypoints a cubic spline over its length."""
+    """Joints along a line from rest to rest; a cubic spline over its length between waypoints."""
 
     T_goal: FloatArray  # (4, 4) of the tip in the world, at the end
     length_m: float
     law: TimeLaw
-    _joints: "CubicSpline"  # of (n,), over the share of the length
+    _joints: "CubicSpline"  # of (n,), over the fraction of the length
 
     @property
     def duration(self) -> float:
@@ -51,11 +51,11 @@ def straight_line(
     Args:
         arm: up to its tip.
         q: joint positions at the start, (n,).
-        shift_m: of the tip, along world axes, (3,).
-        speed_m_s: at most.
+        shift_m: displacement of the tip along world axes, (3,).
+        speed_m_s: largest speed of the tip.
 
     Returns:
-        The motion, or what prevents it and where on the line; obstacles are not considered.
+        The motion, or what prevents it and where on the line. Obstacles are not considered.
     """
     from scipy.interpolate import CubicSpline
 

@@ -1,4 +1,4 @@
-"""A path in time: what the law should reach, at any instant."""
+"""A timed path: the reference of the law at any time."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
@@ -13,12 +13,12 @@ from vergence.signals import Reference
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-MARGIN = 0.98  # of the limits: what lies between the places where they are checked
+MARGIN = 0.98  # of the limits, for what lies between the points where they are checked
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """C² splines of image points, depths and joints over one place σ, and σ's time law.
+    """C² splines of image points, depths and joints over a path parameter σ, with its time law.
 
     [Mezouar2001] section 4; the splines are cubic and interpolate the waypoints.
     """
@@ -28,7 +28,7 @@ class Trajectory:
     _image: "CubicSpline"  # of (N, 2) px
     _depth: "CubicSpline"  # of (N,) m
     _joints: "CubicSpline"  # of (n,)
-    desired_px: FloatArray | None = None  # (N, 2) after the end; what the path's end shows if None
+    desired_px: FloatArray | None = None  # (N, 2) after the end; that of the path's end if None
 
     @classmethod
     def of(
@@ -38,8 +38,8 @@ class Trajectory:
 
         Args:
             path: from a planner.
-            camera_speed: m/s; turning counts with the distance of the object as its lever.
-            desired_px: desired image after the end, (N, 2); what the end of the path shows if None.
+            camera_speed: m/s; rotation is weighted by the distance of the object.
+            desired_px: desired image after the end, (N, 2); that of the path's end if None.
         """
         from scipy.interpolate import CubicSpline
 
@@ -61,10 +61,10 @@ class Trajectory:
     def in_steps(cls, path: Path, period_s: float) -> Self:
         """Time a path as [Mezouar2001] section 4 does: t_k = kT, through a natural spline.
 
-        It starts and stops at once and knows no limits: the planner's step sets the speed.
+        It starts and stops abruptly and ignores limits: the planner's step determines the speed.
 
         Args:
-            path: from a planner with steps of one length.
+            path: from a planner, with steps of equal length.
             period_s: T, between two waypoints.
         """
         from scipy.interpolate import CubicSpline
@@ -108,7 +108,7 @@ class Trajectory:
 
 
 def _way(path: Path) -> float:
-    """Return the length of the camera's path, m, turning weighed with the object's distance."""
+    """Return the length of the camera's path, m, rotation weighted by the object's distance."""
     from vergence.geometry import se3_distance
 
     poses, lever = path.T_world_camera, float(path.depth_m.mean())
@@ -116,7 +116,7 @@ def _way(path: Path) -> float:
 
 
 def _at_least_four(path: Path) -> Path:
-    """Return a path with waypoints enough for a cubic spline; a goal at the start has but one."""
+    """Return a path with enough waypoints for a cubic spline, even if start and goal agree."""
     if len(path.q) >= 4:
         return path
     at = np.linspace(0, len(path.q) - 1, 4)

@@ -1,7 +1,7 @@
-"""A bidirectional tree in joint space, for starts where every smooth guess is stuck.
+"""A bidirectional tree in joint space, for starts from which no smooth guess succeeds.
 
-Few configurations see the object, so a sample or a step that does not is first pulled back into
-view along the exact slope of the visibility hinges; the tree grows along the visible set.
+Few configurations see the object, so a sample or a step that does not is first pulled into view
+along the exact gradient of the visibility hinges; the tree grows along the visible set.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from vergence.robot import Chain
 def pull_into_view(
     chain: Chain, q: FloatArray, view: View, margin: float, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, bool]:
-    """Return a configuration in view near q, inside the limits, and whether one was found."""
+    """Return a configuration in view near q, within the limits, and whether one was found."""
     n = len(q)
     for _ in range(15):
         if clearance_at(chain, q, view) > 0.0:
@@ -26,7 +26,7 @@ def pull_into_view(
         add_visibility_penalty(chain, q, view, margin, 1.0, g, H)
         for i in range(n):
             H[i, i] += 1e-3
-            if high[i] <= low[i]:  # a joint that is held
+            if high[i] <= low[i]:  # a joint that is locked
                 H[i, :], H[:, i], H[i, i], g[i] = 0.0, 0.0, 1.0, 0.0
         step = banded_solve(H, g, n)
         largest = np.abs(step).max()
@@ -76,10 +76,10 @@ def grow(
     target: FloatArray,
     step: float,
 ) -> tuple[int, bool]:
-    """Grow a tree towards a target for as long as that brings it closer.
+    """Grow a tree towards a configuration for as long as that brings it closer.
 
     Returns:
-        the new number of nodes, the last being the closest, and whether the target was reached.
+        The new number of nodes, of which the last is the closest, and whether it was reached.
     """
     at = nearest_node(nodes, count, target, scale)
     before = np.sqrt(np.sum(((nodes[at] - target) * scale) ** 2))
@@ -119,14 +119,14 @@ def connect_trees(
 
     Args:
         chain: the arm up to the camera.
-        view: what must be seen.
+        view: what must be visible.
         margin: sine that a pulled configuration keeps from the sides of the view.
         low: joint limits, (n,).
         high: joint limits, (n,).
         scale: weight of each joint in distances, (n,).
         start: in view, (n,).
         goals: in view, (G, n).
-        samples: configurations to grow towards, (S, n); they decide the answer.
+        samples: configurations to grow towards, (S, n); they determine the result.
         step: longest edge, in scaled units.
     """
     n, most = len(start), 4 * len(samples) + 50
@@ -163,7 +163,7 @@ def connect_trees(
 
 @njit(cache=True)
 def _joined(nodes: FloatArray, parents: IntArray, ends: IntArray) -> FloatArray:
-    """Return the waypoints from the start's root over both ends to the goal's root."""
+    """Return the waypoints from the start's root through both ends to the goal's root."""
     lengths = np.zeros(2, np.int64)
     for side in range(2):
         k = ends[side]
@@ -186,14 +186,14 @@ def _joined(nodes: FloatArray, parents: IntArray, ends: IntArray) -> FloatArray:
 def shorten(
     chain: Chain, view: View, scale: FloatArray, path: FloatArray, draws: FloatArray
 ) -> FloatArray:
-    """Cut corners off waypoints (P, n): straight edges between random places that stay in view.
+    """Shorten waypoints (P, n) by straight edges between random positions that stay in view.
 
     Args:
         chain: the arm up to the camera.
-        view: what must be seen.
+        view: what must be visible.
         scale: weight of each joint in distances, (n,).
         path: waypoints.
-        draws: numbers in [0, 1), (D, 2), that pick the places.
+        draws: random numbers in [0, 1), (D, 2), that select the positions.
     """
     for d in range(len(draws)):
         count = len(path)

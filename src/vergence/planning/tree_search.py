@@ -1,4 +1,4 @@
-"""Trees from the start and from the goals, for a problem whose margins are given up bit by bit."""
+"""Trees from the start and from the goals, for a problem whose margins are reduced step by step."""
 
 from functools import cached_property
 
@@ -15,14 +15,14 @@ _STEP = 0.15  # longest edge, s at full speed
 class TreeSearch:
     """Searches one problem at several margins to the border of the image.
 
-    A search that fails takes all of its samples. Where trees do not meet in the whole image they
-    do not within margins either, so that is tried first, once.
+    A failing search uses up all its samples. Trees that do not meet in the whole image do not meet
+    within margins either, so that is tried first, once.
 
     Args:
-        problem: whose arm, start and ranges are searched.
+        problem: with arm, start and ranges.
         goals: goal configurations, (G, n).
         clearance: sine that a sampled posture keeps from the sides of the view.
-        samples: how many, before the trees give up; 0 for no search.
+        samples: number of samples before the trees give up; 0 for no search.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class TreeSearch:
         self._clearance, self._count = clearance, samples
 
     def waypoints(self, margin_px: float) -> FloatArray:
-        """Return waypoints (P, n) from the start to one of the goals; none if (0, n).
+        """Return waypoints (P, n) from the start to one of the goals; (0, n) if there are none.
 
         Args:
             margin_px: to the border of the image.

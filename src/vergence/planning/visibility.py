@@ -1,7 +1,7 @@
-"""What keeps points in a camera's view, as kernels: half-spaces and their slopes.
+"""Constraints that keep points in a camera's view, as kernels: half-spaces and their gradients.
 
-Five half-spaces of the camera hold the points that it sees; one of each face of the object, in the
-world, holds the cameras that see its front.
+Five half-spaces in the camera frame contain the visible points; one per face of the object, in the
+world frame, contains the camera positions that see its front.
 """
 
 from typing import NamedTuple
@@ -16,20 +16,20 @@ from vergence.robot import Chain, chain_state, world_jacobian
 
 
 class View(NamedTuple):
-    """The space a camera sees, and the points that must stay in it.
+    """The space that a camera sees, and the points that must stay in it.
 
-    A point X of the camera frame is seen where h_k = (a_k·X - b_k)/‖X‖ > 0 for every k. For the
-    four sides, through the focal point, h is the sine of the angle to the side; it stays smooth
-    where the pixel coordinates blow up and change sign. The fifth keeps a least depth.
+    A point X in the camera frame is visible if h_k = (a_k·X - b_k)/‖X‖ > 0 for every k. For the
+    four sides, through the focal point, h is the sine of the angle to the side; it remains smooth
+    where pixel coordinates diverge and change sign. The fifth keeps a smallest depth.
 
-    A face with the point c and the outward normal o is seen from p where o·(p - c)/‖p - c‖, the
-    sine of the angle at which it is seen, is larger than a least sine.
+    A face with the point c and the outward normal o is visible from p if o·(p - c)/‖p - c‖, the
+    sine of the angle at which it is seen, exceeds a threshold.
     """
 
     normals: FloatArray  # (5, 3) a_k, unit
     offsets: FloatArray  # (5,) b_k, m
     points_world: FloatArray  # (N, 3) m
-    faces: FloatArray  # (F, 7) c in m, o, and the least sine
+    faces: FloatArray  # (F, 7) c in m, o, and the smallest sine
 
 
 NO_FACES = np.empty((0, 7))
@@ -42,7 +42,7 @@ def make_view(
     depth_min: float,
     faces: FloatArray = NO_FACES,
 ) -> View:
-    """Return the view of a camera that keeps a margin in pixels and a least depth in metres."""
+    """Return the view of a camera that keeps a margin in pixels and a smallest depth in metres."""
     x_min, x_max, y_min, y_max = camera.rectangle(margin_px)
     sides = np.array([[1, 0, -x_min], [-1, 0, x_max], [0, 1, -y_min], [0, -1, y_max], [0, 0, 1.0]])
     return View(
@@ -73,7 +73,7 @@ def view_clearances(R: FloatArray, p: FloatArray, view: View) -> FloatArray:
 
 @njit(cache=True)
 def face_clearances(p: FloatArray, faces: FloatArray) -> FloatArray:
-    """Return the sine at which each face is seen from p (3,), less its least one, (F,)."""
+    """Return the sine at which each face is seen from p (3,), minus its smallest one, (F,)."""
     h: FloatArray = face_sines(p, faces) - faces[:, 6]
     return h
 
@@ -150,7 +150,7 @@ def _add_face_penalty(
     gradient: FloatArray,
     hessian: FloatArray,
 ) -> float:
-    """Return the penalty of the faces, likewise: with d = p - c, ∂h/∂p = (o - (o·d̂) d̂)/‖d‖."""
+    """Return the penalty of the faces: with d = p - c, ∂h/∂p = (o - (o·d̂) d̂)/‖d‖."""
     n, cost = len(gradient), 0.0
     slope, d = np.empty(n), np.empty(3)
     for f in range(len(faces)):

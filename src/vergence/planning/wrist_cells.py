@@ -1,4 +1,4 @@
-"""Cells of a grid over the turning joints of an arm that slides first: what is seen from them."""
+"""Visibility in the cells of a grid over the revolute joints of a gantry with a wrist."""
 
 import numpy as np
 from numba import njit, prange
@@ -8,21 +8,21 @@ from vergence.planning.halfspaces import halfspaces_meet
 from vergence.planning.visibility import View
 from vergence.robot import Chain, chain_state, world_jacobian
 
-COARSE = 32  # cells along each joint, that a finer grid begins with
+COARSE = 32  # cells along each joint with which a finer grid begins
 
 
 class WristCells:
     """Which cells of a grid see all points, as it is refined.
 
-    What is known of a cell is known of all its parts, so a finer grid is asked only at the border
-    of what is seen.
+    A known result for a cell holds for all its parts, so a finer grid is evaluated only at the
+    border of the visible set.
 
     Args:
-        chain: of an arm whose first three joints slide and whose others, three at most, turn.
-        view: what must be seen.
-        low: limits of all joints, (n,).
-        high: likewise.
-        cells: along each turning joint, to begin with.
+        chain: of an arm with three prismatic joints first and at most three revolute joints last.
+        view: what must be visible.
+        low: lower limits of all joints, (n,).
+        high: upper limits of all joints, (n,).
+        cells: initial number along each revolute joint.
     """
 
     def __init__(
@@ -30,22 +30,22 @@ class WristCells:
     ) -> None:
         self.cells = cells
         self._chain, self._view, self._low, self._high = chain, view, low, high
-        self.seen = np.ones((cells,) * (len(low) - 3), dtype=np.bool_)  # may be
+        self.seen = np.ones((cells,) * (len(low) - 3), dtype=np.bool_)  # these may see all
         self._sure = np.zeros_like(self.seen)
 
     @property
     def shape(self) -> IntArray:
-        """Cells along each turning joint, (W,)."""
+        """Cells along each revolute joint, (W,)."""
         return np.array(self.seen.shape)
 
     @property
     def width(self) -> FloatArray:
-        """Width of a cell along each turning joint, (W,), rad."""
+        """Width of a cell along each revolute joint, (W,), rad."""
         width: FloatArray = (self._high[3:] - self._low[3:]) / self.cells
         return width
 
     def sharpen(self) -> None:
-        """Drop the cells that hold no configuration that sees all points."""
+        """Remove the cells without a configuration that sees all points."""
         self.seen = self._see(1.0)
 
     def split(self) -> None:
@@ -55,11 +55,11 @@ class WristCells:
         self.cells *= 2
 
     def middles(self) -> BoolArray:
-        """Return which cells see all points from their middle."""
+        """Return which cells see all points from their centre."""
         return self._see(0.0)
 
     def of(self, q: FloatArray) -> int:
-        """Return the number of the cell that holds joint positions (n,)."""
+        """Return the index of the cell that contains joint positions (n,)."""
         at = np.clip(((q - self._low)[3:] / self.width).astype(np.int64), 0, self.cells - 1)
         return int(np.ravel_multi_index(tuple(at), self.seen.shape))
 
@@ -73,14 +73,14 @@ class WristCells:
 
 
 def in_halves(cells: BoolArray) -> BoolArray:
-    """Return what holds of the cells of a grid for one with twice as many along each axis."""
+    """Return the values of a grid's cells for a grid with twice as many along each axis."""
     for axis in range(cells.ndim):
         cells = np.repeat(cells, 2, axis=axis)
     return cells
 
 
 def coarsest(cells: int) -> int:
-    """Return the coarsest grid that becomes one of so many cells by halving, 32 at least."""
+    """Return the coarsest grid that reaches this number of cells by halving, 32 at least."""
     while cells % 2 == 0 and cells > COARSE:
         cells //= 2
     return cells
@@ -98,10 +98,10 @@ def visible_cells(
     asked: BoolArray,
     ease: float,
 ) -> BoolArray:
-    """Return which of the cells asked for see all points.
+    """Return which of the given cells see all points.
 
-    With ease 1 those that may hold a configuration that does, with 0 those whose middle does; with
-    -1 those all of which does.
+    With ease 1, those that may contain such a configuration; with 0, those whose centre is one;
+    with -1, those that consist of such configurations only.
     """
     result = np.zeros(len(asked), np.bool_)
     middle, half = 0.5 * (q_min + q_max), ease * 0.5 * width
@@ -119,7 +119,7 @@ def visible_cells(
 def set_wrist(
     q: FloatArray, cell: int, low: FloatArray, width: FloatArray, shape: IntArray
 ) -> None:
-    """Put the turning joints of q, in place, in the middle of a cell."""
+    """Set the revolute joints of q, in place, to the centre of a cell."""
     for i in range(len(shape) - 1, -1, -1):
         q[3 + i] = low[i] + (cell % shape[i] + 0.5) * width[i]
         cell //= shape[i]
@@ -134,23 +134,22 @@ def cell_sees(
     q_max: FloatArray,
     half: FloatArray,
 ) -> bool:
-    """Return whether the camera may see all points from somewhere, the wrist within q[3:] ± half.
+    """Return whether the camera may see all points, the wrist within q[3:] ± half.
 
-    Y is a point seen from the turned camera, a the normal of a side of the view, z the optical
-    axis, both as they are at q. Turning joint i by δ_i changes a·Y by δ_i (ω_i × a)·Y and moves the
-    camera by δ_i J_i; what is left is of second order, at most τ²/2 ‖Y‖ and τ²/2 · lever with
-    τ = Σ half_i. Y lies in the cone of view, turned by at most τ, where
-    |(ω_i × a)·Y| ≤ c_i z·Y. So whatever is seen from the cell obeys, at q itself, with
-    side = a + (Σ half_i c_i + τ²/2 ‖y‖) z,
+    Y is a point seen from the rotated camera, a the normal of a side of the view, z the optical
+    axis, both at q. Rotating joint i by δ_i changes a·Y by δ_i (ω_i × a)·Y and moves the camera by
+    δ_i J_i; the remainder is of second order, at most τ²/2 ‖Y‖ and τ²/2 · lever with τ = Σ half_i.
+    Y lies in the cone of view, rotated by at most τ, where |(ω_i × a)·Y| ≤ c_i z·Y. So whatever is
+    visible from the cell satisfies, at q itself, with side = a + (Σ half_i c_i + τ²/2 ‖y‖) z,
 
         side·X ≥ -Σ half_i |side·J_i| - τ²/2 · lever ‖side‖.
 
-    A face is seen where o·(p(x) - c) ≥ 0; turning moves the camera by Σ δ_i J_i, and by at most
-    τ²/2 · lever more. These sides, the faces and the box of the sliding joints are half-spaces
-    g·x ≥ h of the sliding joints' positions x; whether they meet is decided by `halfspaces_meet`.
+    A face is visible if o·(p(x) - c) ≥ 0; rotation moves the camera by Σ δ_i J_i, and by at most
+    τ²/2 · lever more. These sides, the faces and the limits of the prismatic joints are half-spaces
+    g·x ≥ h of the prismatic joints' positions x; `halfspaces_meet` decides whether they meet.
 
-    With half negative it is the reverse: whatever obeys the half-spaces, tightened by as much, is
-    seen from all of the cell.
+    With negative half the converse holds: whatever satisfies the half-spaces, tightened by as much,
+    is visible from all of the cell.
     """
     state = chain_state(chain, q)
     J = world_jacobian(chain, state, len(q))
@@ -158,7 +157,7 @@ def cell_sees(
     G, h, side = np.zeros((count, 3)), np.empty(count), np.empty(3)
     turn = half.sum()
     corner = _turned_corner(view, abs(turn))
-    if np.isinf(corner[0]):  # the cell is too wide to say anything
+    if np.isinf(corner[0]):  # the cell is too wide for any conclusion
         return bool(turn > 0.0)
     second, lever = 0.5 * turn * abs(turn), _lever(chain)
     axes = np.empty((len(half), 3))  # of the wrist, in the camera's frame
@@ -205,9 +204,9 @@ def cell_sees(
 
 @njit(cache=True, error_model="numpy")
 def _turned_corner(view: View, turn: float) -> tuple[float, float]:
-    """Return the largest |x/z| and |y/z| of what is in view of a camera turned by at most `turn`.
+    """Return the largest |x/z| and |y/z| in view of a camera rotated by at most `turn`.
 
-    Turning y = (x/z, y/z, 1) moves it by at most turn ‖y‖.
+    Rotation moves y = (x/z, y/z, 1) by at most turn ‖y‖.
     """
     x = max(
         abs(view.normals[0, 2] / view.normals[0, 0]), abs(view.normals[1, 2] / view.normals[1, 0])
@@ -233,7 +232,7 @@ def _most_turned(axis: FloatArray, a: FloatArray, corner: tuple[float, float]) -
 
 @njit(cache=True, error_model="numpy")
 def _lever(chain: Chain) -> float:
-    """Return the sum of the wrist's link lengths: how far the camera can be from a wrist axis."""
+    """Return the sum of the wrist's link lengths: the largest distance of camera and wrist axis."""
     total = 0.0
     for i in range(4, len(chain.position)):
         total += np.sqrt(_dot(chain.position[i], chain.position[i]))
@@ -248,7 +247,7 @@ def _dot(a: FloatArray, b: FloatArray) -> float:
 
 @njit(cache=True)
 def shortest_way(seen: BoolArray, shape: IntArray, start: int, goals: IntArray) -> IntArray:
-    """Return the cells from start to the first goal met, through seen neighbours, breadth first."""
+    """Return the cells from start to the first goal, through visible neighbours, breadth first."""
     axes, count = len(shape), np.sum(seen)
     before = np.full(len(seen), -1, np.int64)
     queue, at = np.empty(count + 1, np.int64), np.empty(axes, np.int64)

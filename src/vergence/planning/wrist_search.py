@@ -1,8 +1,8 @@
-"""A search for arms that slide first and turn last: breadth first over the wrist, cell by cell.
+"""A breadth-first search over wrist cells, for arms with prismatic joints first and a wrist last.
 
-For one orientation the camera's places that see all points form a convex set, so a path through
-neighbouring orientations that see is a path of the arm; see `separation`. What is found is a guess
-for the optimiser: orientations cell by cell, the sliding joints pulled along into view.
+For one orientation, the camera positions that see all points form a convex set, so a path through
+neighbouring visible orientations is a path of the arm; see `separation`. The result is a guess for
+the optimiser: orientations cell by cell, with the prismatic joints moved along into view.
 """
 
 import numpy as np
@@ -18,13 +18,13 @@ from vergence.planning.wrist_cells import WristCells, coarsest, shortest_way
 def wrist_path(
     problem: PlanningProblem, view: View, goals: FloatArray, cells: int = 64
 ) -> FloatArray:
-    """Return joint waypoints (P, n) from the start to a goal, (0, n) where none is found.
+    """Return joint waypoints (P, n) from the start to a goal, (0, n) if none is found.
 
     Args:
-        problem: any; only arms that slide first are searched.
-        view: what must be seen.
+        problem: any; only arms with three prismatic joints first are searched.
+        view: what must be visible.
         goals: goal configurations, (G, n).
-        cells: along each turning joint; more find narrower ways.
+        cells: number along each revolute joint; more cells find narrower passages.
     """
     arm = problem.arm
     none = np.empty((0, arm.joint_count))
@@ -48,7 +48,7 @@ def wrist_path(
 
 
 def _evened(wrist: FloatArray) -> FloatArray:
-    """Return waypoints without the stairs of the grid: a moving mean, the ends held."""
+    """Return waypoints smoothed by a moving mean, which removes the grid's stairs; fixed ends."""
     padded = np.pad(wrist, ((2, 2), (0, 0)), mode="edge")
     return np.asarray(sum(padded[k : k + len(wrist)] for k in range(5)) / 5)
 
@@ -56,7 +56,7 @@ def _evened(wrist: FloatArray) -> FloatArray:
 def _carried(
     problem: PlanningProblem, view: View, wrist: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return waypoints (P, n): wrists in order, the sliding joints pulled along into view."""
+    """Return waypoints (P, n): wrists in order, the prismatic joints moved along into view."""
     low, high = problem.joint_range(goal)
     q, result = problem.q_start.copy(), [problem.q_start]
     for turned in wrist[1:-1]:

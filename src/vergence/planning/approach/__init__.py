@@ -1,4 +1,4 @@
-"""The way to a photograph: recognise it, plan, follow the plan, look again, arrive."""
+"""Approaching a photograph: recognise it, plan a path, follow it, re-check, arrive."""
 
 from vergence.planning.approach.approach import Approach
 from vergence.planning.approach.goal import ApproachSettings, GoalImage, KnownLength

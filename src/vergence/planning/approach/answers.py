@@ -1,4 +1,4 @@
-"""What comes of a job, and what is told of it."""
+"""Results of planning jobs, and the events that are reported."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from vergence.vision.tracks import Tracks
 
 
 class Told(NamedTuple):
-    """Something that happened on the way."""
+    """An event during the approach."""
 
     time: float  # s
     name: str
@@ -21,21 +21,21 @@ class Told(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What came of a job."""
+    """The result of a job."""
 
     recognition: Recognition | TwoViewFailure
-    path: Path | PlanFailure | None  # None if the plan holds
-    new_points: bool  # whether other points are to be followed
+    path: Path | PlanFailure | None  # None if the present plan remains valid
+    new_points: bool  # whether other points are to be tracked
 
 
 class Arrived(NamedTuple):
-    """What a last comparison says of a camera that seems to be at its goal."""
+    """The result of the final comparison, for a camera that seems to be at its goal."""
 
     confirmation: Confirmation
-    reason: str  # the state reached, in words
+    reason: str  # the state reached, as text
 
     def outcome(self, time: float) -> Outcome:
-        """Return the end of the run."""
+        """Return the outcome of the run."""
         found = self.confirmation
         if found.holds:
             return Outcome(OutcomeKind.REACHED, self.reason, time)
@@ -48,7 +48,7 @@ class Arrived(NamedTuple):
 
 
 def view_of(frame: Frame, tracks: Tracks) -> ImagePoints:
-    """Return tracked points as perception hands them on."""
+    """Return tracked points in the form that perception delivers."""
     return ImagePoints(
         frame.camera,
         frame.time,
@@ -61,5 +61,5 @@ def view_of(frame: Frame, tracks: Tracks) -> ImagePoints:
 
 
 def in_words(distance_m: float, angle_rad: float) -> str:
-    """Return a distance and an angle in words."""
+    """Return a distance and an angle as text."""
     return f"{1e3 * distance_m:.2f} mm and {np.rad2deg(angle_rad):.2f}°"

@@ -1,4 +1,4 @@
-"""The images that tell the scale: those taken from elsewhere than the ones before."""
+"""The images that determine the scale: those taken from new camera poses."""
 
 import numpy as np
 
@@ -8,18 +8,18 @@ from vergence.planning.approach.goal import GoalImage
 from vergence.planning.approach.recognition import Recognition, tracked_image
 from vergence.vision.tracks import Tracks
 
-_PARALLAX = 0.03  # of the object's distance, or rad, that the camera moves between two images kept
+_PARALLAX = 0.03  # relative to the object's distance, or rad: camera motion between two kept images
 _MOST_IMAGES = 20
 
 
 def with_tracks(known: Recognition, goal: GoalImage, T: FloatArray, tracks: Tracks) -> Recognition:
-    """Return what is known with an image's points as well, if it was taken from elsewhere.
+    """Return the recognition with the points of another image, if its camera pose is new.
 
     Args:
-        known: before it.
+        known: the recognition before it.
         goal: the photograph.
         T: T_world_camera of the image, (4, 4).
-        tracks: the points followed into it.
+        tracks: the points tracked into it.
     """
     distance = float(np.median(points_in(T, known.fit.points_world)[:, 2]))
     moves = (pose_difference(T, image.T_world_camera) for image in known.images)

@@ -1,27 +1,27 @@
-"""How deep points of the photograph are, as the camera's own motion before its goal tells."""
+"""Depths of the photograph's points, from the camera's own motion near its goal."""
 
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.geometry import transform_points
 
-_APART = 0.004  # of the points' distance, that the camera moves between two images that count
+_APART = 0.004  # relative to the points' distance: camera motion between two images that count
 _MOST_IMAGES = 24
-_ASIDE = 0.02  # deviation across the photograph's rays, a share of the distance: the goal's pose
-_RANGE = 2.0  # a depth is at most so many times the one believed before, and as little of it
+_ASIDE = 0.02  # deviation of the goal's pose across the photograph's rays, relative to the distance
+_RANGE = 2.0  # largest ratio of a depth to the prior one, in either direction
 
 
 class PointDepths:
-    """Depths of points, all alike until images from several places distinguish them.
+    """Depths of points, all equal until images from several poses distinguish them.
 
-    A point lies where its rays meet: Σ w (I - d dᵀ) X = Σ w (I - d dᵀ) c, over the images' centres
-    c and directions d, and the assumed depth as one more measurement.
+    A point is the intersection of its rays: Σ w (I - d dᵀ) X = Σ w (I - d dᵀ) c, over the images'
+    centres c and directions d, with the prior depth as an additional measurement.
 
     Args:
         points: of the photograph, normalized coordinates, (K, 2).
-        T_world_goal: where it was taken, about, (4, 4).
-        depth_m: believed of all points.
-        share: standard deviation of that, a share of it.
+        T_world_goal: approximate pose of its camera, (4, 4).
+        depth_m: prior depth of all points.
+        share: relative standard deviation of the prior depth.
     """
 
     def __init__(
@@ -43,13 +43,13 @@ class PointDepths:
         deviation: FloatArray,
         found: BoolArray,
     ) -> None:
-        """Take in an image if the camera is elsewhere than in those before.
+        """Add an image if the camera pose differs from those before.
 
         Args:
-            T_world_camera: where it was taken, (4, 4).
-            points: as it shows them, normalized coordinates, (K, 2).
-            deviation: standard, of these, (K,).
-            found: which it shows, (K,).
+            T_world_camera: pose of the camera that took it, (4, 4).
+            points: measured in it, normalized coordinates, (K, 2).
+            deviation: standard deviation of these, (K,).
+            found: which points were found, (K,).
         """
         c, least = T_world_camera[:3, 3], _APART * self._distance
         if len(self._centres) >= _MOST_IMAGES:
@@ -64,7 +64,7 @@ class PointDepths:
         self._b[found] += across @ c
 
     def at_goal(self) -> tuple[FloatArray, FloatArray]:
-        """Return depths in the photograph, (K,) m, and their deviations, shares of them, (K,)."""
+        """Return depths in the photograph, (K,) m, and their relative deviations, (K,)."""
         X = np.linalg.solve(self._A, self._b[:, :, None])[:, :, 0]
         axis = self._T_world_goal[:3, 2]
         variance = np.einsum("i,kij,j->k", axis, np.linalg.inv(self._A), axis)
@@ -77,7 +77,7 @@ class PointDepths:
 
 
 def _across(directions: FloatArray) -> FloatArray:
-    """Return what is left of a vector without its part along each direction (K, 3), (K, 3, 3)."""
+    """Return the projections orthogonal to directions (K, 3), (K, 3, 3)."""
     d = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     across: FloatArray = np.eye(3) - d[:, :, None] * d[:, None, :]
     return across

@@ -1,24 +1,24 @@
-"""Which of the recognised points are followed, and how deep those between them are."""
+"""Selects the recognised points to track, and interpolates depths between them."""
 
 import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.camera import Camera
 
-_BORDER_PX = 24.0  # the tracker's templates need as much
-_NEAREST = 4  # known points that tell the depth of one between them
+_BORDER_PX = 24.0  # margin that the tracker's templates need
+_NEAREST = 4  # known points from which the depth of a point is interpolated
 
 
 def choose_points(
     points_px: FloatArray, points_star_px: FloatArray, camera: Camera, count: int
 ) -> IntArray:
-    """Return the indices of matches that are spread most, each next farthest from those before.
+    """Return the indices of well-spread matches, each the farthest from those before.
 
     Args:
         points_px: in the current image, (N, 2).
         points_star_px: in the desired image, (N, 2).
         camera: that took both.
-        count: how many at most.
+        count: largest number of indices.
     """
     inside = camera.contains(points_px, _BORDER_PX) & camera.contains(points_star_px, _BORDER_PX)
     candidates = np.flatnonzero(inside)
@@ -36,14 +36,14 @@ def choose_points(
 def depth_between(
     points: FloatArray, known_points: FloatArray, known_depth_m: FloatArray
 ) -> FloatArray:
-    """Return the depth of points (N, 2) between known ones, (N,), m.
+    """Return the depth of points (N, 2) interpolated between known ones, (N,), m.
 
     Inverse depth is linear in the image of a plane; it is averaged over the nearest known points.
 
     Args:
         points: pixels or normalized coordinates.
-        known_points: likewise, (K, 2).
-        known_depth_m: of these, (K,).
+        known_points: in the same coordinates, (K, 2).
+        known_depth_m: their depths, (K,).
     """
     A = np.column_stack((known_points, np.ones(len(known_points))))
     inverse = 1.0 / known_depth_m

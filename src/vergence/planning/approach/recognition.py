@@ -1,4 +1,4 @@
-"""What an image of the arm and the photograph have in common, in metres."""
+"""The match between an image of the arm's camera and the photograph, in metres."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -22,31 +22,31 @@ from vergence.vision.matching import compare_images
 from vergence.vision.matching.compare import NOISE_PX, Compared
 from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem
 
-ROUGH_M = 0.3  # distance of the object if nothing is known: rather too near, for short first moves
-UNKNOWN, ROUGH, KNOWN = 0.7, 0.3, 0.05  # deviations of its logarithm
-FEWEST = 8  # points to follow
+ROUGH_M = 0.3  # assumed distance if unknown: rather too small, so that first moves are short
+UNKNOWN, ROUGH, KNOWN = 0.7, 0.3, 0.05  # standard deviations of its logarithm
+FEWEST = 8  # number of points to track
 IN_PLACE_PX = 3.0
-MOST = 0.7  # share of the points recognised that have to be in their places
-_RIVAL = 13.8  # by how much χ² of a second motion must be larger: odds of one to a thousand
-_TRACK_PX = 0.15  # what a tracked point may be off beside its stated deviation
+MOST = 0.7  # fraction of the recognised points that must be in place
+_RIVAL = 13.8  # difference of χ² that excludes a second motion: odds of one to a thousand
+_TRACK_PX = 0.15  # error of a tracked point in addition to its stated deviation
 
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """Points of the photograph that are followed, and where it may have been taken."""
+    """The tracked points of the photograph, and candidates for where it was taken."""
 
-    image: ImageArray  # the arm's
+    image: ImageArray  # of the arm's camera
     points_px: FloatArray  # (M, 2) in it
     star_px: FloatArray  # (M, 2) in the photograph
     goal: ArmImage  # the photograph
-    images: tuple[ArmImage, ...]  # the arm's so far, that image first
-    fits: tuple[GoalFit, ...]  # where it was taken, the likeliest first; never empty
+    images: tuple[ArmImage, ...]  # of the arm's camera so far, `image` first
+    fits: tuple[GoalFit, ...]  # where it was taken, the most likely first; never empty
     prior: Prior
     recognised_px: FloatArray  # (N, 2) all points of the photograph that were recognised
 
     @property
     def fit(self) -> GoalFit:
-        """The likeliest."""
+        """The most likely fit."""
         return self.fits[0]
 
     @property
@@ -55,11 +55,11 @@ class Recognition:
         return len(self.fits) == 1
 
     def with_image(self, image: ArmImage) -> "Recognition":
-        """Return this with one more image of the same points; nothing is fitted again."""
+        """Return a copy with one more image of the same points, without a new fit."""
         return replace(self, images=(*self.images, image))
 
     def fitted(self) -> "Recognition":
-        """Return this with the poses fitted to all images, without those that are refuted."""
+        """Return a copy with the poses fitted to all images, without those that are refuted."""
         again = (
             fit_goal(
                 GoalGuess(fit.T_world_goal, fit.points_world), self.goal, self.images, self.prior
@@ -71,7 +71,7 @@ class Recognition:
 
     @property
     def depth_deviation(self) -> float:
-        """Deviation of the scale: of the goal's place along its way, relative to that."""
+        """Relative deviation of the scale: of the distance to the goal."""
         T, first = self.fit.T_world_goal, self.images[0].T_world_camera
         shift = T[:3, 3] - first[:3, 3]
         length = float(np.linalg.norm(shift))
@@ -89,16 +89,16 @@ def recognise(
     prior: Prior,
     known: GoalFit | None = None,
 ) -> Recognition | TwoViewFailure:
-    """Recognise the photograph in an image of the arm.
+    """Recognise the photograph in an image of the arm's camera.
 
     Args:
         goal: the photograph.
         image: grey, (height, width).
         T_world_camera: pose of the camera that took it, (4, 4).
-        count: points to follow.
-        prior: of the depths, for all points alike: `depth_m` is (1,).
-        known: what images before have told; it is tried first, and dropped where it contradicts
-            these two images, as after the object was moved.
+        count: number of points to track.
+        prior: of the depths, the same for all points: `depth_m` is (1,).
+        known: fit of earlier images; tried first, and dropped if it contradicts these two images,
+            as after the object was moved.
     """
     found = compare_images(image, goal.image, goal.camera, goal.matcher, goal.described)
     if isinstance(found, TwoViewFailure):
@@ -129,14 +129,14 @@ def recognise(
     by_depth = Prior(_depths_here(guesses[0], T_world_camera), prior.log_deviation)
     fits = _fits(guesses, star, first, by_depth)
     if not fits:
-        return TwoViewFailure(TwoViewProblem.WRONG_MATCHES, "no pose explains the points followed")
+        return TwoViewFailure(TwoViewProblem.WRONG_MATCHES, "no pose explains the tracked points")
     return Recognition(
         image, points_px, star_px, star, (first,), fits, by_depth, matches.points_star_px
     )
 
 
 def length_ratio(length: KnownLength, goal: GoalImage, fit: GoalFit) -> float:
-    """Return how much longer a known length is than a fit has it."""
+    """Return the ratio of a known length to its value in a fit."""
     known = fit.points_goal
     points = goal.camera.normalize(length.points_px)
     depth = depth_between(points, known[:, :2] / known[:, 2:], known[:, 2])
@@ -145,19 +145,19 @@ def length_ratio(length: KnownLength, goal: GoalImage, fit: GoalFit) -> float:
 
 
 class Confirmation(NamedTuple):
-    """How much of the photograph is where it shows it, once the camera is thought to be there."""
+    """How much of the photograph is in place, once the camera is assumed to be at the goal."""
 
-    recognised: int  # points
-    in_place: int  # of them within `IN_PLACE_PX` of where the photograph has them
+    recognised: int  # number of points
+    in_place: int  # number of them within `IN_PLACE_PX` of their position in the photograph
 
     @property
     def holds(self) -> bool:
-        """Whether enough is recognised, and most of it in its place."""
+        """Whether enough points are recognised and most of them are in place."""
         return self.recognised >= FEWEST and self.in_place >= MOST * self.recognised
 
 
 def confirm(goal: GoalImage, image: ImageArray) -> Confirmation:
-    """Compare an image with the photograph afresh, by nothing that was tracked."""
+    """Compare an image with the photograph from scratch, using no tracked points."""
     found = goal.matcher.match(goal.matcher.describe(image), goal.described)
     shift = np.linalg.norm(found.points_px - found.points_star_px, axis=1)
     return Confirmation(len(shift), int(np.count_nonzero(shift < IN_PLACE_PX)))
@@ -170,7 +170,7 @@ def tracked_image(
     covariance_px: FloatArray,
     found: BoolArray,
 ) -> ArmImage:
-    """Return tracked points as `fit_goal` takes them."""
+    """Return tracked points in the form that `fit_goal` takes."""
     variance = np.trace(covariance_px, axis1=1, axis2=2) / 2.0 + _TRACK_PX**2
     return arm_image(goal.camera, T_world_camera, points_px, np.sqrt(variance), found)
 
@@ -183,17 +183,17 @@ def _fits(
 
 
 def _possible(fits: list[GoalFit]) -> tuple[GoalFit, ...]:
-    """Return the fits that no other refutes, the likeliest first."""
+    """Return the fits that no other refutes, the most likely first."""
     if not fits:
         return ()
     best = min(fits, key=lambda fit: fit.chi_square)
     limit = best.chi_square + _RIVAL * best.scale
-    # A stable sort: what images do not tell apart stays in the order of the two-view motions.
+    # A stable sort: equally likely fits keep the order of the two-view motions.
     return (best, *(fit for fit in fits if fit is not best and fit.chi_square <= limit))
 
 
 def _depths(points_star: FloatArray, known: GoalFit | None, prior: Prior) -> FloatArray:
-    """Return what is believed of the points' depths at the goal, (M,), m."""
+    """Return the prior depths of the points at the goal, (M,), m."""
     if known is None:
         assert prior.depth_m is not None
         return np.full(len(points_star), float(prior.depth_m[0]))
@@ -212,7 +212,7 @@ def _guesses(
     points_star: FloatArray,
     depth: FloatArray,
 ) -> list[GoalGuess]:
-    """Return the motions between the images, scaled to the depths believed at the goal."""
+    """Return the motions between the images, scaled to the prior depths at the goal."""
     if found.view is None:
         T = T_world_camera @ se3_inverse(se3(found.rotation.copy(), np.zeros(3)))
         rays = np.column_stack((points_star, np.ones(len(points_star))))

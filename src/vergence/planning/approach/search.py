@@ -1,4 +1,4 @@
-"""What takes longer than an image on the way to a photograph: recognising it, and planning."""
+"""Jobs of an approach that take longer than an image: recognising the photograph, and planning."""
 
 from collections.abc import Callable
 
@@ -27,13 +27,13 @@ from vergence.vision import TwoViewFailure
 Plan = Callable[[PlanningProblem], Path | PlanFailure]
 
 _CONTRADICTION = 22.5  # χ² with 6 degrees of freedom, one in a thousand
-_OFF, _OFF_M, _OFF_RAD = 0.1, 3e-3, 0.02  # share of the rest of the path, and lengths, to plan anew
+_OFF, _OFF_M, _OFF_RAD = 0.1, 3e-3, 0.02  # fraction of the path left, and lengths, to replan
 
 
 class Search:
-    """Looks for a photograph in an image and plans the path to where it was taken.
+    """Searches for a photograph in an image and plans the path to where it was taken.
 
-    It remembers nothing, so it may be asked beside the loop.
+    It has no state, so it can run in another thread than the loop.
 
     Args:
         goal: the photograph.
@@ -50,11 +50,11 @@ class Search:
         self._plan, self._settings = plan, settings
 
     def camera_pose(self, frame: Frame) -> FloatArray:
-        """Return T_world_camera (4, 4) when an image was taken."""
+        """Return T_world_camera (4, 4) at the exposure of an image."""
         return self._arm.forward_kinematics(frame.joints[self._carrier])
 
     def first(self, frame: Frame) -> Answer | PlanFailure | TwoViewFailure:
-        """Recognise the photograph from the start and plan; or say why not."""
+        """Recognise the photograph from the start and plan, or return why not."""
         settings, T = self._settings, self.camera_pose(frame)
         deviation = UNKNOWN if settings.distance_m is None else ROUGH
         prior = Prior(np.array([settings.distance_m or ROUGH_M]), deviation)
@@ -71,12 +71,12 @@ class Search:
         return path if isinstance(path, PlanFailure) else Answer(found, path, True)
 
     def again(self, known: Recognition, frame: Frame, T_world_goal: FloatArray) -> Answer:
-        """Look for the photograph again.
+        """Search for the photograph again.
 
         Args:
-            known: of it.
-            frame: to look in.
-            T_world_goal: where the path leads that is followed, (4, 4).
+            known: the present recognition.
+            frame: the image to search.
+            T_world_goal: end pose of the path being followed, (4, 4).
         """
         assert frame.image is not None
         known = known.fitted()
@@ -92,7 +92,7 @@ class Search:
     def checked(
         self, known: Recognition, frame: Frame, T_world_goal: FloatArray, new_points: bool
     ) -> Answer:
-        """Plan anew if the path leads elsewhere, or other points are followed."""
+        """Replan if the path leads elsewhere, or other points are tracked."""
         if not (new_points or self._contradicted(known, frame, T_world_goal)):
             return Answer(known, None, False)
         return Answer(known, self._plan(self._problem(known.fit, frame)), new_points)

@@ -1,4 +1,4 @@
-"""Who looks again while the arm moves."""
+"""Runs jobs of the approach while the arm moves."""
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -6,45 +6,45 @@ from typing import Any, Protocol
 
 
 class Worker(Protocol):
-    """Does one job at a time, which must not delay the loop."""
+    """Runs one job at a time without delaying the loop."""
 
     @property
     def busy(self) -> bool:
-        """Whether a job is under way, or its answer has not been fetched."""
+        """Whether a job is running, or its result has not been fetched."""
         ...
 
     def ask(self, job: Callable[[], Any]) -> None:
-        """Begin a job."""
+        """Start a job."""
         ...
 
     def answer(self) -> Any:
-        """Return what came of the job, once; None while there is nothing."""
+        """Return the result of the job, once; None while there is none."""
         ...
 
 
 class InlineWorker:
-    """Does each job at once: for a simulation, whose clock waits, and so is deterministic."""
+    """Runs each job at once, for a simulation, whose clock waits; therefore deterministic."""
 
     def __init__(self) -> None:
         self._answer: Any = None
 
     @property
     def busy(self) -> bool:
-        """Whether an answer has not been fetched."""
+        """Whether a result has not been fetched."""
         return self._answer is not None
 
     def ask(self, job: Callable[[], Any]) -> None:
-        """Do a job."""
+        """Run a job."""
         self._answer = job()
 
     def answer(self) -> Any:
-        """Return what came of it, once."""
+        """Return its result, once."""
         answer, self._answer = self._answer, None
         return answer
 
 
 class ThreadWorker:
-    """Does jobs in a thread of its own: for a robot, which does not wait."""
+    """Runs jobs in a thread of its own, for a robot, which does not wait."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="approach")
@@ -52,18 +52,18 @@ class ThreadWorker:
 
     @property
     def busy(self) -> bool:
-        """Whether a job is under way, or its answer has not been fetched."""
+        """Whether a job is running, or its result has not been fetched."""
         return self._job is not None
 
     def ask(self, job: Callable[[], Any]) -> None:
-        """Begin a job."""
+        """Start a job."""
         self._job = self._pool.submit(job)
 
     def answer(self) -> Any:
-        """Return what came of it, once; None while it is under way.
+        """Return the result of the job, once; None while it is running.
 
         Raises:
-            Exception: what the job raised.
+            Exception: raised by the job.
         """
         if self._job is None or not self._job.done():
             return None
