@@ -1,11 +1,16 @@
 """Formulas as MathML, which browsers draw themselves: no script, no fonts, no network."""
 
+from xml.etree import ElementTree
+
 from docutils import nodes
 from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.writers.html5 import HTML5Translator
+
+_NAMESPACE = ' xmlns="http://www.w3.org/1998/Math/MathML"'  # not needed within HTML
+_DOTS = ("˙", "¨")
 
 
 def visit_math(self: HTML5Translator, node: nodes.Element) -> None:
@@ -22,9 +27,29 @@ def visit_displaymath(self: HTML5Translator, node: nodes.Element) -> None:
 
 def _mathml(tex: str, as_block: bool) -> str:
     try:
-        return str(tex2mathml(tex, as_block=as_block))
+        text = str(tex2mathml(tex, as_block=as_block))
     except MathError as error:
         raise ExtensionError(f"the formula {tex!r}: {error}") from None
+    root = ElementTree.fromstring(text.replace(_NAMESPACE, ""))
+    for element in root.iter():
+        _separate_dots(element)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _separate_dots(element: ElementTree.Element) -> None:
+    """Put dots clear of their letter, and the index of a dotted letter beside it, not below.
+
+    Without a mathematical font, browsers draw an accent into the letter.
+    """
+    if element.tag not in ("mover", "munderover") or element[-1].text not in _DOTS:
+        return
+    element.attrib.pop("accent", None)
+    if element.tag == "munderover":
+        letter, index, dots = element
+        dotted = ElementTree.Element("mover")
+        dotted.extend((letter, dots))
+        element.tag = "msub"
+        element[:] = [dotted, index]
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
