@@ -1,6 +1,6 @@
 """Formulas as MathML, which browsers draw themselves: no script, no fonts, no network."""
 
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from docutils import nodes
 from docutils.utils.math import MathError
@@ -30,13 +30,13 @@ def _mathml(tex: str, as_block: bool) -> str:
         text = str(tex2mathml(tex, as_block=as_block))
     except MathError as error:
         raise ExtensionError(f"the formula {tex!r}: {error}") from None
-    root = ElementTree.fromstring(text.replace(_NAMESPACE, ""))
+    root = ET.fromstring(text.replace(_NAMESPACE, ""))
     for element in root.iter():
         _separate_dots(element)
-    return ElementTree.tostring(root, encoding="unicode")
+    return ET.tostring(root, encoding="unicode")
 
 
-def _separate_dots(element: ElementTree.Element) -> None:
+def _separate_dots(element: ET.Element) -> None:
     """Put dots clear of their letter, and the index of a dotted letter beside it, not below.
 
     Without a mathematical font, browsers draw an accent into the letter.
@@ -46,7 +46,7 @@ def _separate_dots(element: ElementTree.Element) -> None:
     element.attrib.pop("accent", None)
     if element.tag == "munderover":
         letter, index, dots = element
-        dotted = ElementTree.Element("mover")
+        dotted = ET.Element("mover")
         dotted.extend((letter, dots))
         element.tag = "msub"
         element[:] = [dotted, index]

@@ -1,4 +1,4 @@
-"""From a camera twist to joint rates, slowed alike to keep their limits."""
+"""Converts a camera twist to joint rates, scaled uniformly to satisfy their limits."""
 
 import numpy as np
 from numba import njit
@@ -10,9 +10,9 @@ from vergence.arrays import FloatArray
 def resolve_twist(
     J_inverse: FloatArray, v_camera: FloatArray, rate_max: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Return joint rates q̇ = J⁺ v_camera, slowed as a whole until none exceeds its limit.
+    """Return joint rates q̇ = J⁺ v_camera, scaled uniformly until none exceeds its limit.
 
-    Slowing all joints alike keeps the camera on its course.
+    Uniform scaling preserves the camera's direction of motion.
 
     Args:
         J_inverse: (n, 6), damped near singularities.
@@ -20,7 +20,7 @@ def resolve_twist(
         rate_max: (n,), rad/s or m/s.
 
     Returns:
-        The rates (n,) and the scale in (0, 1] they were slowed by.
+        The rates (n,) and their scale in (0, 1].
     """
     rates = np.zeros(len(J_inverse))
     for i in range(len(J_inverse)):
@@ -31,7 +31,7 @@ def resolve_twist(
 
 @njit(cache=True, error_model="numpy")
 def slow_down(rates: FloatArray, rate_max: FloatArray) -> float:
-    """Slow rates (n,), in place, as a whole until none exceeds its limit; return the scale."""
+    """Scale rates (n,), in place, uniformly until none exceeds its limit; return the scale."""
     scale = 1.0
     for i in range(len(rates)):
         if abs(rates[i]) * scale > rate_max[i]:

@@ -1,4 +1,4 @@
-"""Optimal tracking by one camera at the arm's tip, as one kernel: equal to the general servo."""
+"""Optimal tracking by one camera at the arm's tip, as one kernel; agrees with the general servo."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ class TrackingTickLaw:
         camera: intrinsics.
         objective: the weights.
         period_s: between two images.
-        singular_below: smallest singular value of J at which the servo gives up.
+        singular_below: smallest singular value of J, below which the servo gives up.
         feeds_forward: whether the target's motion is fed forward.
     """
 
@@ -46,7 +46,7 @@ class TrackingTickLaw:
         self._packed = pack_setup(self.setup(1))
 
     def setup(self, count: int) -> TrackingSetup:
-        """Return all of a tick that stays the same, for a number of features."""
+        """Return the constants of a tick for a given number of features."""
         return TrackingSetup(
             self._objective.gains(count, self._period_s),
             self._camera.focal_px,

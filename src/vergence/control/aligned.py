@@ -1,4 +1,4 @@
-"""Where points of an image are, and the pose that brings known points nearest to them."""
+"""Points in space from an image, and the pose that best aligns known points with them."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from vergence.geometry import nearest_rotation, se3
 
 
 def lifted(image: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """Return points in the camera's frame, (M, 3), m.
+    """Return points in the camera frame, (M, 3), m.
 
     Args:
         image: normalized coordinates, (M, 2).
@@ -17,7 +17,7 @@ def lifted(image: FloatArray, depth_m: FloatArray) -> FloatArray:
 
 
 def aligned(points: FloatArray, seen: FloatArray) -> FloatArray:
-    """Return the pose (4, 4) that brings points (M, 3) nearest to where they are seen, (M, 3)."""
+    """Return the pose (4, 4) that best aligns points (M, 3) with measured ones, (M, 3)."""
     M = (seen - seen.mean(axis=0)).T @ (points - points.mean(axis=0))
     R = nearest_rotation(np.ascontiguousarray(M))
     T: FloatArray = se3(R, seen.mean(axis=0) - R @ points.mean(axis=0))

@@ -1,4 +1,4 @@
-"""Joint rates along a motion that was planned, at the inner rate."""
+"""Joint rates along a planned motion, at the inner rate."""
 
 from vergence.arrays import FloatArray
 from vergence.control.mounting import CameraMounting
@@ -6,14 +6,14 @@ from vergence.planning.straight_line import StraightLine
 from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
 
-_GAIN = 5.0  # 1/s, at which set-points come back to the motion
+_GAIN = 5.0  # 1/s, at which set-points converge to the motion
 
 
 class AlongLine:
-    """Follows a motion in time, which pauses while the arm is held.
+    """Follows a timed motion, which pauses while the arm is held.
 
-    q̇ = Δq_line/Δt + k (q_line - q), with q the last set-point: a start beside the line, by as much
-    as a servo lags, is gently made up for.
+    q̇ = Δq_line/Δt + k (q_line - q), with q the last set-point: a start next to the line, by as
+    much as a servo lags, is corrected smoothly.
 
     Args:
         arm: up to its tip.
@@ -30,7 +30,7 @@ class AlongLine:
 
     @property
     def done(self) -> bool:
-        """Whether the end of the line has been asked for."""
+        """Whether the end of the line has been requested."""
         return self._time >= self._line.duration
 
     def command(
@@ -50,4 +50,4 @@ class AlongLine:
         return rates + _GAIN * (before - setpoint.position)
 
     def hold(self) -> None:
-        """Go on later from where the set-points are."""
+        """Prepare to continue from the present set-points."""

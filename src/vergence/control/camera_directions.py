@@ -1,4 +1,4 @@
-"""Which motions of a camera move its features in the image, and which hardly do."""
+"""How strongly each motion of a camera moves its features in the image."""
 
 from typing import NamedTuple
 
@@ -11,11 +11,11 @@ from vergence.features import interaction_matrix_points
 class CameraDirections(NamedTuple):
     """Directions of camera motion, the best conditioned first: [Nelson1995] section 2.2.
 
-    Their rate is the flow in the image, root mean square over the features, for a turn of 1 rad or
-    a way as long as the features are deep: so far away, both move a feature in the middle alike.
+    Their rate is the root mean square flow of the features for a rotation of 1 rad or a translation
+    by the features' depth; at the image centre, both move a feature equally.
     """
 
-    rate_px: FloatArray  # (6,) falling: roots of the eigenvalues of BᵀB
+    rate_px: FloatArray  # (6,) descending: roots of the eigenvalues of BᵀB
     directions: FloatArray  # (6, 6) rows (x, y, z, rx, ry, rz) of length 1: its eigenvectors
     axis_px: FloatArray  # (6,) the rate along each axis of the camera
 
@@ -23,7 +23,7 @@ class CameraDirections(NamedTuple):
 def camera_directions(
     points: FloatArray, depth_m: FloatArray, focal_px: FloatArray
 ) -> CameraDirections:
-    """Return the directions of camera motion by how well features tell of them.
+    """Return the directions of camera motion, sorted by how well the features determine them.
 
     Args:
         points: normalized coordinates of the features, (M, 2).

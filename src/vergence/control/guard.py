@@ -11,15 +11,15 @@ from vergence.errors import InputError, ShapeError
 from vergence.robot import Arm
 from vergence.signals import Setpoint
 
-_SPARE = 1e-9  # rad or m of room beyond what braking needs; nearer, rounding decides
+_SPARE = 1e-9  # rad or m beyond the braking distance; closer to a limit, rounding decides
 
 
 class GuardedStep(NamedTuple):
-    """The next set-point, and which joints met what."""
+    """The next set-point, and which joints are at a limit."""
 
     position: FloatArray  # (n,) rad or m
     velocity: FloatArray  # (n,) rad/s or m/s
-    at_limit: BoolArray  # (n,) held back from a position limit it was driven against
+    at_limit: BoolArray  # (n,) held back from a position limit that they were driven towards
 
 
 @njit(cache=True, error_model="numpy")
@@ -33,13 +33,13 @@ def guarded_step(
     """Follow desired rates as far as limits and braking distance allow.
 
     A set-point moving at v towards a limit, braked by a dt every step from the next one on, travels
-    at most v²/(2a) + v dt/2 + a dt²/8. So v ≤ √((a dt/2)² + 2 a (room - a dt²/8)) - a dt/2 can
-    always still be stopped, and the state after the step satisfies the same bound again.
+    at most v²/(2a) + v dt/2 + a dt²/8. So any v ≤ √((a dt/2)² + 2 a (room - a dt²/8)) - a dt/2 can
+    still be stopped, and the state after the step satisfies the same bound again.
 
     Args:
         position: of the last set-point, (n,).
         velocity: of the last set-point, (n,).
-        commanded: the rates asked for, (n,).
+        commanded: desired rates, (n,).
         limits: rows q_min, q_max, rate_max, acceleration_max, (4, n).
         dt: inner period, s.
     """
@@ -57,9 +57,9 @@ def guarded_step(
 def guarded_joint(
     position: float, velocity: float, commanded: float, limits: FloatArray, dt: float
 ) -> tuple[float, float, bool]:
-    """Do one joint's part of `guarded_step`; limits (4,).
+    """Compute `guarded_step` for one joint; limits (4,).
 
-    A joint that started outside its range is brought back to it, at a speed from which it can stop
+    A joint that started outside its range is returned to it, at a speed from which it can stop
     there.
     """
     a = limits[3]
@@ -81,7 +81,7 @@ def guarded_joint(
 
 @njit(cache=True, error_model="numpy")
 def reachable_rate(commanded: float, rate_max: float) -> float:
-    """Return the rate that is meant: within its limit, and rest where it is not a number."""
+    """Return the rate clamped to its limit, 0 if it is NaN."""
     return min(max(commanded, -rate_max), rate_max) if np.isfinite(commanded) else 0.0
 
 
@@ -95,19 +95,19 @@ def guarded_steps(
     count: int,
     stuck: BoolArray,
 ) -> None:
-    """Take many guarded steps with the same desired rates, in place.
+    """Take several guarded steps with the same desired rates, in place.
 
     A joint so far from its limits that it could stop anywhere on the way ramps to its rate and
-    keeps it, which is a sum in closed form; only one that might have to brake is stepped.
+    keeps it, which has a closed form; only a joint that might have to brake is stepped.
 
     Args:
-        position: set-points, (n,); moved.
-        velocity: their rates, (n,); changed.
-        commanded: as for `guarded_step`, and so are the rest.
+        position: set-points, (n,); updated.
+        velocity: their rates, (n,); updated.
+        commanded: as for `guarded_step`, like the following ones.
         limits: (4, n).
         dt: inner period, s.
-        count: how many steps.
-        stuck: says which joints a limit held back at every step, (n,); filled.
+        count: number of steps.
+        stuck: set to which joints a limit held back at every step, (n,).
     """
     for i in range(len(position)):
         step, v = limits[3, i] * dt, reachable_rate(commanded[i], limits[2, i])
@@ -143,18 +143,18 @@ def same_steps(
     dt: float,
     count: int,
 ) -> GuardedStep:
-    """Return what `guarded_step` comes to, to the last bit, when it is taken many times.
+    """Return the result of repeated `guarded_step`, exact to the last bit.
 
     Args:
-        position: as for `guarded_step`, and so are the rest.
+        position: as for `guarded_step`, like the following ones.
         velocity: (n,).
         commanded: (n,).
         limits: (4, n).
         dt: inner period, s.
-        count: how many steps, at least one.
+        count: number of steps, at least one.
 
     Returns:
-        The last step; at a limit are the joints that one held back at every step.
+        The last step; `at_limit` is true for joints held back at every step.
     """
     step = guarded_step(position, velocity, commanded, limits, dt)
     at_limit = step.at_limit
@@ -166,13 +166,13 @@ def same_steps(
 
 @njit(cache=True, error_model="numpy")
 def _room(room: float, speed: float, a: float, dt: float) -> float:
-    """Return what is left of the room when a speed is braked with a, by `guarded_step`'s bound."""
+    """Return the room left after braking from a speed with a, by `guarded_step`'s bound."""
     return room - a * dt * dt / 8.0 - speed * (speed + a * dt) / (2.0 * a)
 
 
 @njit(cache=True, error_model="numpy")
 def stoppable_speed(room: float, a: float, dt: float) -> float:
-    """Return the largest speed that braking with a stops within the room, in steps of dt."""
+    """Return the largest speed from which braking with a stops within the room, in steps of dt."""
     if np.isinf(room):
         return np.inf
     usable = max(room - a * dt * dt / 8.0, 0.0)
@@ -182,7 +182,7 @@ def stoppable_speed(room: float, a: float, dt: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def closing_speed(gap: float, a: float, dt: float) -> float:
-    """Return the speed at which to close a gap, so that braking with a stops at its end."""
+    """Return the speed at which to close a gap such that braking with a stops at its end."""
     speed: float = min(gap / dt, max(stoppable_speed(gap, a, dt), a * dt / 8.0))
     return speed
 
@@ -216,23 +216,24 @@ class Braking(Protocol):
 
 
 class Guard:
-    """Set-points of one arm, stepped at the inner rate and kept inside all its limits.
+    """Set-points of one arm, stepped at the inner rate and kept within all its limits.
 
-    ``guard.step(rates)`` follows any rates as far as the limits allow; call it once a period. From
-    a start outside a position limit the joint is brought back to it at a limited rate.
+    ``guard.step(rates)`` follows any rates as far as the limits allow; call it once per period. A
+    joint that starts outside a position limit is returned to it at a limited rate.
 
     Args:
         arm: the arm with its limits.
         start: joint positions at the start, (n,) rad or m.
         period_s: of the steps.
-        braking: finds what the arm would touch if it braked from a set-point; None for nothing.
+        braking: finds what the arm would collide with if it braked from a set-point; None for no
+            check.
 
     Attributes:
         hindrance: what it would have touched, from then on only braking; else nothing.
 
     Raises:
-        InputError: if the positions are not finite numbers, or the period is not above zero.
-        ShapeError: if there is not one position a joint.
+        InputError: if the positions are not finite, or the period is not positive.
+        ShapeError: if there is not one position per joint.
     """
 
     def __init__(

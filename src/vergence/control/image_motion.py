@@ -1,4 +1,4 @@
-"""Where the features are now, and how fast the target moves them: latency and motion undone."""
+"""Compensates latency and target motion: predicts features to the present, estimates their flow."""
 
 from collections import deque
 from functools import partial
@@ -18,25 +18,25 @@ from vergence.signals import ImagePoints, JointState, TargetState
 
 
 class FeatureState(NamedTuple):
-    """The features as they should look at this instant."""
+    """The predicted features at the present time."""
 
     points: FloatArray  # (M, 2) normalized coordinates, now
-    flow: FloatArray  # (M, 2) their motion by the target's own, 1/s
-    depth: FloatArray  # (M,) m, as believed
-    depth_share: float = float("nan")  # its largest deviation, a share; NaN if unknown
+    flow: FloatArray  # (M, 2) flow caused by the target's own motion, 1/s
+    depth: FloatArray  # (M,) m, believed
+    depth_share: float = float("nan")  # largest relative deviation of the depth; NaN if unknown
 
 
 class MotionSettings(NamedTuple):
-    """What is assumed of the features between their exposure and now.
+    """Assumptions about the features between their exposure and the present.
 
     Attributes:
-        feed_forward: whether the target's own motion is estimated and fed forward; else the target
-            is taken for stationary. If None, where the depth is right for a target that moves: the
-            motion that a wrong depth feigns would be fed forward like any other.
-        prediction: whether features are carried from their exposure to now; else they are taken as
-            they are, late.
+        feed_forward: whether the target's own motion is estimated and fed forward; if false, the
+            target is assumed stationary. None means true if the depth is right for a moving target,
+            because a wrong depth causes an apparent motion that would be fed forward as well.
+        prediction: whether features are predicted from their exposure to the present; if false,
+            they are used as measured, late.
         flow_smoothing_s: time constant of the target's motion in the image, s; see `TargetFlow`.
-        depth: where the depth of the features is had from.
+        depth: source of the features' depth.
     """
 
     feed_forward: bool | None = None
@@ -53,12 +53,12 @@ class MotionSettings(NamedTuple):
 
     @property
     def as_it_is(self) -> bool:
-        """Whether features and depth are taken as they are."""
+        """Whether features and depth are used as measured."""
         return not (self.feeds_forward or self.prediction) and isinstance(self.depth, HeldDepth)
 
 
 class _Exposure(NamedTuple):
-    """The last view."""
+    """The last measured image."""
 
     time: float  # s
     T_camera_scene: FloatArray  # (4, 4)
@@ -67,22 +67,22 @@ class _Exposure(NamedTuple):
 
 
 class ImageMotion:
-    """Carries measured features from their exposure to now, through the camera's known motion.
+    """Predicts measured features from their exposure to the present, through known camera motion.
 
-    A feature seen at exposure is lifted to its depth, moved with the camera's motion since, which
-    the joints tell, and projected again; what consecutive images then leave unexplained is the
-    target's own motion, smoothed to a flow with its trend and extrapolated. So a servo acts on the
-    present although images are late, and can feed the target's motion forward.
+    A feature measured at an exposure is lifted to its depth, moved with the camera's motion since
+    then, which the joints determine, and projected again. What consecutive images leave unexplained
+    is the target's own motion, smoothed to a flow with its trend and extrapolated. A servo can
+    therefore act on the present although images are late, and feed the target's motion forward.
 
     Args:
         arm: up to its tip.
         mounting: of the camera.
-        settings: what is assumed.
-        memory_s: how far back the joints are remembered; more than the latency.
-        features: in the target's frame, (M, 3), m; None where they are not known.
+        settings: the assumptions.
+        memory_s: time for which joints are stored; must exceed the latency.
+        features: in the target's frame, (M, 3), m; None if unknown.
 
     Raises:
-        InputError: if the depth needs features that are not known.
+        InputError: if the depth needs features that are unknown.
     """
 
     def __init__(
@@ -110,18 +110,18 @@ class ImageMotion:
         joints: JointState,
         target: TargetState | None = None,
     ) -> FeatureState:
-        """Take in a view and return the features now.
+        """Process an image's features and return them at the present time.
 
         Args:
             view: the newest measurement.
-            depth: of the features, (M,), m, as it is believed without any measurement.
+            depth: of the features, (M,), m, as believed without any measurement.
             joints: now.
-            target: from a filter, where one runs.
+            target: from a filter, if one runs.
         """
         self._remember(joints)
         points = self._mounting.camera.normalize(view.points_px)
         if self._last is not None and len(points) != len(self._last.points):
-            self._last = None  # other features
+            self._last = None  # the features have changed
             self._flow.clear()
             self._depth_source = self._bind()
         if self._last is None or view.time > self._last.time:
@@ -148,7 +148,7 @@ class ImageMotion:
         depth: FloatArray,
         target: TargetState | None,
     ) -> None:
-        """Take in a new view: its depths, and what the last one leaves unexplained as flow."""
+        """Process a new image: its depths, and the flow that the last one leaves unexplained."""
         T_camera_scene = self._T_camera_scene(self._joints_at(view.time))
         measured = MeasuredPoints(
             view.time,
@@ -182,7 +182,7 @@ class ImageMotion:
             self._history.popleft()
 
     def _joints_at(self, time: float) -> FloatArray:
-        """Return joint positions at a past instant, (n,), between the remembered ones."""
+        """Return joint positions at a past time, (n,), interpolated between the stored ones."""
         later = self._history[-1]
         for earlier in reversed(self._history):
             if earlier[0] <= time:
@@ -195,7 +195,7 @@ class ImageMotion:
 
 @njit(cache=True, error_model="numpy")
 def reproject(T_to_from: FloatArray, points: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return stationary points as another camera pose sees them: x, y and their depth, (M, 3).
+    """Return stationary points as seen from another camera pose: x, y and depth, (M, 3).
 
     Args:
         T_to_from: pose of the first camera in the second, (4, 4).

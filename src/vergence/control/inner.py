@@ -1,4 +1,4 @@
-"""What the loop asks of a law that works at the inner rate."""
+"""The interface of a law that works at the inner rate."""
 
 from typing import Protocol, runtime_checkable
 
@@ -9,7 +9,7 @@ from vergence.signals import Setpoint
 
 @runtime_checkable
 class InnerLaw(Law, Protocol):
-    """A law that makes a trajectory between images."""
+    """A law that generates a trajectory between images."""
 
     def follow(self, setpoint: Setpoint) -> FloatArray:
         """Return joint rates (n,) for the next inner period.
@@ -20,5 +20,5 @@ class InnerLaw(Law, Protocol):
         ...
 
     def hold(self) -> None:
-        """Forget where the arm was going: it is held, and will start again from rest."""
+        """Clear the trajectory: the arm is held, and will start again from rest."""
         ...

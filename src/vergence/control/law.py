@@ -1,4 +1,4 @@
-"""What the loop asks of a control law."""
+"""The interface of a control law."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ from vergence.signals import JointCommand, JointState, Observation, Reference
 
 
 class Law(Protocol):
-    """Turns what is seen and what is desired into joint rates."""
+    """Computes joint rates from measured and desired features."""
 
     def command(
         self, observation: Observation, reference: Reference, joints: JointState

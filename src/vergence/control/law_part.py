@@ -1,4 +1,4 @@
-"""A whole law of a user's own, as a cell file declares it."""
+"""A user's own complete law, as a cell file declares it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,14 +12,14 @@ from vergence.robot import Arm
 
 @dataclass(frozen=True, slots=True)
 class LawSetting:
-    """What a law is made for.
+    """The input from which a law is made.
 
     Attributes:
-        arm: up to its tip: the task's camera, or the target where the arm holds it before a fixed
+        arm: up to its tip: the task's camera, or the target if the arm holds it in front of a fixed
             camera.
-        cameras: and where they are, by name; the task's first.
-        depth_m: believed depth of a camera's features at the start, (M,), by camera; without those
-            of which nothing is known.
+        cameras: the cameras with their poses, by name; the task's first.
+        depth_m: believed depth of a camera's features at the start, (M,), by camera; only those
+            that are known.
         period_s: between two images of the task's camera, s.
         inner_period_s: between two set-points, s.
         start: joint positions at the start, (n,), rad or m.
@@ -35,7 +35,7 @@ class LawSetting:
 
 @runtime_checkable
 class LawPart(Protocol):
-    """A part that makes laws: what a cell names, with its numbers."""
+    """A part that makes laws: its name in a cell file, with its settings."""
 
     def bind(self, setting: LawSetting) -> Law:
         """Return the law for one arm and its cameras.

@@ -1,4 +1,4 @@
-"""How a camera of the task is mounted: at the arm's tip, elsewhere on its last link, or fixed."""
+"""The mounting of a task's camera: at the arm's tip, elsewhere on its last link, or fixed."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from vergence.geometry import se3_adjoint, se3_compose, se3_inverse
 
 @dataclass(frozen=True, slots=True)
 class CameraMounting:
-    """A camera and where it is.
+    """A camera and its pose.
 
-    A camera on the arm looks at the world. A fixed camera looks at what the arm holds; what it sees
-    moves as if the end effector were stationary and the camera moved.
+    A camera on the arm observes the world. A fixed camera observes what the arm holds; its image
+    changes as if the end effector were stationary and the camera moved.
     """
 
     camera: Camera
@@ -37,7 +37,7 @@ class CameraMounting:
         return self.T_world_camera is None and self.T_tip_camera is None
 
     def twist_map(self, T_world_tip: FloatArray) -> FloatArray:
-        """Return A (6, 6) with v_camera = A v_tip, each in its own axes.
+        """Return A (6, 6) with v_camera = A v_tip, each in its own frame.
 
         A = Ad(T_camera_tip) for a camera on the arm, -Ad(T_camera_tip) for a fixed one.
 
@@ -53,9 +53,9 @@ class CameraMounting:
         return np.eye(6)
 
     def T_camera_scene(self, T_world_tip: FloatArray) -> FloatArray:
-        """Return the pose (4, 4), in the camera, of the frame that what it looks at is fixed in.
+        """Return the pose (4, 4), in the camera, of the frame to which the observed scene is fixed.
 
-        That frame is the world for a camera on the arm, the arm's tip for a fixed camera.
+        That frame is the world for a camera on the arm, and the arm's tip for a fixed camera.
 
         Args:
             T_world_tip: (4, 4).

@@ -1,4 +1,4 @@
-"""A pose that moves: extrapolated, and compared with another."""
+"""A moving pose: extrapolation and comparison."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from vergence.geometry import so3_exp, so3_log
 
 
 class MovingPose(NamedTuple):
-    """A pose and how fast it moves, both along world axes."""
+    """A pose and its velocity, both along world axes."""
 
     T: FloatArray  # (4, 4) in the world
     twist: FloatArray  # (6,) velocity of its origin and angular velocity, m/s and rad/s

@@ -1,17 +1,17 @@
-"""How much each point of an image counts, by how well its place is known."""
+"""Weights of image points according to their measurement accuracy."""
 
 import numpy as np
 
 from vergence.arrays import FloatArray
 
-_SURE_PX = 0.5  # standard deviation up to which a point counts (nearly) fully
+_SURE_PX = 0.5  # standard deviation up to which a point has (almost) full weight
 
 
 def point_weights(covariance_px: FloatArray) -> FloatArray | None:
-    """Return roots R (M, 2, 2) of what rows of points weigh: Rᵀ R = σ² (σ² I + C)⁻¹, the best 1.
+    """Return roots R (M, 2, 2) of the weights of points: Rᵀ R = σ² (σ² I + C)⁻¹, at most 1.
 
-    Points of equal covariance C weigh the same, 1, whatever it is: None for those that are equally
-    sure along all directions. One that lies on an edge weighs across it and not along it.
+    Points of equal covariance C all have weight 1, whatever C is; None if they are also equally
+    accurate in all directions. A point on an edge has weight across the edge but not along it.
 
     Args:
         covariance_px: C, (M, 2, 2), px².
@@ -28,7 +28,7 @@ def row_variance(roots: FloatArray | None, covariance: FloatArray) -> float:
     """Return the mean variance of weighted rows.
 
     Args:
-        roots: R of each point, (M, 2, 2); None where all weigh 1.
+        roots: R of each point, (M, 2, 2); None if all weights are 1.
         covariance: of each point, (M, 2, 2).
     """
     if not len(covariance):

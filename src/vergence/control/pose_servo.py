@@ -21,25 +21,25 @@ from vergence.estimation.feature_faces import FeatureFaces
 from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
 
-_ONSET_S = 0.5  # of the motion of redundant joints, so that no joint meets its acceleration limit
-_HELD_BACK = 1e-3  # m/s and rad/s of the desired twist that is not reached
+_ONSET_S = 0.5  # to start the motion of redundant joints within their acceleration limits
+_HELD_BACK = 1e-3  # m/s and rad/s of the desired twist that are not reached
 
 
 class PoseServo:
-    """Serves one position-based objective: a goal an image, joint rates at the inner rate.
+    """Executes one position-based objective: a goal per image, joint rates at the inner rate.
 
-    Between images a trajectory leads the arm's tip to the goal, see `PoseTrajectory`; where limits
-    hold the tip back, the trajectory continues from where the tip is.
+    Between images a trajectory leads the arm's tip to the goal, see `PoseTrajectory`; if limits
+    hold the tip back, the trajectory continues from the tip's pose.
 
     Args:
         arm: up to its tip: the camera, the link that carries it, or the link that holds the target.
         mounting: of the camera.
-        objective: the numbers of the trajectory.
-        limits: what is kept; those of `Limits` if None and the solver keeps limits.
+        objective: the settings of the trajectory.
+        limits: to enforce; the defaults of `Limits` if None and the solver enforces limits.
         solver: the quadratic program if None.
-        corners: of the target, (M, 3), m, which have to stay in view; None for none.
-        faces: that the corners lie on; None where not known.
-        situation: what else is known; its period is the inner one.
+        corners: of the target, (M, 3), m, that must stay in view; None for none.
+        faces: with the corners; None if unknown.
+        situation: further data; its period is the inner one.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class PoseServo:
         self._solver = (QuadraticProgram() if solver is None else solver).bind(setting)
         self._trajectory = PoseTrajectory(objective, arm, situation.period_s)
         self._null_space_rate = objective.null_space_rate
-        self._null_space = np.zeros(arm.joint_count)  # rates of redundant joints, gently begun
+        self._null_space = np.zeros(arm.joint_count)  # rates of redundant joints, started smoothly
         self._view: TargetView | None = None
         if corners is not None and self._solver.keeps_limits:
             self._view = TargetView(mounting, corners, *self._solver.view, faces)
@@ -70,7 +70,7 @@ class PoseServo:
         self._active, self._slack, self._solved = np.zeros(count), np.zeros(count), True
 
     def take_over(self, previous: object) -> bool:
-        """Go on along the trajectory of another servo of this kind; return whether it is one."""
+        """Continue the trajectory of another servo of this kind; return whether it is one."""
         if not isinstance(previous, PoseServo):
             return False
         self._trajectory.take_over(previous._trajectory)
@@ -80,7 +80,7 @@ class PoseServo:
     def command(
         self, observation: Observation, reference: Reference, joints: JointState
     ) -> JointCommand:
-        """Take the target's new pose as the goal; return the rates to set out with."""
+        """Set the goal from the target's new pose; return the initial rates."""
         target, desired = observation.target, reference.T_camera_target
         if target is None or desired is None:
             self.hold()
@@ -121,7 +121,7 @@ class PoseServo:
         return solution.rates
 
     def hold(self) -> None:
-        """Forget the goal and the trajectory."""
+        """Clear the goal and the trajectory."""
         self._trajectory.clear()
         self._null_space = np.zeros(self._arm.joint_count)
 
@@ -154,7 +154,7 @@ class PoseServo:
         return self._mounting.twist_map(self._arm.forward_kinematics(q))
 
     def _null_space_rates(self, q: FloatArray) -> FloatArray:
-        """Return the rates of redundant joints towards mid-range, (n,), gently begun."""
+        """Return the rates of redundant joints towards mid-range, (n,), started smoothly."""
         away = -self._null_space_rate * self._arm.normalized(q)
         share = self._situation.period_s / _ONSET_S
         self._null_space = self._null_space + share * (away - self._null_space)

@@ -49,25 +49,24 @@ from vergence.signals import (
     Reference,
 )
 
-_PLAN_WEIGHT = 1e-3  # of a plan's joint rates: where the image says little, joints go its way
+_PLAN_WEIGHT = 1e-3  # of a plan's joint rates: they decide where the image determines little
 AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
 NO_FEATURES = pack_features(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
 
 
 class Situation(NamedTuple):
-    """What a servo is told beside its objectives, limits and solver.
+    """The data of a servo other than its objectives, limits and solver.
 
     Attributes:
         period_s: between two images, for which a command acts.
-        motion: what is assumed of the features between exposure and now.
-        obstacles: gives what may come between camera and features; None for nothing.
+        motion: assumptions about the features between exposure and now.
+        obstacles: returns what may occlude features; None for nothing.
         depth_range: bounds on true over believed depth, where the limits give none.
         start: joint positions at the start, (n,); those of the first tick if None.
-        fewest: found features below which the target is lost.
-        features: in the target's frame, (M, 3), m, by camera, where they are known; "" for the only
-            camera.
-        clearance: gives the distances between what must not touch; None for nothing.
-        faces: of the same features, by camera, where a surface is known around them.
+        fewest: number of found features below which the target is lost.
+        features: in the target's frame, (M, 3), m, by camera, if known; "" for the only camera.
+        clearance: computes distances between bodies that must not collide; None for no check.
+        faces: of the same features, by camera, if a surface is known around them.
     """
 
     period_s: float = 1 / 30
@@ -82,22 +81,22 @@ class Situation(NamedTuple):
 
 
 class Servo:
-    """Serves objectives of any kind, from any cameras, on the arm or fixed, under limits.
+    """Combines objectives of any kind, from any cameras, on the arm or fixed, under limits.
 
     minimise  Σ_i w_i (½ v_iᵀ H_i v_i - g_iᵀ v_i)  with v_i = A_i J q̇, under the limits that the
-    solver keeps. The first camera's features are those that have to stay in view. Beside other
-    cameras, one that has lost its features or sends no images has no say.
+    solver enforces. The first camera's features must stay in view. With several cameras, one that
+    has lost its features or sends no images is ignored.
 
     Args:
         arm: up to its tip: the camera itself, or the link that carries it or holds the target.
         cameras: one at the arm's tip, one with its mounting, or several by name, the main one
             first.
-        objectives: what to do; one of a stack is a `Term` with a weight and a camera's name.
-        limits: what is kept; those of `Limits` if None and the solver keeps limits.
+        objectives: what to do; in a sum, each is a `Term` with a weight and a camera's name.
+        limits: to enforce; the defaults of `Limits` if None and the solver enforces limits.
         solver: the quadratic program if None.
-        depth_m: believed depth of the features where the reference knows none: one number, (M,),
-            or either by camera.
-        situation: what else is known.
+        depth_m: believed depth of the features where the reference has none: one number, (M,), or
+            either by camera.
+        situation: further data.
 
     Raises:
         InputError: if these contradict each other.
@@ -149,25 +148,25 @@ class Servo:
 
     @property
     def tracking(self) -> TrackingSetup | None:
-        """The setup of [Nelson1995] in one kernel, where the servo is just that, else None."""
+        """The setup of [Nelson1995] in one kernel if the servo is exactly that, else None."""
         if self._kernel is None:
             return None
         return self._kernel.setup(len(self._main.depth_m))
 
     def believed_depth(self, count: int, camera: str | None = None) -> FloatArray:
-        """Return the believed depth of a camera's features, (count,), m; by default the first's."""
+        """Return the believed depth of a camera's features, (count,), m; the first's by default."""
         chosen = self._main if camera is None else self._cameras[camera]
         return chosen.believed_depth(count)
 
     @property
     def feeds_forward(self) -> bool:
-        """Whether features or depth are carried to now, or the target's motion is fed forward."""
+        """Whether features or depth are predicted, or the target's motion is fed forward."""
         return self._main.feeds_forward
 
     def take_over(self, previous: object) -> bool:
-        """Go on with the target's motion in the image and the depth as another servo has them.
+        """Continue with another servo's estimates of the target's image motion and the depth.
 
-        Where the two estimate them differently, they are estimated afresh.
+        If the two estimate them differently, the estimates are restarted.
 
         Returns:
             Whether the other is a servo, whose command holds until the next image.
@@ -194,7 +193,7 @@ class Servo:
         ]
         if self._first in fresh and (fault := self._too_few(observation)):
             return JointCommand(self._rest, np.zeros(6), fault=fault)
-        weighted = self._kernel is None  # which takes all features for equally sure
+        weighted = self._kernel is None  # the kernel weights all features equally
         states = {
             name: self._cameras[name].state(
                 observation, self._reference(name, reference), joints, weighted=weighted
@@ -211,8 +210,8 @@ class Servo:
         """Return joint rates (n,) for features of the first camera, for a stationary target.
 
         Args:
-            features: as they are.
-            desired: as they should be.
+            features: the present ones.
+            desired: the desired ones.
             q: joint positions, (n,).
             velocity: joint rates now, (n,); at rest if None.
         """
@@ -224,7 +223,7 @@ class Servo:
         return self._solve({self._first: state}, joints, None).velocity
 
     def _tracking_kernel(self, solver: Solver) -> TrackingTickLaw | None:
-        """Return the kernel of [Nelson1995] where the servo asks for nothing else."""
+        """Return the kernel of [Nelson1995] if the servo needs nothing else."""
         alone = len(self._terms) == len(self._cameras) == 1
         mounting, objective = self._main.mounting, self._terms[0].objective
         if not (alone and mounting.at_tip and self._terms[0].weight == 1.0):
@@ -269,7 +268,7 @@ class Servo:
                 continue
             try:
                 quadratic = objective.quadratic(state)
-            except InputError as error:  # the points make no such feature, such as a line end on
+            except InputError as error:  # such as a line seen end-on
                 reason = f"{error.source}: {error.given}; needs {error.allowed}"
                 lost = OutcomeKind.TARGET_LOST, reason
                 return JointCommand(self._rest, np.zeros(6), fault=lost)
@@ -292,7 +291,7 @@ class Servo:
             return JointCommand(self._rest, np.zeros(6), fault=fault)
         first = states.get(self._first)
         A = AT_TIP if first is None or first.A is None else first.A
-        if not H.any():  # no camera sees anything
+        if not H.any():  # no camera sees any feature
             return JointCommand(self._rest, np.zeros(6))
         problem = Problem(
             joints.position,
@@ -315,7 +314,7 @@ class Servo:
 
 
 def command_of(solution: Solution, A: FloatArray, names: tuple[str, ...]) -> JointCommand:
-    """Return a solution as a law gives it; A (6, 6) of a camera that is not at the tip."""
+    """Return a solution as the command of a law; A (6, 6) of a camera that is not at the tip."""
     said = describe(solution.active, solution.slack, solution.solved, names)
     return JointCommand(
         solution.rates,

@@ -1,4 +1,4 @@
-"""One camera of a servo: where it is, what it saw last, and how its features move."""
+"""One camera of a servo: its pose, its last image, and the motion of its features."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,20 +25,20 @@ Cameras: TypeAlias = Camera | CameraMounting | Mapping[str, CameraMounting]
 NOTHING_SEEN = ImagePoints(
     "", 0.0, np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0, dtype=np.bool_), ()
 )
-_FEWEST_TURNED = 3  # features that tell how the target is turned
-_STALE_S = 0.3  # beside other cameras, what one saw longer ago no longer counts
+_FEWEST_TURNED = 3  # features that determine the orientation of the target
+_STALE_S = 0.3  # with several cameras, older measurements of one are ignored
 
 
 class ServoCamera:
-    """Brings what a camera saw last to the time of the joints, as objectives need it.
+    """Predicts a camera's last measurement to the time of the joints, for the objectives.
 
     Args:
         arm: up to its tip.
         mounting: of the camera.
-        depth_m: believed depth of the features, (M,) or (1,) for all; None where it is not known.
-        motion: what is assumed of the features between exposure and now.
-        features: in the target's frame, (M, 3), m, where they are known.
-        faces: that they lie on, where a surface is known around them.
+        depth_m: believed depth of the features, (M,) or (1,) for all; None if unknown.
+        motion: assumptions about the features between exposure and now.
+        features: in the target's frame, (M, 3), m, if known.
+        faces: with the features, if a surface is known around them.
         period_s: between two images.
     """
 
@@ -53,7 +53,7 @@ class ServoCamera:
         period_s: float,
     ) -> None:
         self.mounting = mounting
-        self.view = NOTHING_SEEN  # what it saw last
+        self.view = NOTHING_SEEN  # the last measurement
         self._arm, self._depth_m, self._period_s = arm, depth_m, period_s
         self._features, self._faces = features, faces
         self._predicts = motion.prediction
@@ -63,16 +63,16 @@ class ServoCamera:
 
     @property
     def feeds_forward(self) -> bool:
-        """Whether features or depth are carried to now, or the target's motion is fed forward."""
+        """Whether features or depth are predicted, or the target's motion is fed forward."""
         return self._motion is not None
 
     def take_over(self, previous: "ServoCamera") -> None:
-        """Go on with the target's motion and the depth as another servo's camera has them."""
+        """Continue with the estimates of target motion and depth of another servo's camera."""
         self._motion = previous._motion
 
     @property
     def depth_m(self) -> FloatArray:
-        """Believed depth of the features, (M,), or (1,) for all alike; refused if not known."""
+        """Believed depth of the features, (M,), or (1,) for all."""
         if self._depth_m is None:
             raise InputError("Servo", "depth_m", NOTHING, "the depth of the features in metres")
         return self._depth_m
@@ -83,19 +83,19 @@ class ServoCamera:
         return np.full(count, depth[0]) if len(depth) == 1 else depth
 
     def is_fresh(self, time: float) -> bool:
-        """Whether it saw something lately enough to count beside other cameras."""
+        """Whether its last measurement is recent enough to count beside other cameras."""
         return self.view is not NOTHING_SEEN and time - self.view.time <= _STALE_S
 
     def state(
         self, observation: Observation, reference: Reference, joints: JointState, *, weighted: bool
     ) -> CameraState:
-        """Return what the objectives know of the camera, with features at the time of the joints.
+        """Return the camera's data for the objectives, with features at the time of the joints.
 
         Args:
             observation: of this tick; the camera's image in it may be an earlier one.
             reference: desired values in this camera's image.
             joints: now.
-            weighted: whether features weigh by how well their places are known.
+            weighted: whether features are weighted by their accuracy.
         """
         view, camera = self.view, self.mounting.camera
         depth, share = self._depth(reference, len(view.found)), float("nan")
@@ -142,11 +142,11 @@ class ServoCamera:
         )
 
     def state_of(self, features: Points, desired: Points, q: FloatArray) -> CameraState:
-        """Return what the objectives know of given features of a stationary target.
+        """Return the camera's data for given features of a stationary target.
 
         Args:
-            features: as they are.
-            desired: as they should be.
+            features: the present ones.
+            desired: the desired ones.
             q: joint positions, (n,).
         """
         known = state_of(features, desired)
@@ -156,13 +156,13 @@ class ServoCamera:
     def _shown(
         self, found: BoolArray, now: FloatArray, desired: FloatArray | None, reference: Reference
     ) -> FloatArray | None:
-        """Return the faces that show the features found, here and as desired, (F, 6).
+        """Return the faces that show the features found, now and as desired, (F, 6).
 
         Args:
-            found: which they are, (M,).
-            now: where they are in the camera's frame, (K, 3), m.
+            found: mask of them, (M,).
+            now: their positions in the camera frame, (K, 3), m.
             desired: normalized coordinates, (K, 2).
-            reference: with their desired depth, if that is known.
+            reference: with their desired depth, if known.
         """
         if self._faces is None or self._features is None:
             return None
@@ -184,7 +184,7 @@ class ServoCamera:
         return self.believed_depth(count) if count else np.empty(0)
 
     def _pose(self, q: FloatArray) -> dict[str, Any]:
-        """Return the arm's part of the camera's state."""
+        """Return the arm's part of the camera's data."""
         if self.mounting.at_tip:
             return {"arm": self._arm, "q": q}
         T_world_tip = self._arm.forward_kinematics(q)
@@ -195,7 +195,7 @@ class ServoCamera:
 
 
 def mountings_by_name(cameras: Cameras) -> dict[str, CameraMounting]:
-    """Return the mountings of cameras by their names; "" is that of the only one."""
+    """Return the mountings of cameras by name; "" is the name of a single one."""
     if isinstance(cameras, Camera):
         return {"": CameraMounting(cameras)}
     if isinstance(cameras, CameraMounting):
@@ -206,12 +206,12 @@ def mountings_by_name(cameras: Cameras) -> dict[str, CameraMounting]:
 
 
 def depth_for(given: ArrayLike | Mapping[str, ArrayLike] | None, camera: str) -> FloatArray | None:
-    """Return the believed depths, (M,) or (1,), that are given for a camera; None if none are."""
+    """Return the believed depths, (M,) or (1,), given for a camera; None if there are none."""
     if isinstance(given, Mapping):
         given = given.get(camera)
     if given is None:
         return None
     depth = frozen(np.atleast_1d(np.asarray(given, dtype=np.float64)), (None,), "depth_m")
     if not (depth > 0).all():
-        raise InputError("Servo", "depth_m", given, "depths above zero")
+        raise InputError("Servo", "depth_m", given, "positive depths")
     return depth

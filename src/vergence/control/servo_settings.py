@@ -61,11 +61,11 @@ class ServoSettings:
         return self.objectives[0].objective
 
     def motion(self, depth: Depth, stationary: bool) -> MotionSettings:
-        """Return what is assumed of the features between their exposure and now.
+        """Return the assumptions about the features between their exposure and now.
 
         Args:
-            depth: where it is had from.
-            stationary: whether the target is declared so.
+            depth: source of their depth.
+            stationary: whether the target is declared stationary.
         """
         feeds = self.feed_forward
         if feeds is None:
@@ -120,7 +120,7 @@ class ServoSettings:
 
 
 def _term(given: Any, place: Place) -> WeightedObjective:
-    """Return an objective from its table, its weight and camera beside its own keys."""
+    """Return an objective from its table, which also contains its weight and camera."""
     if isinstance(given, WeightedObjective):
         return given
     if not isinstance(given, Mapping):
@@ -146,7 +146,7 @@ def _term(given: Any, place: Place) -> WeightedObjective:
 
 
 def _flat(term: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table of a term: its objective's with weight and camera beside."""
+    """Return the table of a term: that of its objective with weight and camera added."""
     return {
         **term["objective"],
         **{key: term[key] for key in ("weight", "camera") if key in term},

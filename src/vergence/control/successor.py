@@ -1,4 +1,4 @@
-"""A law that continues with what another has found out."""
+"""A law that continues with another law's estimates."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,8 +7,8 @@ from vergence.control.law import Law
 
 @runtime_checkable
 class Successor(Law, Protocol):
-    """A law that may replace another while the arm moves, without a jolt."""
+    """A law that may replace another while the arm moves, without a jump in velocity."""
 
     def take_over(self, previous: Law) -> bool:
-        """Go on with the estimates of the law before; return whether it is of a kind that can."""
+        """Take over the estimates of the law before; return whether it is of a suitable kind."""
         ...

@@ -6,7 +6,7 @@ from vergence.control.objectives import Objective
 
 
 class Term(NamedTuple):
-    """An objective with its weight, and the camera that it is about."""
+    """An objective with its weight and its camera."""
 
     objective: Objective
     weight: float = 1.0

@@ -1,4 +1,4 @@
-"""Depth as a part: where the law has the depth of its image points from."""
+"""Depth as a part: the source of the depth of a law's image points."""
 
 from vergence.control.depth.carried import CarriedDepth
 from vergence.control.depth.depth import Depth, Depths, DepthSource, MeasuredPoints

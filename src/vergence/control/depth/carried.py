@@ -10,11 +10,11 @@ from vergence.parts import part
 
 @part("depth", "carried")
 class CarriedDepth:
-    """The depth believed at the start, updated from the camera's motion; the target must rest."""
+    """The depth believed at the start, updated from camera motion; needs a stationary target."""
 
     @property
     def estimates_motion(self) -> bool:
-        """It is not right for a target that moves in depth."""
+        """False: it is wrong for a target that moves in depth."""
         return False
 
     def bind(self, features: FloatArray | None) -> "CarriedSource":
@@ -29,15 +29,15 @@ class CarriedSource:
         self._last: tuple[FloatArray, FloatArray] | None = None  # T_camera_scene, points (M, 3)
 
     def update(self, exposure: MeasuredPoints) -> Depths:
-        """Return the depths of the last exposure, seen from where the camera is now."""
+        """Return the depths at the last exposure, as seen from the present camera pose."""
         return Depths(self.carry(exposure, np.full(len(exposure.points), np.nan)))
 
     def carry(self, exposure: MeasuredPoints, measured_m: FloatArray) -> FloatArray:
-        """Return depths (M,), m: those that were measured, the others as `update` has them.
+        """Return depths (M,), m: measured ones where known, the others as by `update`.
 
         Args:
             exposure: the image.
-            measured_m: depths (M,), NaN where there is none.
+            measured_m: depths (M,), NaN where unknown.
         """
         depth = exposure.believed_m
         carried = np.full((len(depth), 3), np.nan)

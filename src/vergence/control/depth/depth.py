@@ -1,4 +1,4 @@
-"""Where the depth of image points comes from: what is given to a source, and what it answers."""
+"""The source of the depth of image points: its input and its result."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -9,7 +9,7 @@ from vergence.signals import TargetState
 
 
 class MeasuredPoints(NamedTuple):
-    """One image of the features, as a depth source is given it."""
+    """One image of the features, as the input of a depth source."""
 
     time: float  # s
     points: FloatArray  # (M, 2) normalized coordinates
@@ -19,27 +19,27 @@ class MeasuredPoints(NamedTuple):
     believed_m: FloatArray  # (M,) depth at the start
     target: TargetState | None = None  # from a filter, where one runs
     measured_m: FloatArray | None = None  # (M,) by a depth camera; NaN where unknown
-    deviation_m: FloatArray | None = None  # (M,) of that, standard deviations
+    deviation_m: FloatArray | None = None  # (M,) standard deviation of measured_m
 
 
 class Depths(NamedTuple):
     """Depth of the features at an exposure."""
 
     depth_m: FloatArray  # (M,)
-    share: float = float("nan")  # largest standard deviation, a share of the depth; NaN if unknown
+    share: float = float("nan")  # largest relative standard deviation; NaN if unknown
 
 
 class DepthSource(Protocol):
-    """Follows the depth of one camera's features from image to image."""
+    """Tracks the depth of one camera's features from image to image."""
 
     def update(self, exposure: MeasuredPoints) -> Depths:
-        """Take in an image and return the depths at its exposure."""
+        """Process an image and return the depths at its exposure."""
         ...
 
 
 @runtime_checkable
 class Depth(Protocol):
-    """A way of knowing depth, as a cell file declares it."""
+    """A method of obtaining depth, as a cell file declares it."""
 
     @property
     def estimates_motion(self) -> bool:
@@ -50,16 +50,16 @@ class Depth(Protocol):
         """Return a source for one camera.
 
         Args:
-            features: in the target's frame, (M, 3), m; None where they are not known.
+            features: in the target's frame, (M, 3), m; None if unknown.
 
         Raises:
-            InputError: if it needs what is not known.
+            InputError: if the method needs something that is unknown.
         """
         ...
 
 
 def in_front(depth_m: FloatArray, believed_m: FloatArray) -> FloatArray:
-    """Return depths (M,) kept in front of the camera, though they were believed too small."""
+    """Return depths (M,) limited from below, to keep them in front of the camera."""
     least = 0.1 * believed_m
     kept: FloatArray = np.maximum(np.where(np.isfinite(depth_m), depth_m, least), least)
     return kept

@@ -1,4 +1,4 @@
-"""Depth as a depth camera measures it, at each feature."""
+"""Depth at each feature, measured by a depth camera."""
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from vergence.parts import part
 class DepthFromCamera:
     """The depth that a depth camera measures at each feature.
 
-    Where it tells nothing (a hole, an edge between near and far), the last depth is updated from
-    the camera's motion.
+    Where it has no value (a hole, an edge between near and far), the last depth is updated from the
+    camera's motion.
     """
 
     @property
     def estimates_motion(self) -> bool:
-        """Every image is measured by itself."""
+        """True: every image is measured independently."""
         return True
 
     def bind(self, features: FloatArray | None) -> "MeasuredSource":
@@ -27,7 +27,7 @@ class DepthFromCamera:
 
 
 class MeasuredSource:
-    """Takes the depth of each point as it was measured, and carries it where it was not."""
+    """Uses the measured depth of each point, and updates it from the camera's motion if missing."""
 
     def __init__(self) -> None:
         self._carried = CarriedSource()

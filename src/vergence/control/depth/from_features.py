@@ -12,23 +12,24 @@ from vergence.estimation.view import View
 from vergence.geometry import se3_inverse
 from vergence.parts import part
 
-_FEWEST = 4  # features: three fit up to four poses
-_STEPS = 6  # of Gauss-Newton an image
-_UNLIKELY = 16.0  # χ² a degree of freedom, above which the pose is sought anew
-_LEAST_PX_SHARE = 1e-4  # of the focal length: least deviation of a point, some tenth of a pixel
+_FEWEST = 4  # features; three have up to four poses
+_STEPS = 6  # of Gauss-Newton per image
+_UNLIKELY = 16.0  # χ² per degree of freedom, above which the pose is searched for again
+_LEAST_PX_SHARE = 1e-4  # of the focal length: smallest deviation of a point, about 0.1 px
 
 
 @part("depth", "from_features")
 class DepthFromFeatures:
     """The depth of known features at the pose that fits the newest image best.
 
-    The fit starts from the last one and takes a few steps; nothing is assumed of the target's
-    motion. Of several poses that fit the first image, the one nearest to the believed depth counts.
+    The fit starts from the last pose and takes a few steps; no assumption is made about the
+    target's motion. If several poses fit the first image, the one closest to the believed depth is
+    used.
     """
 
     @property
     def estimates_motion(self) -> bool:
-        """Every image is fitted by itself."""
+        """True: every image is fitted independently."""
         return True
 
     def bind(self, features: FloatArray | None) -> "FeatureSource":
@@ -55,7 +56,7 @@ class FeatureSource:
         self._pose: FloatArray | None = None  # (4, 4) T_scene_target
 
     def update(self, exposure: MeasuredPoints) -> Depths:
-        """Return the depths at the fitted pose; at the last one where too little is found."""
+        """Return the depths at the fitted pose; at the last pose if too few features are found."""
         found = exposure.found
         if found.sum() < _FEWEST:
             return self._at_last(exposure)
@@ -77,7 +78,7 @@ class FeatureSource:
         return depths_at(exposure, pose, covariance, self._features)
 
     def _off(self, exposure: MeasuredPoints, pose: FloatArray) -> float:
-        """Return how far the depths at a pose (4, 4) are from those believed, a share."""
+        """Return the relative difference between the depths at a pose (4, 4) and those believed."""
         depth = depths_at(exposure, pose, np.zeros((6, 6)), self._features).depth_m
         return float(np.abs(np.log(depth / exposure.believed_m)).max())
 
@@ -110,14 +111,14 @@ def _seen(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> V
 
 
 def _from_depths(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> FloatArray:
-    """Return the pose (4, 4) in the scene that brings features nearest to the believed depths."""
+    """Return the pose (4, 4) in the scene that best aligns features with the believed depths."""
     seen = lifted(exposure.points[found], exposure.believed_m[found])
     pose: FloatArray = se3_inverse(exposure.T_camera_scene) @ aligned(features[found], seen)
     return np.ascontiguousarray(pose)
 
 
 def fixes_pose(features: FloatArray) -> bool:
-    """Return whether features (M, 3) in an image fix the pose: four or more, not on a line."""
+    """Return whether the image of features (M, 3) determines the pose: four or more, not a line."""
     if len(features) < _FEWEST:
         return False
     extent = np.linalg.svd(features - features.mean(axis=0), compute_uv=False)

@@ -1,4 +1,4 @@
-"""Depth from the camera's own motion: each point's parallax before a stationary target."""
+"""Depth from the camera's own motion: the parallax of each point of a stationary target."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from vergence.control.depth.depth import Depths, MeasuredPoints
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.parts import knob, part
 
-_LEAST_VARIANCE = 1e-8  # of a point, normalized coordinates squared: some tenth of a pixel
-_GATE = 9.0  # χ² of a point's innovation, two degrees of freedom, above which it is left out
+_LEAST_VARIANCE = 1e-8  # of a point, normalized coordinates squared: about a tenth of a pixel
+_GATE = 9.0  # χ² of a point's innovation, two degrees of freedom, above which it is rejected
 
 
 @part("depth", "from_motion")
 class DepthFromMotion:
-    """Inverse depth of each point, filtered from its parallax; the target must rest.
+    """Inverse depth of each point, filtered from its parallax; the target must be stationary.
 
-    Before the camera has moved it is the depth believed at the start, with its deviation.
+    Before the camera has moved, it is the depth believed at the start with its deviation.
     """
 
     start_share: float = knob(0.3, above=0, upto=2)  # deviation at the start, of the inverse depth
@@ -23,7 +23,7 @@ class DepthFromMotion:
 
     @property
     def estimates_motion(self) -> bool:
-        """Parallax does not tell the target's motion from the camera's."""
+        """False: parallax cannot distinguish the target's motion from the camera's."""
         return False
 
     def bind(self, features: FloatArray | None) -> "MotionSource":
@@ -34,11 +34,11 @@ class DepthFromMotion:
 class MotionSource:
     """A scalar filter for each point's inverse depth ρ = 1/z.
 
-    With T from the last camera to this one, a point m at ρ is seen at R m + ρ t, which is linear in
-    ρ but for the projection: ∂m'/∂ρ = (t_xy - m' t_z) / w with w the third component.
+    With T from the last camera pose to this one, a point m with ρ is at R m + ρ t, which is linear
+    in ρ except for the projection: ∂m'/∂ρ = (t_xy - m' t_z) / w, with w the third component.
 
     Args:
-        settings: its numbers.
+        settings: the settings of the filter.
     """
 
     def __init__(self, settings: DepthFromMotion) -> None:
@@ -74,7 +74,7 @@ class MotionSource:
         usable &= (left**2).sum(axis=1) <= _GATE * noise
         rho = np.where(usable, rho + step, rho)
         variance = np.where(usable, gain, self._variance)
-        # From the last camera to this one: ρ' = ρ / w.
+        # From the last camera pose to this one: ρ' = ρ / w.
         w = np.maximum(np.where(np.isfinite(w), rays[:, 2] + rho * t[2], 1.0), 0.1)
         believed = 1.0 / now.believed_m
         self._inverse = np.clip(rho / w, 0.1 * believed, 10.0 * believed)

@@ -1,4 +1,4 @@
-"""Depth from the target's pose, as a filter estimates it."""
+"""Depth from the target's pose as estimated by a filter."""
 
 import numpy as np
 from numba import njit
@@ -15,7 +15,7 @@ class DepthFromPose:
 
     @property
     def estimates_motion(self) -> bool:
-        """The filter follows a target that moves."""
+        """True: the filter tracks a moving target."""
         return True
 
     def bind(self, features: FloatArray | None) -> "PoseSource":
@@ -30,7 +30,7 @@ class DepthFromPose:
 
 
 class PoseSource:
-    """Looks the features up at the filter's pose.
+    """Computes the features' depths from the filter's pose.
 
     Args:
         features: in the target's frame, (M, 3), m.
@@ -40,7 +40,7 @@ class PoseSource:
         self._features = features
 
     def update(self, exposure: MeasuredPoints) -> Depths:
-        """Return the depths at the estimated pose; those believed before there is one."""
+        """Return the depths at the estimated pose, or the believed ones if there is none."""
         target = exposure.target
         if target is None:
             return Depths(exposure.believed_m)
@@ -55,13 +55,13 @@ def depths_at(
 ) -> Depths:
     """Return the depths of features at a pose, with their deviation.
 
-    With a the lever of a feature and r the camera's optical axis along the scene's axes,
+    With a the lever of a feature and r the camera's optical axis, in scene axes,
     δz = r·δp + (a × r)·δθ.
 
     Args:
         exposure: of the image.
         T_scene_target: the pose, (4, 4).
-        covariance: of its position and rotation along the scene's axes, (6, 6).
+        covariance: of its position and rotation in scene axes, (6, 6).
         features: in the target's frame, (M, 3), m.
     """
     depth, deviation = _depths_at(exposure.T_camera_scene, T_scene_target, covariance, features)

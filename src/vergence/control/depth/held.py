@@ -1,4 +1,4 @@
-"""Depth that stays as it was believed at the start."""
+"""Constant depth, as believed at the start."""
 
 from vergence.arrays import FloatArray
 from vergence.control.depth.depth import Depths, MeasuredPoints
@@ -11,11 +11,11 @@ class HeldDepth:
 
     @property
     def estimates_motion(self) -> bool:
-        """It is not right for a target that moves in depth."""
+        """False: it is wrong for a target that moves in depth."""
         return False
 
     def bind(self, features: FloatArray | None) -> "HeldDepth":
-        """Return itself: there is nothing to remember."""
+        """Return itself: it has no state."""
         return self
 
     def update(self, exposure: MeasuredPoints) -> Depths:

@@ -1,4 +1,4 @@
-"""Limits: constraint rows that the quadratic program keeps, hard or by priority."""
+"""Limits: constraint rows of the quadratic program, hard or relaxed by priority."""
 
 from vergence.control.limits._rows import (
     COLLISION,

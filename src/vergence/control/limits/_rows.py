@@ -9,40 +9,40 @@ from vergence.arrays import FloatArray, IntArray
 from vergence.control.guard import stoppable_speed
 from vergence.features import interaction_matrix_points
 
-# Kinds of rows. The first three are what the arm can do: they are hard.
+# Kinds of rows. The first three are the capabilities of the arm: they are hard.
 KIND_NAMES = (
     "joint positions", "joint rates", "joint accelerations",
     "collision", "view", "occlusion", "singularity", "joint margin",
 )  # fmt: skip
 POSITION, RATE, ACCELERATION, COLLISION, VIEW, OCCLUSION, SINGULARITY, JOINT_MARGIN = range(8)
-RELAXED = KIND_NAMES[3:]  # in the priority order that holds unless the user gives another
+RELAXED = KIND_NAMES[3:]  # in default priority order
 X, Y, X_FLOW, Y_FLOW, DEPTH, X_SPREAD, Y_SPREAD = range(7)  # columns of `pack_features`
 
 
 class ConstraintSettings(NamedTuple):
-    """Margins, and how soon a border is felt; packed for the kernel."""
+    """Margins, and rates of approach; packed for the kernel."""
 
-    approach_rate: float  # 1/s: a border is neared at most at this share of what is left a second
-    joint_margin: float  # soft margin to position limits, share of a joint's range
-    view_low: FloatArray  # (2,) normalized coordinates the features stay above
-    view_high: FloatArray  # (2,) and below
-    depth_low: float  # the true depth is at least this factor of the believed one
-    depth_high: float  # and at most this
-    manipulability_min: float  # √det(J Jᵀ) is kept above it; 0 for no such row
-    clearance: float  # m, of sight lines from solids
+    approach_rate: float  # 1/s: largest rate of approach, as a fraction of the distance left
+    joint_margin: float  # soft margin to position limits, as a fraction of a joint's range
+    view_low: FloatArray  # (2,) lower bounds of the features, normalized coordinates
+    view_high: FloatArray  # (2,) and upper ones
+    depth_low: float  # lower bound on the true depth over the believed one
+    depth_high: float  # and upper bound
+    manipulability_min: float  # lower bound on √det(J Jᵀ); 0 for no such row
+    clearance: float  # m, distance between lines of sight and obstacles
     priority: IntArray  # (K,) by kind: 0 for a hard limit, then 1, 2, …, the last relaxed first
 
 
 def pack_features(
     points: FloatArray, flow: FloatArray, depth: FloatArray, spread: FloatArray | None = None
 ) -> FloatArray:
-    """Return what the limits know of the features, one row each, (M, 7).
+    """Return the features as the limits use them, one row each, (M, 7).
 
     Args:
         points: now, normalized coordinates, (M, 2).
-        flow: their motion by the target's own, (M, 2), 1/s.
+        flow: caused by the target's own motion, (M, 2), 1/s.
         depth: (M,), m.
-        spread: how far off they may lie, normalized, (M, 2); exact if None.
+        spread: possible error of the points, normalized, (M, 2); none if None.
     """
     off = np.zeros_like(points) if spread is None else spread
     return np.column_stack((points, flow, depth, off))
@@ -72,20 +72,20 @@ def constraint_rows(
 ) -> ConstraintRows:
     """Return every row of one tick.
 
-    Hard rows hold the rate, the acceleration and the distance needed to brake before a position
-    limit. The others are barriers, ḣ ≥ -γ h for a margin h: outside (h < 0) they lead back at the
-    same pace. View rows are doubled for the nearest and the farthest depth, between which the
-    image motion is linear in 1/Z, so they hold for every depth of the range.
+    Hard rows keep the rate, the acceleration and the braking distance before a position limit. The
+    others are barriers, ḣ ≥ -γ h for a margin h; outside (h < 0) they lead back at the same rate.
+    View rows exist for the nearest and for the farthest depth; since image motion is linear in 1/Z,
+    they hold for every depth in between.
 
     Args:
         q: joint positions, (n,).
         velocity: joint rates now, (n,).
         limits: rows q_min, q_max, rate_max, acceleration_max, (4, n).
-        period: how long the command will act, s.
+        period: time for which the command acts, s.
         J_camera: (6, n).
-        features: of `pack_features`, (M, 7).
-        C_sight: of `sight_rows`, (R, n).
-        d_sight: of `sight_rows`, (R,).
+        features: from `pack_features`, (M, 7).
+        C_sight: from `sight_rows`, (R, n).
+        d_sight: from `sight_rows`, (R,).
         yoshikawa: √det(J Jᵀ).
         yoshikawa_gradient: its gradient, (n,).
         settings: margins.
@@ -124,9 +124,9 @@ def constraint_rows(
 def fastest(
     room: float, velocity: float, rate_max: float, a: float, period: float
 ) -> tuple[float, int]:
-    """Return how fast a joint may move towards a limit, and the kind of what says so.
+    """Return the largest speed of a joint towards a limit, and the kind of limit that sets it.
 
-    What cannot be reached within the acceleration is brought as near as it can be.
+    If the acceleration limit prevents that speed, the nearest possible one is returned.
     """
     speed, kind = rate_max, RATE
     stoppable = stoppable_speed(room, a, period)
@@ -145,9 +145,9 @@ def view_rows(
     features: FloatArray,
     settings: ConstraintSettings,
 ) -> None:
-    """Fill eight rows a feature, C (8M, n) and d (8M,): four borders, at two depths each.
+    """Fill eight rows per feature, C (8M, n) and d (8M,): four borders, at two depths each.
 
-    A feature behind the camera has no rows, and a border at infinity has none either.
+    A feature behind the camera has no rows, nor does a border at infinity.
     """
     L = interaction_matrix_points(features[:, :2], features[:, DEPTH])
     near, far = 1.0 / settings.depth_low, 1.0 / settings.depth_high
@@ -157,7 +157,7 @@ def view_rows(
         for a in range(2):
             row, image, flow = 8 * j + 4 * a, 2 * j + a, features[j, X_FLOW + a]
             room = 0.5 * (settings.view_high[a] - settings.view_low[a])
-            spread = min(features[j, X_SPREAD + a], 0.5 * room)  # or nowhere would be far enough in
+            spread = min(features[j, X_SPREAD + a], 0.5 * room)  # else nowhere is far enough inside
             below = features[j, a] - settings.view_low[a] - spread
             above = settings.view_high[a] - features[j, a] - spread
             for i in range(C.shape[1]):

@@ -14,9 +14,9 @@ def facing_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the rows that keep the camera in front of faces, C (F, n) and d (F,).
 
-    With the middle c and outward normal o of a face, both in the camera's frame, it is seen at
-    the sine h = -o·c/‖c‖, and for a stationary target ḣ = (o + h c/‖c‖)·v/‖c‖. The row is the
-    barrier ḣ ≥ -γ (h - h_min).
+    With the centre c and outward normal o of a face, both in the camera frame, it is seen at the
+    sine h = -o·c/‖c‖, and for a stationary target ḣ = (o + h c/‖c‖)·v/‖c‖. The row is the barrier
+    ḣ ≥ -γ (h - h_min).
 
     Args:
         faces: c and o of each, (F, 6).
@@ -41,12 +41,12 @@ def facing_rows(
 
 @njit(cache=True, error_model="numpy")
 def flat_face(features: FloatArray) -> FloatArray:
-    """Return the side that a camera sees of features in a plane, c and o in its frame, (1, 6).
+    """Return the visible side of coplanar features, c and o in the camera frame, (1, 6).
 
-    Features that are not flat, as they are believed, have none: (0, 6).
+    Features whose believed positions are not coplanar have none: (0, 6).
 
     Args:
-        features: of `pack_features`, (M, 7).
+        features: from `pack_features`, (M, 7).
     """
     M, none = len(features), np.zeros((0, 6))
     if M < 3:

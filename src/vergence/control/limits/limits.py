@@ -17,7 +17,7 @@ _Factor = Annotated[float, Field(ge=1, le=1e3)]
 
 @runtime_checkable
 class Limit(Protocol):
-    """A limit of a user's own, as rows C q̇ ≥ d."""
+    """A user's own limit, as rows C q̇ ≥ d."""
 
     def rows(
         self, arm: Arm, q: FloatArray, velocity: FloatArray, period_s: float
@@ -28,7 +28,7 @@ class Limit(Protocol):
             arm: up to its tip.
             q: joint positions, (n,).
             velocity: joint rates now, (n,).
-            period_s: how long the command will act.
+            period_s: time for which the command acts, s.
         """
         ...
 
@@ -37,8 +37,8 @@ class Limit(Protocol):
 class Limits:
     """Limits of the quadratic program. Joint positions, rates and accelerations are hard.
 
-    The others are relaxed when they conflict, the last of `order` first, then a user's own; the
-    slack is reported. A limit that is not in `order` is not kept.
+    The others are relaxed when they conflict, the last of `order` first, but after a user's own;
+    the slack is reported. A limit that is not in `order` is not enforced.
     """
 
     order: tuple[Relaxed, ...] = knob(RELAXED)  # highest priority first

@@ -1,7 +1,7 @@
-"""Lines of sight: how far obstacles are from coming between a camera and its features.
+"""Lines of sight: the distance of obstacles from occluding features.
 
-Every solid is a rounded box, the points within a radius of a box: a ball, a rod and a box are such,
-and anything else lies in one.
+Every solid is a rounded box, the points within a radius of a box. This includes balls, rods and
+boxes; anything else is enclosed in one.
 """
 
 import numpy as np
@@ -9,33 +9,33 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 
-# Columns of a solid: its axes in the world, row by row; its middle, half its sides, its radius.
+# Columns of a solid: axes in the world, row by row; centre, half sides, radius.
 AXES, MIDDLE, HALF, RADIUS = 0, 9, 12, 15
 COLUMNS = 16
 NO_SOLIDS = np.empty((0, COLUMNS))
 
-END = 0.95  # of a line: what is nearer to the feature than the rest lies beside or behind it
-NEAR = 0.3  # m: what is farther from a line cannot come into it before the next look
+END = 0.95  # of a line: a solid nearest beyond this lies beside or behind the feature
+NEAR = 0.3  # m: a solid farther from a line cannot reach it before the next tick
 
 
 @njit(cache=True, error_model="numpy")
 def sight_gap(
     eye: FloatArray, feature: FloatArray, solid: FloatArray, work: FloatArray
 ) -> tuple[float, float]:
-    """Return how far a solid is from a sight line, m, and where on the line it is nearest.
+    """Return the distance of a solid from a line of sight, m, and where on the line it is nearest.
 
     With e(t) the vector from the box to the line's point t, d/dt ½ ‖e‖² = e · (feature - eye) grows
-    piecewise linearly; its bends are where the line crosses a plane of a side. Of a line that
-    pierces the box the gap is how far it has to be moved aside to come free, negative.
+    piecewise linearly, with bends where the line crosses the plane of a side. For a line that
+    intersects the box, the gap is minus the shift that frees it.
 
     Args:
         eye: (3,).
-        feature: (3,), where the line ends.
+        feature: (3,), the end of the line.
         solid: (16,).
-        work: (4, 3); its first row is filled with the unit vector from the solid to the line.
+        work: (4, 3); its first row is set to the unit vector from the solid to the line.
 
     Returns:
-        The gap, and the share of the line, 0 at the eye; `END` if it is nearest beyond that.
+        The gap, and the fraction of the line, 0 at the eye; `END` if it is nearest beyond that.
     """
     normal, a, d, e = work[0], work[1], work[2], work[3]
     half = solid[HALF:RADIUS]
@@ -64,7 +64,7 @@ def sight_gap(
 
 @njit(cache=True, error_model="numpy")
 def _beyond(x: float, half: float) -> float:
-    """Return how far x lies outside -half … half, with its sign."""
+    """Return the signed distance of x beyond -half … half."""
     return x - min(max(x, -half), half)
 
 
@@ -104,9 +104,9 @@ def _nearest(a: FloatArray, d: FloatArray, half: FloatArray) -> float:
 def _pierced(
     a: FloatArray, d: FloatArray, half: FloatArray, aside: FloatArray
 ) -> tuple[float, float]:
-    """Return where the line is inside the box, and the gap, for the shortest way aside; fills it.
+    """Return where the line is inside the box, and the gap for the shortest shift; fills `aside`.
 
-    A line comes free over a side or over an edge; over an edge along that is the normal of both.
+    A line is freed over a side or over an edge; over an edge along the common normal of both.
     """
     first, last, best = 0.0, END, -np.inf
     for i in range(3):
@@ -147,16 +147,16 @@ def sight_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Return C (R, n) and d (R,) that keep solids at a distance from the lines to the features.
 
-    Where the solid is nearest, a share t of the way, the line moves with (1 - t) of the camera's
-    velocity and t of the feature's. A solid nearest beyond `END` has no row, nor has a far one.
+    At the fraction t of the line where the solid is nearest, the line moves with (1 - t) of the
+    camera's velocity and t of the feature's. A solid nearest beyond `END` or far away has no row.
 
     Args:
         T_world_camera: (4, 4).
         J_camera: (6, n).
-        features: of `pack_features`, (M, 7).
+        features: from `pack_features`, (M, 7).
         solids: (K, 16).
-        clearance: kept between a solid and a line, m.
-        approach_rate: share of the room left that may be used up in a second.
+        clearance: to keep between a solid and a line, m.
+        approach_rate: fraction of the distance left that may be used up per second.
     """
     n, R, eye = J_camera.shape[1], T_world_camera[:3, :3], T_world_camera[:3, 3]
     found = np.empty((len(features) * len(solids), 6))  # the normal in the camera, t, gap, feature

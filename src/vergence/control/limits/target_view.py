@@ -1,4 +1,4 @@
-"""A target of known shape, and what of it has to stay in view."""
+"""The corners of a target of known shape that must stay in view."""
 
 from dataclasses import replace
 
@@ -12,21 +12,21 @@ from vergence.estimation.feature_faces import FeatureFaces, faces_in_view
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import TargetState
 
-_SIGMAS = 2.0  # how far off a corner is allowed for, in standard deviations of its place
+_SIGMAS = 2.0  # standard deviations of a corner's position that are allowed for
 
 
 class TargetView:
-    """The corners of a target as a camera is expected to see them, between images too.
+    """The corners of a target as a camera is expected to see them, also between images.
 
-    Where they are follows from the estimated pose, extrapolated at the estimated velocity; how far
-    off they may be, from the covariance of that pose. Corners that the desired pose itself does
-    not show are left out. For a fixed camera the pose is kept in the frame of the arm's tip, which
-    holds the target.
+    Their positions follow from the estimated pose, extrapolated at the estimated velocity; their
+    possible errors follow from the covariance of that pose. Corners that are not visible at the
+    desired pose are ignored. For a fixed camera, the pose is kept in the frame of the arm's tip,
+    which holds the target.
 
     Args:
         mounting: of the camera.
         corners: of the target, in its own frame, (M, 3), m.
-        faces: that they lie on, in the same frame; None where not known.
+        faces: with the corners, in the same frame; None if unknown.
         low: lower bounds of the view, normalized coordinates, (2,).
         high: upper bounds, (2,).
     """
@@ -47,7 +47,7 @@ class TargetView:
         self._eye_desired = np.zeros((1, 3))
 
     def see(self, target: TargetState, T_camera_target: FloatArray, now: float) -> None:
-        """Take in a new estimate of the target.
+        """Process a new estimate of the target.
 
         Args:
             target: the estimate.
@@ -66,15 +66,15 @@ class TargetView:
             self._eye_desired = se3_inverse(T_camera_target)[None, :3, 3].copy()
 
     def features(self, T_world_tip: FloatArray) -> FloatArray:
-        """Return the corners as the camera sees them with its arm's tip there, (M, 7)."""
+        """Return the corners as the camera sees them at a pose of the arm's tip, (M, 7)."""
         T = self._mounting.T_camera_scene(T_world_tip)
         rows: FloatArray = pose_features(T, *self._target, self._kept, self._covariance)
         return rows
 
     def faces(self, T_world_tip: FloatArray) -> FloatArray | None:
-        """Return the faces that show the corners now and as desired, in the camera's frame, (F, 6).
+        """Return the faces that show the corners now and as desired, in the camera frame, (F, 6).
 
-        None where no faces are known.
+        None if no faces are known.
         """
         known = self._faces_kept
         if known is None:
@@ -84,11 +84,11 @@ class TargetView:
         return faces
 
     def advance(self, period_s: float) -> None:
-        """Extrapolate the target by a time."""
+        """Extrapolate the target by a time step."""
         self._target = MovingPose(moved(self._target, period_s), self._target.twist)
 
     def _shown(self, T_camera_target: FloatArray) -> BoolArray:
-        """Return which corners the desired pose shows within the margin, (M,)."""
+        """Return which corners are visible within the margin at the desired pose, (M,)."""
         points = transform_points(T_camera_target, self._corners)
         with np.errstate(divide="ignore", invalid="ignore"):
             image = points[:, :2] / points[:, 2:]
@@ -117,11 +117,11 @@ def pose_features(
     corners: FloatArray,
     covariance: FloatArray,
 ) -> FloatArray:
-    """Return the corners of a target as a camera sees them, as `pack_features` has it, (M, 7).
+    """Return the corners of a target as a camera sees them, as by `pack_features`, (M, 7).
 
-    With r a corner's lever from the target's origin and P = R_camera_scene [I, -[r]×], it moves
-    with P twist in the camera, and its place has the covariance P Σ Pᵀ; both are projected with
-    ∂(x, y)/∂p = [I, -(x, y)ᵀ] / Z. A corner behind the camera gets depth 0.
+    With r a corner's lever from the target's origin and P = R_camera_scene [I, -[r]×], the corner
+    moves with P twist in the camera, and its position has the covariance P Σ Pᵀ; both are projected
+    with ∂(x, y)/∂p = [I, -(x, y)ᵀ] / Z. A corner behind the camera gets depth 0.
 
     Args:
         T_camera_scene: pose of the frame that the target's pose is given in, (4, 4).

@@ -1,4 +1,4 @@
-"""Objectives: what the camera or the arm should do, one class a file."""
+"""Objectives: what the camera or the arm should do, one class per file."""
 
 from vergence.control.objectives._tracking import (
     PackedSetup,

@@ -1,4 +1,4 @@
-"""Between two images: a trajectory of poses at the inner rate, by a second-order filter."""
+"""A trajectory of poses between two images at the inner rate, by a second-order filter."""
 
 from numba import njit
 
@@ -12,12 +12,12 @@ def interpolate(
     """Advance the filter by one inner period.
 
     a = ω² Δ(goal, reference) + 2 ζ ω (goal's twist - reference's twist): the second-order
-    interpolating filter of [Lippiello2005] section IV. With the goal's twist zero it lags behind a
-    moving goal by 2 ζ/ω seconds, as the paper's does; with it, it keeps up.
+    interpolating filter of [Lippiello2005] section IV. If the goal's twist is zero, as in the
+    paper, it lags behind a moving goal by 2 ζ/ω seconds; with the true twist it does not.
 
     Args:
         reference: the filter's state.
-        goal: where to, and how fast that moves.
+        goal: desired pose and its velocity.
         frequency: ω, rad/s.
         damping: ζ.
         dt: inner period, s.

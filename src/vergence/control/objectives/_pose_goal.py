@@ -1,4 +1,4 @@
-"""Where the arm's tip should be, and how fast that place moves, for a desired relative pose."""
+"""The desired pose of the arm's tip, and its velocity, for a desired relative pose."""
 
 import numpy as np
 
@@ -9,12 +9,12 @@ from vergence.signals import TargetState
 
 
 def tip_goal_beside(target: TargetState, T_tip_target: FloatArray) -> MovingPose:
-    """Return where the tip should be at the target's time, and how it should move.
+    """Return the desired pose and motion of the tip at the target's time.
 
-    T_world_tip = T_world_target T_tip_target⁻¹, and it moves as one body with the target.
+    T_world_tip = T_world_target T_tip_target⁻¹, moving rigidly with the target.
 
     Args:
-        target: seen by any cameras.
+        target: observed by any cameras.
         T_tip_target: the desired pose of the target in the tip, (4, 4).
     """
     T_tip = se3_compose(target.T_world_target, se3_inverse(T_tip_target))
@@ -23,14 +23,14 @@ def tip_goal_beside(target: TargetState, T_tip_target: FloatArray) -> MovingPose
 
 
 def tip_goal_of_holder(target: TargetState, T_world_desired: FloatArray) -> MovingPose:
-    """Return where the tip should be so that what it holds is at a desired pose in the world.
+    """Return the pose of the tip at which the held target is at a desired pose in the world.
 
-    T_world_tip = T_world_desired T_tip_target⁻¹ with T_tip_target as it is seen, not as a model has
-    it: an object that is held otherwise reaches its place too. One that slips is followed by the
+    T_world_tip = T_world_desired T_tip_target⁻¹, with T_tip_target as measured instead of as
+    modelled, so an object that is held differently reaches its goal too. Slip is compensated by the
     opposite motion.
 
     Args:
-        target: held, with the pose of the tip.
+        target: held by the arm, with the pose of the tip.
         T_world_desired: (4, 4).
     """
     assert target.T_world_tip is not None
@@ -42,5 +42,5 @@ def tip_goal_of_holder(target: TargetState, T_world_desired: FloatArray) -> Movi
 
 
 def _with_lever(twist: FloatArray, lever: FloatArray) -> FloatArray:
-    """Return the twist (6,) of a point of the same body, a lever (3,) away."""
+    """Return the twist (6,) of a point of the same body at a lever (3,)."""
     return np.concatenate((twist[:3] + np.cross(twist[3:], lever), twist[3:]))

@@ -1,4 +1,4 @@
-"""The arithmetic of optimal tracking, [Nelson1995]: one tick from features to joint rates."""
+"""The computation of optimal tracking, [Nelson1995]: one tick from features to joint rates."""
 
 from typing import NamedTuple
 
@@ -20,8 +20,8 @@ from vergence.robot.manipulability import (
 )
 from vergence.robot.positive_definite import factor_spd, solve_factored
 
-# Times R: what going along with the target costs. So little that next to nothing of it is saved,
-# enough that the flow's noise does not shake axes that a small target hardly tells apart.
+# Times R: the cost of moving along with the target. So small that the motion is hardly reduced, yet
+# enough that the flow's noise does not shake axes that a small target barely distinguishes.
 SHARING = 1e-7
 
 
@@ -38,7 +38,7 @@ class TrackingGains(NamedTuple):
 
 
 class TrackingSetup(NamedTuple):
-    """All of a tick that stays the same from tick to tick."""
+    """The constants of a tick."""
 
     gains: TrackingGains
     focal_px: FloatArray  # (2,) fx, fy
@@ -52,11 +52,11 @@ class TrackingSetup(NamedTuple):
 
 
 class TrackingTick(NamedTuple):
-    """What a tick comes to."""
+    """The results of a tick."""
 
     rates: FloatArray  # (n,) joint rates, rad/s or m/s
-    v_camera: FloatArray  # (6,) the camera twist they were made from, m/s and rad/s
-    scale: float  # in (0, 1], by which the rates were slowed to keep their limits
+    v_camera: FloatArray  # (6,) the camera twist of the rates, m/s and rad/s
+    scale: float  # in (0, 1], applied to the rates to satisfy their limits
     w: float  # w'(q), [Nelson1995] eq. (26)
     penalty: float  # P(q), eq. (27)
     sigma: float  # smallest singular value of J, bounded from below
@@ -69,13 +69,13 @@ def tracking_displacement(
     """Return u, the camera's displacement over the next frame, (6,), by [Nelson1995] eq. (29).
 
     u = -(Bᵀ Q B + R)⁻¹ [Bᵀ Q (x - x_D) - S/(2 w'²) ∇_u w'], over the controlled axes only. With
-    the paper's gains u is a displacement a frame, so T is 1 in B but stays in ∇_u (31).
+    the paper's gains u is a displacement per frame, so T is 1 in B but stays in ∇_u (31).
 
-    The avoidance term grows without bound as w' vanishes, which in discrete time throws the arm;
-    its share of u is bounded to `avoidance_max`.
+    The avoidance term diverges as w' vanishes, which in discrete time would throw the arm; its part
+    of u is therefore limited to `avoidance_max`.
 
     Args:
-        BtB: Bᵀ B, (6, 6), B in px per m and per rad; its lower half is enough.
+        BtB: Bᵀ B, (6, 6), B in px per m and per rad; only its lower half is used.
         Bt_error: Bᵀ (x - x_D) of the features found, (6,).
         gains: the weights.
         w: w'(q).
@@ -106,15 +106,17 @@ def tracking_displacement(
 
 @njit(cache=True, error_model="numpy")
 def target_displacement(BtB: FloatArray, Bt_drift: FloatArray, gains: TrackingGains) -> FloatArray:
-    """Return the camera's displacement over the next frame that goes along with the target, (6,).
+    """Return the camera's displacement over the next frame that follows the target, (6,).
 
-    It is (17) with the drift for an error, and errors so dear that R only decides how axes with the
-    same effect share the motion. Added to (29), whose R then charges only for what is done about
-    the error, it leaves no lag behind a target in uniform motion. The paper has no such term.
+    It is (17) with the drift as the error, and errors so expensive that R only decides how axes
+    with the same effect share the motion. It is added to (29), whose R then applies only to the
+    correction of the error, so there is no lag behind a target in uniform motion. The paper has no
+    such term.
 
     Args:
         BtB: as for `tracking_displacement`.
-        Bt_drift: Bᵀ times how far the target's own motion moves the features in a frame, (6,).
+        Bt_drift: Bᵀ times the displacement of the features by the target's own motion per frame,
+            (6,).
         gains: the weights.
     """
     dear = TrackingGains(
@@ -148,8 +150,8 @@ def image_square(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return Bᵀ B (6, 6), its lower half, Bᵀ (x - x_D) and Bᵀ drift (6,) of `image_model`.
 
-    They are summed point by point, in a third of the time that B takes to be written down first.
-    The drift is how far the target's own motion moves the features in a period, if known.
+    They are summed point by point, which takes a third of the time of building B first. The drift
+    is the displacement of the features by the target's own motion per period, if known.
     """
     BtB, Bt_error, Bt_drift = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
     across_px, down_px = focal_px[0] * focal_px[0], focal_px[1] * focal_px[1]
@@ -169,7 +171,7 @@ def image_square(
 
 
 class PackedSetup(NamedTuple):
-    """A setup in two arrays: every array costs a call from Python 0.1 µs, a container more."""
+    """A setup in two arrays: an array costs 0.1 µs per call from Python, a container more."""
 
     weights: FloatArray  # (27,) the numbers and the gains
     joints: FloatArray  # (m + 1, 5, 4) the chain's transforms, limits and coupling
@@ -192,14 +194,14 @@ def pack_setup(setup: TrackingSetup) -> PackedSetup:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def unpack_chain(joints: FloatArray) -> Chain:
-    """Read the chain back."""
+    """Unpack the chain."""
     coupled = int(joints[-1, 4, 3])
     return Chain(joints[:, :3, :3], joints[:, :3, 3], joints[:-1, 4, 3], joints[:coupled, 4, :3])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def unpack_gains(w: FloatArray) -> TrackingGains:
-    """Read the gains back."""
+    """Unpack the gains."""
     return TrackingGains(w[0], w[9:15], w[1], w[15:21], w[21:27], w[2], w[3])
 
 
@@ -211,17 +213,17 @@ def optimal_tracking_tick(
     features: FloatArray,
     result: FloatArray,
 ) -> None:
-    """One tick: features and joint positions in, joint rates and what led to them out.
+    """Compute one tick: joint rates and intermediate results from features and joint positions.
 
-    The setup comes packed inside kernels too: handing containers on costs a tick a fifth more.
+    The setup is packed inside kernels as well: passing containers would make a tick a fifth slower.
 
     Args:
-        weights: of `pack_setup`.
-        joints: of `pack_setup`.
+        weights: from `pack_setup`.
+        joints: from `pack_setup`.
         q: joint positions, (n,).
-        features: as for `image_model`, (M, 5), or (M, 7) with the target's own motion in the
-            image as well, normalized, 1/s, which is then fed forward.
-        result: takes the fields of a `TrackingTick` one after the other, (n + 10,).
+        features: as for `image_model`, (M, 5); or (M, 7) with the image motion caused by the
+            target, normalized, 1/s, which is then fed forward.
+        result: set to the fields of a `TrackingTick` in order, (n + 10,).
     """
     n, gains, focal_px = len(q), unpack_gains(weights), weights[7:9]
     penalty_k, per_joint, damping = weights[4], weights[5] != 0.0, weights[6]
@@ -250,7 +252,7 @@ def optimal_tracking_tick(
 
 
 def unpack_tick(result: FloatArray) -> TrackingTick:
-    """Give the numbers of `optimal_tracking_tick` their names again."""
+    """Return the results of `optimal_tracking_tick` as named fields."""
     n = len(result) - 10
     scale, w, penalty, sigma = result[n + 6 :].tolist()
     return TrackingTick(result[:n], result[n : n + 6], scale, w, penalty, sigma)

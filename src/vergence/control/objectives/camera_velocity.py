@@ -1,4 +1,4 @@
-"""The camera moved at a given velocity along some of its axes."""
+"""Camera motion at a given velocity along some of its axes."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ _AXES = 3
 class CameraVelocity:
     """Moves the camera at a velocity along its axes x, y, z, beside other objectives: v_i = v_i*.
 
-    An axis whose velocity is zero is left to the others. Along a line that the other objectives
-    keep in its place it follows that line.
+    An axis whose velocity is zero is left to the others. If the other objectives keep a line in its
+    place, the camera moves along that line.
     """
 
     # Velocity along x, y, z.

@@ -23,16 +23,16 @@ InteractionModel = Literal["current", "desired", "mean"]
 class ImageBased:
     """Lets the error of a feature decay exponentially: L v = -λ (s - s_star) + ∂s_star/∂t - ∂s/∂t.
 
-    L is taken at the feature as it is, as it should be, or as the mean of both
-    [Chaumette2006] section 5. The mean alone brings a camera through half a turn about its axis.
-    Points count by how well their places are known; any other feature is of all points alike.
+    L is evaluated at the present feature, at the desired one, or as the mean of both
+    [Chaumette2006] section 5. Only the mean brings a camera through half a turn about its axis.
+    Points are weighted by their measurement accuracy; other features use all points equally.
     """
 
     gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
     interaction: InteractionModel = knob("mean")  # where L is evaluated
     # Feature computed from the image points.
     feature: type[Feature] = slot("feature", Points, by_class=True)
-    # Damping of the twist, for directions that the features leave free.
+    # Damping of the twist, for directions that the features do not determine.
     damping: float = knob(1e-6, above=0, upto=1, live=False)
 
     def quadratic(self, state: CameraState) -> Quadratic:
@@ -72,11 +72,11 @@ class ImageBased:
         return result
 
     def twist(self, features: Points, desired: Points) -> FloatArray:
-        """Return v_camera (6,) that this objective alone asks for, for a stationary target.
+        """Return v_camera (6,) of this objective alone, for a stationary target.
 
         Args:
-            features: as they are.
-            desired: as they should be.
+            features: the present ones.
+            desired: the desired ones.
         """
         quadratic = self.quadratic(state_of(features, desired))
         v_camera: FloatArray = np.linalg.solve(quadratic.H, quadratic.g).astype(np.float64)

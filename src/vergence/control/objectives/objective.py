@@ -1,4 +1,4 @@
-"""What an objective knows, and what it answers: a quadratic in the camera's twist or the joints."""
+"""Input and result of an objective: a quadratic in the camera's twist or in the joint rates."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -19,7 +19,7 @@ class Quadratic(NamedTuple):
 
     H: FloatArray  # (6, 6) positive semi-definite
     g: FloatArray  # (6,)
-    variance: float = 0.0  # that noise of the image gives the rows that H and g are made of
+    variance: float = 0.0  # variance of the rows of which H and g are made, caused by image noise
 
 
 class JointQuadratic(NamedTuple):
@@ -31,29 +31,29 @@ class JointQuadratic(NamedTuple):
 
 @dataclass(slots=True)
 class CameraState:
-    """What an objective knows of one camera at one tick; features that were not found are left out.
+    """The data of one camera at one tick for objectives; features that were not found are left out.
 
     Attributes:
-        mounting: the camera and where it is; None for an objective asked without an arm.
-        points: of the features now, normalized coordinates, (M, 2).
+        mounting: the camera and its pose; None for an objective used without an arm.
+        points: present features, normalized coordinates, (M, 2).
         depth_m: of the features, (M,).
-        flow: their motion by the target's own, (M, 2), 1/s.
-        desired_points: s_star, normalized coordinates, (M, 2); None where none is given.
+        flow: caused by the target's own motion, (M, 2), 1/s.
+        desired_points: s_star, normalized coordinates, (M, 2); None if there are none.
         desired_velocity: of s_star, (M, 2), 1/s; None for a stationary one.
-        desired_depth_m: depth of the features at the goal, (M,); None where it is not known.
-        count: how many features there are, found or not.
+        desired_depth_m: depth of the features at the goal, (M,); None if unknown.
+        count: number of features, found or not.
         period_s: between two images, s.
-        arm: up to its tip; None for an objective asked without an arm.
+        arm: up to its tip; None for an objective used without an arm.
         q: joint positions, (n,).
         A: v_camera = A v_tip, (6, 6); None for a camera at the tip.
         T_world_tip: pose of the arm's tip, (4, 4).
-        target: pose and velocity of the target; None where no filter estimates it.
-        T_camera_target: desired pose of the target, (4, 4); None where none is given.
+        target: estimated pose and velocity of the target; None if no filter runs.
+        T_camera_target: desired pose of the target, (4, 4); None if there is none.
         time: now, s.
-        depth_share: largest standard deviation of a depth, a share of it; NaN if unknown.
-        weights: roots (M, 2, 2) of what the rows of each feature weigh; all alike if None.
-        variance: of a row of a feature, weighted, by the noise of the image; normalized.
-        faces: that have to stay turned to the camera, see `Problem`; None where not known.
+        depth_share: largest relative standard deviation of a depth; NaN if unknown.
+        weights: roots (M, 2, 2) of the weights of each feature's rows; all 1 if None.
+        variance: of a feature's weighted row, caused by image noise; normalized.
+        faces: that must stay turned to the camera, see `Problem`; None if unknown.
     """
 
     mounting: CameraMounting | None
@@ -85,12 +85,12 @@ class CameraState:
 
     @property
     def features(self) -> Points:
-        """The features now."""
+        """The present features."""
         return Points(self.points, self.depth_m)
 
     @property
     def desired(self) -> Points:
-        """The features at the goal; as deep as they are now where their depth there is unknown."""
+        """The desired features; at their present depth if the desired depth is unknown."""
         assert self.desired_points is not None
         depth = self.depth_m if self.desired_depth_m is None else self.desired_depth_m
         return Points(self.desired_points, depth)
@@ -105,7 +105,7 @@ class CameraState:
 
 
 def state_of(features: Points, desired: Points) -> CameraState:
-    """Return the state of a camera without an arm that sees features and should see others."""
+    """Return the state of a camera without an arm for given present and desired features."""
     return CameraState(
         None,
         features.points,
@@ -136,7 +136,7 @@ def least_squares(
 
     Args:
         E: (k, 6).
-        desired: ė, what E v should be, (k,).
+        desired: ė, the desired value of E v, (k,).
         weight: w of each row, (k,), or one number.
         damping: μ of each axis, (6,), or one number.
     """

@@ -28,13 +28,13 @@ from vergence.robot.positive_definite import factor_spd, solve_factored, times_s
 
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
-_UNUSED_AXIS = 1e6  # times R: an axis outside `axes` costs too much to move
+_UNUSED_AXIS = 1e6  # times R: makes an axis outside `axes` too expensive to move
 _LEAST_DET = 1e-9  # of |det J|, by which its slope is divided
 _DAMPED_BELOW = 0.02  # smallest singular value of J below which its inverse is damped
 
 
 class Avoidance(NamedTuple):
-    """How far the arm is from limits and singularities, and which way leads away from them."""
+    """The distance of the arm from limits and singularities, and the direction away from them."""
 
     w: float  # w'(q), [Nelson1995] eq. (26), or w(q), eq. (24)
     gradient: FloatArray  # ∂w'/∂x along the camera's axes, (6,)
@@ -44,12 +44,12 @@ class Avoidance(NamedTuple):
 class OptimalTracking:
     """F = (x - x_D)ᵀ Q (x - x_D) + uᵀ R u + S / w'(q), [Nelson1995] eq. (28).
 
-    Feature errors and camera motion cost, and so does a poor configuration of the arm. The paper's
-    two-axis and four-axis strategies are choices of `axes`; with three or more features and all six
-    axes it keeps the whole pose. With the paper's gains u is a displacement per image period T.
+    Penalises feature errors, camera motion and poor configurations of the arm. The paper's two-axis
+    and four-axis strategies are choices of `axes`; with three or more features and all six axes it
+    keeps the whole pose. With the paper's gains, u is a displacement per image period T.
 
-    Departs from the paper in that the target's motion, where it is fed forward, is no unknown
-    disturbance: R charges only for what u adds to moving along with the target.
+    Departs from the paper in that the target's motion, if it is fed forward, is not an unknown
+    disturbance: R applies only to what u adds to moving along with the target.
     """
 
     # Camera axes used for tracking.
@@ -83,11 +83,11 @@ class OptimalTracking:
 
     @property
     def controlled(self) -> BoolArray:
-        """Which of the six axes track, (6,)."""
+        """The axes used for tracking, (6,)."""
         return axis_mask(self.axes)
 
     def gains(self, count: int, period_s: float) -> TrackingGains:
-        """Return the weights for a number of features and a time between images."""
+        """Return the weights for a given number of features and time between images."""
         given = np.broadcast_to(np.asarray(self.R, dtype=np.float64), (len(self.axes),))
         R = np.full(6, _UNUSED_AXIS * given.max())
         for axis, weight in zip(self.axes, given, strict=True):
@@ -165,5 +165,5 @@ def tracking_quadratic(
 
 
 def axis_mask(axes: tuple[str, ...]) -> BoolArray:
-    """Return which of the six camera axes are named, (6,)."""
+    """Return a mask of the named camera axes, (6,)."""
     return np.array([axis in axes for axis in AXES])

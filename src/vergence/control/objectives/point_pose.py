@@ -1,4 +1,4 @@
-"""Position-based servoing on points of known depth, without a filter of the pose."""
+"""Position-based servoing on points of known depth, without a pose filter."""
 
 from typing import Annotated
 

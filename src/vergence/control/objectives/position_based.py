@@ -1,4 +1,4 @@
-"""Position-based visual servoing: the target kept at a desired pose in the camera."""
+"""Position-based visual servoing: keeps the target at a desired pose in the camera."""
 
 from dataclasses import replace
 
@@ -22,9 +22,9 @@ class PositionBased:
     """Moves the arm's tip so that the target keeps a desired pose in a camera.
 
     The camera is on the arm, [Lippiello2005] section IV, or it is fixed and the arm holds the
-    target. Alone in a servo, it works at the inner rate: each image gives a goal, a second-order
-    filter makes a trajectory of it, and closed-loop inverse kinematics gives the tip's twist.
-    Beside others, the pose error decays at `closed_loop_hz`.
+    target. Alone in a servo, it works at the inner rate: each image provides a goal, a second-order
+    filter turns it into a trajectory, and closed-loop inverse kinematics computes the tip's twist.
+    Combined with other objectives, the pose error decays at `closed_loop_hz`.
     """
 
     # Natural frequency of the second-order filter.
@@ -32,8 +32,7 @@ class PositionBased:
     damping: float = knob(1.0, above=0, upto=100)  # damping ratio of the filter
     # Bandwidth with which the tip follows the filter.
     closed_loop_hz: float = knob(5.0, "Hz", above=0, upto=100)
-    # Of redundant joints at their limits, towards the middle of their range.
-    # Gain in the null space of redundant arms.
+    # Rate of redundant joints towards the middle of their range, in the null space.
     null_space_rate: float = knob(0.5, "rad/s or m/s", least=0, upto=10)
 
     def quadratic(self, state: CameraState) -> Quadratic:
@@ -56,13 +55,13 @@ class PositionBased:
 def tip_goal(
     target: TargetState, T_camera_target: FloatArray, mounting: CameraMounting, now: float | None
 ) -> MovingPose:
-    """Return where the arm's tip should be, and how fast that place moves.
+    """Return the desired pose of the arm's tip and its velocity.
 
     Args:
-        target: as estimated.
-        T_camera_target: desired, (4, 4).
+        target: the estimate.
+        T_camera_target: desired pose, (4, 4).
         mounting: of the camera.
-        now: time that the target is extrapolated to, s; that of its image if None.
+        now: time to which the target is extrapolated, s; that of its image if None.
     """
     if now is not None:
         seen = MovingPose(target.T_world_target, target.velocity)
@@ -76,14 +75,14 @@ def tip_goal(
 
 
 def tip_twist(arm: Arm, q: FloatArray, reference: MovingPose, gain: float) -> FloatArray:
-    """Return the twist (6,) that keeps the tip on a reference trajectory, in its own axes.
+    """Return the twist (6,) that keeps the tip on a reference trajectory, in its own frame.
 
     twist + gain · Δ(reference, tip), of the closed-loop inverse kinematics.
 
     Args:
         arm: up to the tip.
         q: joint set-points, (n,).
-        reference: where the tip should be, and how fast it should move.
+        reference: desired pose of the tip, and its velocity.
         gain: 1/s.
     """
     T = forward_kinematics(arm.chain, q)
@@ -96,9 +95,9 @@ class PoseTrajectory:
     """A trajectory of the arm's tip at the inner rate, from one goal to the next.
 
     Args:
-        objective: its numbers.
+        objective: its settings.
         arm: up to the tip.
-        period_s: the inner one.
+        period_s: the inner period.
     """
 
     def __init__(self, objective: PositionBased, arm: Arm, period_s: float) -> None:
@@ -115,18 +114,18 @@ class PoseTrajectory:
         return self._goal is not None
 
     def take_over(self, previous: "PoseTrajectory") -> None:
-        """Go on where another trajectory is."""
+        """Continue from the state of another trajectory."""
         self._goal, self._reference = previous._goal, previous._reference
         self._ahead = previous._ahead
 
     def aim(self, goal: MovingPose, q: FloatArray) -> None:
-        """Take a new goal; the trajectory begins where the arm is, q (n,), if there is none."""
+        """Set a new goal; without a trajectory, one begins at the present position, q (n,)."""
         self._goal = goal
         if self._reference is None:
             self._reference = MovingPose(forward_kinematics(self._arm.chain, q), np.zeros(6))
 
     def clear(self) -> None:
-        """Forget the goal and the trajectory."""
+        """Clear the goal and the trajectory."""
         self._goal = self._reference = self._ahead = None
 
     def twist(self, q: FloatArray) -> FloatArray:
@@ -135,7 +134,7 @@ class PoseTrajectory:
         return tip_twist(self._arm, q, self._reference, self._gain)
 
     def next_twist(self, q: FloatArray) -> FloatArray:
-        """Return the twist (6,) that leads on: the place of now, the velocity to the next one."""
+        """Return the twist (6,) for the next period: the present pose with the next velocity."""
         assert self._goal is not None
         assert self._reference is not None
         self._ahead = interpolate(
@@ -145,13 +144,13 @@ class PoseTrajectory:
         return tip_twist(self._arm, q, leading, self._gain)
 
     def advance(self, q: FloatArray, rates: FloatArray, held_back: bool) -> None:
-        """Go on by one inner period.
+        """Advance by one inner period.
 
         Args:
             q: joint set-points, (n,).
-            rates: that were commanded, (n,).
-            held_back: whether they do something else than the twist; then the trajectory continues
-                from where the tip will be.
+            rates: as commanded, (n,).
+            held_back: whether they differ from the twist; the trajectory then continues from where
+                the tip will be.
         """
         assert self._goal is not None
         self._reference = self._moving_tip(q, rates) if held_back else self._ahead

@@ -1,4 +1,4 @@
-"""Joints drawn to a posture, where the other objectives leave a choice."""
+"""Pulls the joints towards a posture, as far as the other objectives leave them free."""
 
 import numpy as np
 

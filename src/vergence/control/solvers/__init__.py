@@ -1,4 +1,4 @@
-"""Solvers: from a quadratic in the twist of the arm's tip to joint rates."""
+"""Solvers: compute joint rates from a quadratic in the twist of the arm's tip."""
 
 from vergence.control.solvers._redundancy import resolve_redundant
 from vergence.control.solvers.pseudo_inverse import (

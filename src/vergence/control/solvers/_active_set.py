@@ -9,16 +9,16 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 
 _TOLERANCE = 1e-10
 _MAX_STEPS = 200
-_FAR = 1e5  # farther than any row lets x go
+_FAR = 1e5  # beyond what any row allows for x
 
 
 class OrderedSolution(NamedTuple):
-    """The best point under the constraints, those of higher priority first."""
+    """The optimum under the constraints, those of higher priority first."""
 
     x: FloatArray  # (n,)
-    active: BoolArray  # (m,) rows that hold with equality and push
-    slack: FloatArray  # (m,) by how much each row is relaxed; 0 for rows that hold
-    solved: bool  # False: the steps ran out, x must not be used
+    active: BoolArray  # (m,) rows that hold with equality and have a multiplier
+    slack: FloatArray  # (m,) relaxation of each row; 0 for rows that hold
+    solved: bool  # False if the iteration limit was reached: x must not be used
 
 
 @njit(cache=True, error_model="numpy")
@@ -27,17 +27,17 @@ def solve_ordered_qp(
 ) -> OrderedSolution:
     """Minimise ½ xᵀ H x - gᵀ x subject to C x ≥ d, relaxing rows of lower priority first.
 
-    All rows are tried together. Only if they contradict each other are they taken by priority, and
-    of the rows in conflict the one of lowest priority is relaxed to the best value it can have.
-    Where the dual method stops at that row itself, the value is known: by Farkas' lemma its normal
-    is there a non-positive combination of the active normals, so no feasible point has more of it.
+    All rows are tried together. Only if they contradict each other are they added by priority, and
+    of the conflicting rows the one of lowest priority is relaxed to its best possible value. If the
+    dual method stops at that row itself, the value is known: by Farkas' lemma its normal is then a
+    non-positive combination of the active normals, so no feasible point has a larger value.
 
     Args:
         H_inverse: inverse of the Hessian, (n, n), positive definite.
         g: linear term, (n,).
-        C: one row a constraint, (m, n).
-        d: right-hand sides, (m,); -inf for a row that is not there.
-        priority: 0 for hard rows, then 1, 2, …: the largest number is relaxed first, (m,).
+        C: one row per constraint, (m, n).
+        d: right-hand sides, (m,); -inf for an unused row.
+        priority: 0 for hard rows, then 1, 2, …; the largest number is relaxed first, (m,).
     """
     last = 0
     for i in range(len(priority)):
@@ -83,7 +83,7 @@ def _value(C: FloatArray, row: int, x: FloatArray) -> float:
 def _best_value(
     H_inverse: FloatArray, C: FloatArray, d: FloatArray, priority: IntArray, row: int
 ) -> float:
-    """Return the most a row can have beside all rows that come before it: a pull that decides."""
+    """Return the largest value of a row given all rows before it, by a dominant linear term."""
     pull = C[row] / max(_value(C, row, H_inverse @ C[row]), 1e-300)
     x, _, _, _ = solve_qp(H_inverse, _FAR * pull, C, d, priority, priority[row] - 1)
     return _value(C, row, x)
@@ -100,12 +100,13 @@ def solve_qp(
 ) -> tuple[FloatArray, BoolArray, int, bool]:
     """Minimise ½ xᵀ H x - gᵀ x subject to the rows C x ≥ d of priority at most `up_to`.
 
-    The dual method of Goldfarb and Idnani (1983): start at the unconstrained minimum, and take in
-    the most violated row, moving along the active ones and dropping those that turn around.
+    The dual method of Goldfarb and Idnani (1983): start at the unconstrained minimum and add the
+    most violated row, moving along the active ones and dropping those whose multipliers become
+    negative.
 
     Returns:
-        x (n,), the active rows (m,), the row at which the constraints turned out to contradict
-        each other (-1 if they do not), and whether it came to an end.
+        x (n,), the active rows (m,), the row at which the constraints were found to contradict each
+        other (-1 if they do not), and whether the method terminated.
     """
     n, m = len(g), len(d)
     x = H_inverse @ g
@@ -176,7 +177,7 @@ def _directions(
     count: int,
     p: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the primal direction (n,) and the multipliers' (count,) on taking in row p.
+    """Return the primal direction (n,) and that of the multipliers (count,) for adding row p.
 
     r = (Nᵀ H⁻¹ N)⁻¹ Nᵀ H⁻¹ n_p and z = H⁻¹ n_p - H⁻¹ N r, N the active normals.
     """

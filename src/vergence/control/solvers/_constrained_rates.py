@@ -1,4 +1,4 @@
-"""One tick of the quadratic program: objectives and limits in; joint rates out."""
+"""One tick of the quadratic program: joint rates from objectives and limits."""
 
 from typing import NamedTuple
 
@@ -22,44 +22,44 @@ HARD_AND_BUILT_IN = len(KIND_NAMES)
 
 
 class Avoidance(NamedTuple):
-    """How the program prefers good configurations; packed for the kernel."""
+    """The preference of the program for good configurations; packed for the kernel."""
 
-    S: float  # on 1/w', [Nelson1995] eq. (28)
-    rate_max: float  # the joint rates it alone may cause, ‖q̇‖, rad/s
-    penalty_k: float  # steepness of the joint penalty, taken joint by joint
+    S: float  # weight of 1/w', [Nelson1995] eq. (28)
+    rate_max: float  # limit on the joint rates it causes by itself, ‖q̇‖, rad/s
+    penalty_k: float  # steepness of the joint penalty, evaluated per joint
 
 
 class Task(NamedTuple):
-    """What is asked of the arm."""
+    """The objectives for the arm."""
 
     H: FloatArray  # (6, 6) of the twist of the arm's tip
     g: FloatArray  # (6,)
     H_joints: FloatArray  # (n, n) of the joint rates; (0, 0) for none
     g_joints: FloatArray  # (n,); (0,) for none
-    null_space_rates: FloatArray  # (n,) desired where the objectives leave a choice
-    damping: FloatArray  # (n,) μ, what they weigh; above 0, so that there is one solution
+    null_space_rates: FloatArray  # (n,) desired where the objectives leave freedom
+    damping: FloatArray  # (n,) μ, their weight; positive, so that the solution is unique
 
 
 class Scene(NamedTuple):
-    """What the limits know of what the camera sees, and of a user's own limits."""
+    """The data of the limits about the camera's view, and a user's own limits."""
 
-    features: FloatArray  # of `pack_features`, (M, 7)
-    solids: FloatArray  # (K, 16) what may hide them, see `occlusion`
+    features: FloatArray  # from `pack_features`, (M, 7)
+    solids: FloatArray  # (K, 16) that may occlude features, see `occlusion`
     A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
     T_tip_camera: FloatArray  # (4, 4) of a camera on the arm, for the solids
     C: FloatArray  # (r, n) rows of a user's own limits, C q̇ ≥ d
     d: FloatArray  # (r,)
-    kind: IntArray  # (r,) which limit each is of
+    kind: IntArray  # (r,) kind of limit of each row
 
 
 class ConstrainedRates(NamedTuple):
-    """One tick's answer."""
+    """The result of one tick."""
 
     rates: FloatArray  # (n,)
-    v_tip: FloatArray  # (6,) what they do to the arm's tip, m/s and rad/s
+    v_tip: FloatArray  # (6,) resulting twist of the arm's tip, m/s and rad/s
     manipulability: float  # w'
     penalty: float  # P
-    active: FloatArray  # (K,) by kind of limit: how many rows push
+    active: FloatArray  # (K,) by kind of limit: number of active rows
     slack: FloatArray  # (K,) by kind: the largest slack, in the row's own unit
     solved: bool
 
@@ -76,22 +76,22 @@ def constrained_rates(
     settings: ConstraintSettings,
     avoidance: Avoidance,
 ) -> ConstrainedRates:
-    """Return the joint rates that serve the objectives best within every limit.
+    """Return the joint rates that best serve the objectives within every limit.
 
     Minimise ½ vᵀ H v - gᵀ v + ½ q̇ᵀ H_q q̇ - g_qᵀ q̇ + ½ Σ μ (q̇ - q̇_null)² + S/2 · 1/w'(q + T q̇)
     with v = J q̇, the last term linearised, subject to the rows of `constraint_rows` and a user's
-    own. If the program is not solved, the arm brakes as fast as it may.
+    own. If the program is not solved, the arm brakes as fast as its limits allow.
 
     Args:
         chain: up to the tip.
         limits: rows q_min, q_max, rate_max, acceleration_max, (4, n).
         q: joint positions, (n,).
         velocity: joint rates now, (n,).
-        task: what is asked.
-        scene: what is seen.
-        period: how long the command will act, s.
+        task: the objectives.
+        scene: the camera's view.
+        period: time for which the command acts, s.
         settings: margins and priorities of the limits.
-        avoidance: how good configurations are preferred.
+        avoidance: preference for good configurations.
     """
     n = len(q)
     arm = posture(chain, q, 1e-3)
@@ -135,10 +135,10 @@ def constrained_rates(
     active, slack = np.zeros(len(settings.priority)), np.zeros(len(settings.priority))
     for i in range(len(priority)):
         active[kind[i]] += solution.active[i]
-        if priority[i] > 0:  # hard rows hold exactly: what the solver's rounding leaves is cut off
+        if priority[i] > 0:  # hard rows hold exactly: the solver's rounding is ignored
             slack[kind[i]] = max(slack[kind[i]], solution.slack[i])
     rates = solution.x
-    for i in range(n):  # the solver's rounding must not pass a hard bound either
+    for i in range(n):  # nor may the solver's rounding violate a hard bound
         rates[i] = min(max(rates[i], d[2 * i + 1]), -d[2 * i])
     solved = solution.solved and bool(np.isfinite(rates).all())
     if not solved:

@@ -1,4 +1,4 @@
-"""From a desired twist of the arm's tip to joint rates, for six, seven and more joints."""
+"""Converts a desired twist of the arm's tip to joint rates, for six, seven and more joints."""
 
 import numpy as np
 from numba import njit
@@ -14,19 +14,19 @@ def resolve_redundant(
     rate_max: FloatArray,
     singular_below: float,
 ) -> FloatArray:
-    """Return joint rates that give the tip a twist, with others projected into the null space.
+    """Return joint rates for a twist of the tip, with other rates projected into the null space.
 
     With W = diag(rate_max), J W = U Σ Vᵀ and y = W⁻¹ q̇:
 
         y = V diag(σᵢ / max(σᵢ, σ₀)²) Uᵀ twist + (I - V Vᵀ) W⁻¹ q̇_null.
 
-    Weighting by the rate limits lets metres and radians, slow and fast joints share the work.
-    Only directions with a singular value below σ₀ are damped. All rates are slowed alike until none
-    exceeds its limit, so that the tip stays on its course.
+    Weighting by the rate limits makes metres and radians, slow and fast joints comparable. Only
+    directions with a singular value below σ₀ are damped. All rates are scaled uniformly until none
+    exceeds its limit, which preserves the tip's direction of motion.
 
     Args:
-        J: Jacobian of the tip (6, n) in its own axes.
-        twist: desired, in the same axes, (6,), m/s and rad/s.
+        J: Jacobian of the tip (6, n) in its own frame.
+        twist: desired, in the same frame, (6,), m/s and rad/s.
         null_space_rates: desired in the null space, (n,).
         rate_max: (n,), rad/s or m/s.
         singular_below: σ₀, relative to the largest singular value.

@@ -1,4 +1,4 @@
-"""Joint rates by the pseudo-inverse of the Jacobian, as textbooks have it: no limits are kept."""
+"""Joint rates by the pseudo-inverse of the Jacobian, as in textbooks, without limits."""
 
 import numpy as np
 
@@ -22,11 +22,11 @@ _RATES = KIND_NAMES.index("joint rates")
 
 
 def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, str] | None:
-    """Return the fault of an arm too near a singularity, if it is.
+    """Return the fault of an arm too close to a singularity, if it is.
 
     Args:
         sigma: smallest singular value of its Jacobian.
-        singular_below: below which the solver gives up.
+        singular_below: the value below which the solver gives up.
     """
     if not sigma < singular_below:
         return None
@@ -39,7 +39,7 @@ def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, st
 
 @part("solver", "pseudo_inverse")
 class PseudoInverse:
-    """v = H⁻¹ g, q̇ = J⁺ v + (I - J⁺ J) q̇_null, all rates slowed alike to keep their limits.
+    """v = H⁻¹ g, q̇ = J⁺ v + (I - J⁺ J) q̇_null, scaled uniformly to satisfy the rate limits.
 
     Ends the run near a singularity.
     """
@@ -82,7 +82,7 @@ class _BoundPseudoInverse:
 class DampedPseudoInverse:
     """The pseudo-inverse weighted by the rate limits and damped near singularities.
 
-    Weighting lets metres and radians, slow and fast joints share the work; see `resolve_redundant`.
+    Weighting makes metres and radians, slow and fast joints comparable; see `resolve_redundant`.
     """
 
     # Singular values below this fraction of the largest are damped.
@@ -123,5 +123,5 @@ def secondary_rates(problem: Problem) -> FloatArray:
 
 def _require_no_limits(setting: Setting, kind: str) -> None:
     if setting.limits is not None:
-        raise InputError("Servo", "limits", f"limits beside solver {kind}, which keeps none",
+        raise InputError("Servo", "limits", f"limits with solver {kind}, which has none",
                          "solver quadratic_program, or no limits")  # fmt: skip

@@ -1,4 +1,4 @@
-"""The prioritised quadratic program: any objectives, served as well as the limits allow."""
+"""The prioritised quadratic program: any objectives, as far as the limits allow."""
 
 from collections.abc import Iterator
 
@@ -33,15 +33,15 @@ from vergence.robot import NearPairs, manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
 _APPROACH_RATE_HZ = 2.0
-_PENALTY_K = 50.0  # of the joint penalty, taken joint by joint
-_DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # of a depth's deviation, and shares beyond it
+_PENALTY_K = 50.0  # of the joint penalty, evaluated per joint
+_DEPTH_SIGMAS, _DEPTH_FLOOR = 2.0, 0.02  # standard deviations of a depth, and an added fraction
 _NEARLY, _SINGULAR = 1e-6, 1e-3  # w' and smallest singular value of a singular configuration
-_REST = 1e-3  # share of the rate limits up to which an arm is at rest
-_UNSTEADY = 0.5  # share of the highest change of rates in a period that noise may cause
-_KEPT = 0.9  # share of the rates now to which joints keep against noise: ten images long
+_REST = 1e-3  # fraction of the rate limits below which an arm is at rest
+_UNSTEADY = 0.5  # fraction of the largest change of rates per period that noise may cause
+_KEPT = 0.9  # fraction of the present rates kept against noise: averages over ten images
 _STALL_S = 0.5  # at rest, before the limit on manipulability yields
-_STOPS_HERE = 0.25  # of a pair's margin that braking may use up and need not be looked at
-_YIELD_RATE = 2.0  # 1/s, at which it does
+_STOPS_HERE = 0.25  # of a pair's margin; smaller braking distances need no check
+_YIELD_RATE = 2.0  # 1/s, rate at which it does
 
 
 @part("solver", "quadratic_program")
@@ -69,8 +69,8 @@ class BoundProgram:
     """The quadratic program for one arm.
 
     Args:
-        program: its numbers.
-        setting: what it is made for.
+        program: its settings.
+        setting: its arm, limits and camera.
     """
 
     keeps_limits = True
@@ -92,7 +92,7 @@ class BoundProgram:
         T = setting.mounting.T_tip_camera
         self._T_tip_camera = np.eye(4) if T is None else np.array(T)
         self._least_sine = float(np.sin(np.radians(self._limits.facing_deg)))
-        self._rested_s = 0.0  # at rest, with the limit on manipulability pushing
+        self._rested_s = 0.0  # time at rest with the limit on manipulability active
         self._started = self._starts_at(setting.start)
 
     def solve(self, problem: Problem) -> Solution:
@@ -123,18 +123,19 @@ class BoundProgram:
         return Solution(*answer, clearance=self._clearance.least(near))
 
     def _is_singular(self, q: FloatArray, answer: ConstrainedRates) -> bool:
-        """Return whether there is a direction in which no joint rates move the tip any more."""
-        if not answer.manipulability < _NEARLY:  # far from it, without a decomposition
+        """Return whether there is a direction in which no joint rates move the tip."""
+        if not answer.manipulability < _NEARLY:  # clearly not singular, without a decomposition
             return False
         smallest = np.linalg.svd(self._setting.arm.jacobian(q), compute_uv=False)[-1]
         return bool(smallest < _SINGULAR)
 
     def _preferred(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
-        """Return rates that the joints prefer, (n,), and the weights (n,) with which they do.
+        """Return preferred joint rates, (n,), and their weights, (n,).
 
-        Near a singularity, a little noise asks for rates that no joint can follow. Joints keep
-        to most of what they do now, the more, the more noise alone would change it. All of it
-        would add the noise up; none of it would make the way to the goal endless.
+        Near a singularity, little noise causes rates that no joint can follow. Joints therefore
+        keep most of their present rates, the more, the more noise alone would change them. Keeping
+        them entirely would accumulate the noise; keeping none would make the path to the goal
+        endless.
         """
         steady = problem.variance / self._steady**2
         free = max(self._damping, problem.null_space_weight)
@@ -142,7 +143,7 @@ class BoundProgram:
         return rates / (free + steady), free + steady
 
     def _with_depths(self, share: float) -> ConstraintSettings:
-        """Return the settings with bounds on the depth from its deviation, where that is known."""
+        """Return the settings with bounds on the depth from its deviation, if known."""
         if self._limits.depth_range is not None or not np.isfinite(share):
             return self.settings
         off = _DEPTH_SIGMAS * share + _DEPTH_FLOOR
@@ -152,13 +153,13 @@ class BoundProgram:
         )
 
     def _yield_at_rest(self, answer: ConstrainedRates) -> None:
-        """Lower the manipulability to keep while it alone holds the arm at rest.
+        """Lower the bound on manipulability while it alone holds the arm at rest.
 
-        Joint rates are limited near a singularity as anywhere, so a run is not to end there.
+        Joint rates are limited near a singularity anyway, so a run need not end there.
         """
         period = self._setting.period_s
         rests = (np.abs(answer.rates) <= _REST * self._setting.arm.rate_max).all()
-        relaxed = np.flatnonzero(self.settings.priority[: len(KIND_NAMES)])  # not the hard limits
+        relaxed = np.flatnonzero(self.settings.priority[: len(KIND_NAMES)])  # no hard limits
         alone = (answer.active[relaxed] > 0.0).sum() == 1
         held = answer.solved and alone and answer.active[SINGULARITY] > 0.0
         self._rested_s = self._rested_s + period if rests and held else 0.0
@@ -167,7 +168,7 @@ class BoundProgram:
             self.settings = self.settings._replace(manipulability_min=float(least))
 
     def _starts_at(self, q: FloatArray | None) -> bool:
-        """Take the manipulability to keep from a configuration, if it is known."""
+        """Initialise the bound on manipulability from a configuration, if it is known."""
         if q is None or "singularity" not in self._limits.order:
             return q is not None
         measure = manipulability_measure(self._setting.arm.jacobian(q))
@@ -178,7 +179,7 @@ class BoundProgram:
     def _further_rows(
         self, problem: Problem, near: NearPairs | None
     ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the rows C (r, n), d (r,) and kinds (r,) of what is not in `constraint_rows`.
+        """Return the rows C (r, n), d (r,) and kinds (r,) that are not in `constraint_rows`.
 
         They are those of the target's faces, of pairs that must not collide, and of the user.
         """
@@ -196,7 +197,7 @@ class BoundProgram:
     def _collision(
         self, problem: Problem, near: NearPairs
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the rows of pairs near now, and of those near where the arm would stop."""
+        """Yield the rows of pairs close now, and of those close where the arm would stop."""
         rate, a = self.settings.approach_rate, self._setting.arm.acceleration_max
         yield collision_rows(near, rate)
         end = braked(problem.q, problem.velocity, a)
@@ -223,7 +224,7 @@ def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:
     """Return the margins and priorities of limits for one arm and camera.
 
     Raises:
-        InputError: if they do not suit these.
+        InputError: if they do not suit the arm or the camera.
     """
     camera, order = setting.mounting.camera, limits.order
     view_px = _VIEW_MARGIN_PX if limits.view_margin_px is None else limits.view_margin_px
@@ -233,7 +234,7 @@ def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:
         raise InputError("Limits", "view_margin_px", view_px, allowed)
     rate = _APPROACH_RATE_HZ if limits.approach_rate_hz is None else limits.approach_rate_hz
     if not rate * setting.period_s <= 1:
-        # Faster, and one command would use up more room than there is.
+        # At a higher rate, one command would use up more than the distance left.
         allowed = f"above 0, up to one command's share, {1 / setting.period_s:g}"
         raise InputError("Limits", "approach_rate_hz", rate, allowed)
     x_min, x_max, y_min, y_max = camera.rectangle(view_px + 0.5)

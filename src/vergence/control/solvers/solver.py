@@ -1,4 +1,4 @@
-"""What a servo asks of a solver: joint rates for a quadratic in the twist of the arm's tip."""
+"""The interface of a solver: joint rates for a quadratic in the twist of the arm's tip."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,56 +13,56 @@ from vergence.control.mounting import CameraMounting
 from vergence.robot import Arm, Clearance
 from vergence.signals import OutcomeKind
 
-Obstacles: TypeAlias = Callable[[], FloatArray]  # what may hide the features now, (K, 16)
+Obstacles: TypeAlias = Callable[[], FloatArray]  # what may occlude the features now, (K, 16)
 
 
 class Problem(NamedTuple):
-    """What is asked at one tick."""
+    """The input of one tick."""
 
     q: FloatArray  # (n,) joint positions
     velocity: FloatArray  # (n,) joint rates now
     H: FloatArray  # (6, 6) of ½ vᵀ H v - gᵀ v over the twist of the arm's tip
     g: FloatArray  # (6,)
-    features: FloatArray  # (M, 7) what has to stay in view, of `pack_features`
-    null_space_rates: FloatArray  # (n,) desired where the objectives leave a choice
+    features: FloatArray  # (M, 7) features that must stay in view, from `pack_features`
+    null_space_rates: FloatArray  # (n,) desired where the objectives leave freedom
     H_joints: FloatArray  # (n, n) of a quadratic in the joint rates; (0, 0) for none
     g_joints: FloatArray  # (n,); (0,) for none
     A: FloatArray  # (6, 6) with v_camera = A v_tip; (0, 0) for a camera at the tip
-    null_space_weight: float = 0.0  # μ of ‖q̇ - q̇_null‖² at least
-    depth_share: float = float("nan")  # largest deviation of a depth, a share; NaN if unknown
-    variance: float = 0.0  # that noise gives the rows of which H and g are made
-    # Faces that show the features, their middles and outward normals in the camera's frame, (F, 6);
-    # None where no surface is known: features in a plane, as they are believed, have one.
+    null_space_weight: float = 0.0  # lower bound on μ of ‖q̇ - q̇_null‖²
+    depth_share: float = float("nan")  # largest relative deviation of a depth; NaN if unknown
+    variance: float = 0.0  # variance of the rows of which H and g are made, caused by noise
+    # Faces that show the features, their centres and outward normals in the camera frame, (F, 6);
+    # None if no surface is known, in which case coplanar features are assumed to have one.
     faces: FloatArray | None = None
 
 
 class Solution(NamedTuple):
-    """Joint rates, and how they came about."""
+    """The result of one tick."""
 
     rates: FloatArray  # (n,) rad/s or m/s
-    v_tip: FloatArray  # (6,) what they do to the arm's tip, m/s and rad/s
+    v_tip: FloatArray  # (6,) resulting twist of the arm's tip, m/s and rad/s
     manipulability: float  # w'
     penalty: float  # P
-    active: FloatArray  # (K,) by kind of limit: how many rows push
+    active: FloatArray  # (K,) by kind of limit: number of active rows
     slack: FloatArray  # (K,) by kind: the largest slack, in the row's own unit
     solved: bool
     fault: tuple[OutcomeKind, str] | None = None  # why the servo cannot continue
-    clearance: Mapping[str, float] = MappingProxyType({})  # m, least distance to each kind of thing
+    clearance: Mapping[str, float] = MappingProxyType({})  # m, smallest distance by kind of body
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What a solver is made for.
+    """The input from which a solver is made.
 
     Attributes:
         arm: up to its tip.
-        mounting: of the camera whose features have to stay in view.
-        limits: what is kept; None for a solver that keeps no limits.
-        period_s: how long a command acts.
-        obstacles: gives what may come between camera and features; None for nothing.
+        mounting: of the camera whose features must stay in view.
+        limits: to enforce; None for a solver without limits.
+        period_s: time for which a command acts.
+        obstacles: returns what may occlude features; None for nothing.
         depth_range: bounds on true over believed depth, where the limits give none.
         start: joint positions at the start, (n,); those of the first tick if None.
-        clearance: gives the distances between what must not touch; None for nothing.
+        clearance: computes distances between bodies that must not collide; None for no check.
     """
 
     arm: Arm
@@ -89,13 +89,13 @@ class BoundSolver(Protocol):
 
 @runtime_checkable
 class Solver(Protocol):
-    """Turns objectives into joint rates."""
+    """Computes joint rates from objectives."""
 
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm.
 
         Raises:
-            InputError: if the numbers contradict each other or do not suit the arm.
+            InputError: if the settings contradict each other or do not suit the arm.
         """
         ...
 
@@ -105,16 +105,16 @@ NO_JOINTS = (np.empty((0, 0)), np.empty(0))
 
 
 class Pressure(NamedTuple):
-    """Which limits shaped a command, as `JointCommand` has it."""
+    """The limits that affected a command, in the form of `JointCommand`."""
 
-    active: tuple[str, ...]  # those that pushed
-    slack: dict[str, float]  # those that were relaxed: by how much, in the unit of their rows
+    active: tuple[str, ...]  # active limits
+    slack: dict[str, float]  # relaxed limits: by how much, in the unit of their rows
 
 
 def describe(
     active: FloatArray, slack: FloatArray, solved: bool, names: tuple[str, ...] = KIND_NAMES
 ) -> Pressure:
-    """Name what pushed and what was relaxed, by kind of limit."""
+    """Return the names of active and relaxed limits, by kind."""
     if not solved:
         return Pressure(("no solution: braking",), {})
     pushed = tuple(name for name, count in zip(names, active, strict=True) if count)
