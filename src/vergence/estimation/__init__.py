@@ -1,4 +1,4 @@
-"""Where to look and what it means: prediction, visibility, selection, windows, the pose filters."""
+"""Estimation: prediction, visibility, selection, search windows and the pose filters."""
 
 from vergence.estimation.belief import Belief
 from vergence.estimation.consistency import Consistency

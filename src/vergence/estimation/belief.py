@@ -1,4 +1,4 @@
-"""What the filter believes about the target."""
+"""The state of the pose filter."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from vergence.estimation.consistency import Consistency
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """Pose, velocity, and the covariance of their error, at one time; a value.
+    """Pose, velocity, and the covariance of their error, at one time; immutable.
 
     The error is (δp, δθ, δv, δω) along world axes: p + δp, exp(δθ) R, v + δv, ω + δω.
     """
@@ -21,10 +21,10 @@ class Belief:
     covariance: FloatArray  # (12, 12)
     consistency: Consistency = field(default_factory=Consistency)
     seen: float = -np.inf  # s, exposure of the last image that was used
-    doubts: int = 0  # images in a row that contradicted the prediction and were not used
-    disagreeing: float = 0.0  # share of the last points that fell outside the gate, fading
+    doubts: int = 0  # consecutive images that contradicted the prediction and were not used
+    disagreeing: float = 0.0  # fading fraction of recent points outside the gate
 
     @property
     def honest_covariance(self) -> FloatArray:
-        """The covariance, (12, 12), enlarged while the innovations say that it is too small."""
+        """The covariance, (12, 12), inflated while the innovations show that it is too small."""
         return self.covariance * self.consistency.scale

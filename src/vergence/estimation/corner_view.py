@@ -8,11 +8,11 @@ from vergence.camera import Camera
 
 @dataclass(frozen=True, slots=True)
 class CornerView:
-    """What one camera sees of a shape, and where the camera is."""
+    """The corners measured by one camera, and the camera's pose."""
 
     camera: Camera
     T_world_camera: FloatArray  # (4, 4)
-    corners_px: FloatArray  # (N, 2) of all corners of the shape in order, NaN where not seen
+    corners_px: FloatArray  # (N, 2) of all corners of the shape in order, NaN if not visible
 
     def __post_init__(self) -> None:
         for name, shape in (("T_world_camera", (4, 4)), ("corners_px", (None, 2))):

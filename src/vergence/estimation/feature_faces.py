@@ -1,4 +1,4 @@
-"""The faces that a target's features lie on, and which of them have to stay turned to a camera."""
+"""The faces that a target's features lie on, and which of them must stay turned to a camera."""
 
 from typing import NamedTuple, Self
 
@@ -9,23 +9,23 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.target_shape import TOUCHING, TargetShape
 from vergence.geometry import flat_normal, se3_inverse
 
-_PARALLEL = 1e-6  # 1 - cosine between normals of one face
+_PARALLEL = 1e-6  # 1 - cosine between normals of the same face
 
 
 class FeatureFaces(NamedTuple):
-    """Planes that hold features of a rigid target, and the side from which each is seen.
+    """Planes that contain features of a rigid target, and the side from which each is visible.
 
-    From a point p, a face with the middle c and the outward normal o is seen at the angle whose
-    sine is o·(p - c)/‖p - c‖, where that is above zero. The points that see a face are a
-    half-space: no straight way between two of them leads behind it.
+    From a point p, a face with the centre c and the outward normal o is seen at the angle whose
+    sine is o·(p - c)/‖p - c‖, if that is positive. The points that see a face form a half-space, so
+    no straight path between two of them leads behind it.
     """
 
     planes: FloatArray  # (F, 6) c, the mean of the features on it, m, and o, unit
-    holds: BoolArray  # (M, F) which features lie on which; one on none is seen from all sides
+    holds: BoolArray  # (M, F) which features lie on which; one on no face is visible from all sides
 
     @classmethod
     def of_shape(cls, shape: TargetShape) -> Self:
-        """Return the faces of a target with a surface, (0, 6) for one without."""
+        """Return the faces of a target with a surface, (0, 6) for a target without."""
         tolerance, count = TOUCHING * shape.size, len(shape.points)
         found: list[tuple[FloatArray, float, BoolArray]] = []  # o, o·c, and the features on it
         for m, point in enumerate(shape.points):
@@ -44,7 +44,7 @@ class FeatureFaces(NamedTuple):
 
     @classmethod
     def of_points(cls, points: FloatArray) -> Self:
-        """Return the two sides of flat points (M, 3); no face for others."""
+        """Return the two sides of coplanar points (M, 3); no face otherwise."""
         normal = flat_normal(points)
         if normal is None:
             return cls(np.empty((0, 6)), np.zeros((len(points), 0), dtype=np.bool_))
@@ -54,16 +54,16 @@ class FeatureFaces(NamedTuple):
 
     @property
     def sole(self) -> BoolArray:
-        """Which features nothing but one face shows, (M,).
+        """Which features are visible on one face only, (M,).
 
-        Of the two sides of flat points, one shows them, whichever it is.
+        Coplanar points count as visible on one of their two sides.
         """
         flat = len(self.planes) == 2 and np.array_equal(self.planes[0, 3:], -self.planes[1, 3:])
         count = self.holds.sum(axis=1)
         return np.asarray((count == 1) | (flat & (count == 2)))
 
     def only(self, kept: BoolArray) -> Self:
-        """Return the faces with some of the features, (M,)."""
+        """Return the faces with a subset of the features, (M,)."""
         return self._replace(holds=self.holds[kept])
 
 
@@ -83,10 +83,10 @@ def face_sines(p: FloatArray, planes: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def shared_faces(planes: FloatArray, holds: BoolArray, eyes: FloatArray) -> BoolArray:
-    """Return which faces (F,) show the features to all of some points, eyes (E, 3).
+    """Return which faces (F,) show the features to all of several viewpoints, eyes (E, 3).
 
-    Of the faces around a feature, the one that the eyes see best counts, by the eye that sees it
-    worst. A feature without a face that all of them see asks for none.
+    Of the faces around a feature, the one with the largest worst-case angle over the viewpoints
+    counts. A feature without a face that is visible from all of them requires none.
     """
     worst = np.full(len(planes), np.inf)
     for e in range(len(eyes)):
@@ -106,13 +106,13 @@ def shared_faces(planes: FloatArray, holds: BoolArray, eyes: FloatArray) -> Bool
 def faces_in_view(
     T_camera_target: FloatArray, planes: FloatArray, holds: BoolArray, eyes: FloatArray
 ) -> FloatArray:
-    """Return the faces that show features to a camera and to other points, in its frame, (F, 6).
+    """Return the faces that show features to a camera and other viewpoints, in its frame, (F, 6).
 
     Args:
         T_camera_target: pose of the target, (4, 4).
         planes: of `FeatureFaces`.
         holds: of `FeatureFaces`.
-        eyes: the other points, in the target's frame, (E, 3), such as where it should be.
+        eyes: the other viewpoints, in the target's frame, (E, 3), such as the desired one.
     """
     all_eyes = np.empty((len(eyes) + 1, 3))
     all_eyes[0] = se3_inverse(T_camera_target)[:3, 3]

@@ -1,4 +1,4 @@
-"""The pose of a known shape from the corners that any number of cameras see."""
+"""The pose of a known shape from its corners in the images of any number of cameras."""
 
 from collections.abc import Sequence
 
@@ -17,21 +17,21 @@ def fit_pose(
 ) -> PoseFit | NoPose:
     """Fit the pose of a shape in the world to its corners in the images of one or more cameras.
 
-    Four corners in all are enough, however they are shared among the cameras. Wrong corners are
-    found where one camera sees at least four. If several poses explain the corners, the result is
-    false and holds them all in `alternatives`, with their probabilities.
+    Four corners in total are enough, in whichever images they are. Wrong corners are detected if
+    one camera sees at least four. If several poses explain the corners, the result is false and
+    contains all of them in `alternatives`, with their probabilities.
 
     Args:
         shape: corners in the target's frame, (N, 3), m.
-        views: what each camera sees of them at one time.
+        views: the corners that each camera sees at one time.
         noise_px: standard deviation of a measured corner's coordinate.
 
     Returns:
         The pose T_world_target with its covariance, or why there is none.
 
     Raises:
-        ShapeError: if a view has not as many corners as the shape.
-        InputError: if the shape is not finite or noise_px is not above zero.
+        ShapeError: if a view has another number of corners than the shape.
+        InputError: if the shape is not finite or noise_px is not positive.
     """
     shape = np.ascontiguousarray(shape, dtype=np.float64)
     if shape.ndim != 2 or shape.shape[1] != 3:
@@ -39,7 +39,7 @@ def fit_pose(
     if not np.isfinite(shape).all():
         raise InputError("fit_pose", "shape", "NaN or infinity", "finite coordinates")
     if not noise_px > 0.0:
-        raise InputError("fit_pose", "noise_px", noise_px, "a number of pixels above zero")
+        raise InputError("fit_pose", "noise_px", noise_px, "a positive number of pixels")
     for view in views:
         if view.corners_px.shape != (len(shape), 2):
             raise ShapeError("corners_px", view.corners_px.shape, (len(shape), 2))

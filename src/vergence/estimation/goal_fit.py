@@ -1,8 +1,8 @@
-"""Where a photograph was taken: its pose from images that the arm took at known poses.
+"""The pose of a photograph's camera, from images that the arm's camera took at known poses.
 
-The photograph's pose and the points that it shares with the images are adjusted together, while the
-poses of the images are those of the arm. So lengths come from the arm's own motion, and motions
-that two images cannot tell apart part as soon as the camera has moved.
+The photograph's pose and the points that it shares with the images are adjusted jointly, while the
+poses of the images are those of the arm. The arm's own motion therefore provides the scale, and
+motions that two images cannot distinguish become distinguishable once the camera has moved.
 """
 
 from collections.abc import Sequence
@@ -15,15 +15,15 @@ from vergence.camera import Camera
 from vergence.geometry import se3_inverse, skew, so3_exp
 
 _ITERATIONS = 12
-_ENOUGH = 1e-4  # step, relative to deviations, below which the adjustment has settled
-_DOUBTFUL = 3.0  # standard deviations from which a point counts less and less
-_FEW = 4  # points that agree, below which none is better than another
-_FLOOR = 1e-10  # of the points' own equations: rays that are parallel leave a depth open
+_ENOUGH = 1e-4  # step relative to deviations, below which the adjustment has converged
+_DOUBTFUL = 3.0  # standard deviations beyond which a point is downweighted
+_FEW = 4  # agreeing points, below which no solution is preferred
+_FLOOR = 1e-10  # added to the points' equations: parallel rays leave a depth undetermined
 _LEAST_DEPTH_M = 1e-3
 
 
 class ArmImage(NamedTuple):
-    """Points measured in an image that the arm took."""
+    """Points measured in an image of the arm's camera."""
 
     T_world_camera: FloatArray  # (4, 4)
     points: FloatArray  # (M, 2) normalized coordinates
@@ -31,29 +31,29 @@ class ArmImage(NamedTuple):
 
 
 class GoalGuess(NamedTuple):
-    """A pose of the photograph and points that explain it, to begin with."""
+    """An initial pose of the photograph, and points that explain it."""
 
     T_world_goal: FloatArray  # (4, 4)
     points_world: FloatArray  # (M, 3) m
 
 
 class Prior(NamedTuple):
-    """What is known of the depths, or of the photograph's pose, beforehand."""
+    """Prior knowledge of the depths, or of the photograph's pose."""
 
     depth_m: FloatArray | None = None  # (M,) of the points in the first image
-    log_deviation: float = 0.7  # of what all depths may be wrong by in common
+    log_deviation: float = 0.7  # of the common factor of all depths
     T_world_goal: FloatArray | None = None  # (4, 4)
     covariance: FloatArray | None = None  # (6, 6) of position and rotation, world axes
 
 
 class GoalFit(NamedTuple):
-    """Where the photograph was taken."""
+    """The estimated pose of the photograph's camera."""
 
     T_world_goal: FloatArray  # (4, 4)
     covariance: FloatArray  # (6, 6) of its position and rotation, world axes, m and rad
     points_world: FloatArray  # (M, 3) m
     agrees: BoolArray  # (M,) points that agree with it
-    chi_square: float  # of measured points and of what was known beforehand
+    chi_square: float  # of measured points and prior
     freedom: int
 
     @property
@@ -63,7 +63,7 @@ class GoalFit(NamedTuple):
 
     @property
     def points_goal(self) -> FloatArray:
-        """The points that agree in the frame of the photograph, (K, 3), m; all if few do."""
+        """The agreeing points in the frame of the photograph, (K, 3), m; all if few agree."""
         few = np.count_nonzero(self.agrees) < _FEW
         chosen = self.points_world if few else self.points_world[self.agrees]
         return points_in(self.T_world_goal, chosen)
@@ -78,12 +78,12 @@ def fit_goal(
     """Adjust pose and points to all images; None if points end up behind a camera.
 
     Minimises Σ ‖m_kj − π(T_k⁻¹ X_j)‖²/σ_kj² over X_j and the pose of the photograph, robustly, by
-    Levenberg and Marquardt's method with the points eliminated (Schur complement).
+    the Levenberg-Marquardt method with the points eliminated (Schur complement).
 
     Args:
-        guess: to begin with.
+        guess: the initial values.
         goal: the photograph; its pose is not used.
-        images: of the arm, the first one where the photograph was compared with it.
+        images: of the arm's camera, first the one with which the photograph was compared.
         prior: see `Prior`.
     """
     T, X = guess.T_world_goal.copy(), guess.points_world.copy()
@@ -111,7 +111,7 @@ def fit_goal(
 
 
 def _moved(T: FloatArray, step: FloatArray) -> FloatArray:
-    """Return a pose moved by (6,): position along world axes, and rotation about them."""
+    """Return a pose moved by (6,): translation along world axes and rotation about them."""
     moved = T.copy()
     moved[:3, 3] += step[:3]
     moved[:3, :3] = so3_exp(np.ascontiguousarray(step[3:])) @ T[:3, :3]
@@ -140,7 +140,7 @@ class _System(NamedTuple):
         images: Sequence[ArmImage],
         prior: Prior,
     ) -> "_System":
-        """Linearise everything measured and known at a pose and points."""
+        """Linearise all measurements and the prior at a pose and points."""
         count = len(X)
         U, g = np.zeros((6, 6)), np.zeros(6)
         V, h = np.zeros((count, 3, 3)), np.zeros((count, 3))
@@ -161,7 +161,7 @@ class _System(NamedTuple):
             V += np.einsum("j,jai,jab->jib", weight, J, J)
             h += np.einsum("j,jai,ja->ji", weight, J, r)
             if number == 0:
-                # Moving the photograph by dp and turning it by dω moves the point by -dp - dω × l.
+                # Moving the photograph by dp and rotating it by dω moves the point by -dp - dω × l.
                 lever = X - T[:3, 3]
                 P = np.concatenate((-J, J @ np.array([skew(v) for v in lever])), axis=2)
                 U += np.einsum("j,jai,jab->ib", weight, P, P)
@@ -176,7 +176,7 @@ class _System(NamedTuple):
         if prior.depth_m is not None:
             axis = first.T_world_camera[:3, 2]
             depth = (X - first.T_world_camera[:3, 3]) @ axis
-            # Each depth alone is free; what all have in common has the prior's deviation.
+            # Each depth is free by itself; their common factor has the prior's deviation.
             sigma = prior.log_deviation * np.sqrt(len(X))
             r = np.log(np.maximum(depth, _LEAST_DEPTH_M) / prior.depth_m) / sigma
             J = axis / (np.maximum(depth, _LEAST_DEPTH_M) * sigma)[:, None]
@@ -211,7 +211,7 @@ class _System(NamedTuple):
 
 
 def pose_difference(T: FloatArray, other: FloatArray) -> FloatArray:
-    """Return position and rotation of a pose less another's, (6,), world axes, m and rad."""
+    """Return the difference in position and rotation of two poses, (6,), world axes, m and rad."""
     from vergence.geometry import so3_log
 
     turn = so3_log(np.ascontiguousarray(T[:3, :3] @ other[:3, :3].T))
@@ -221,7 +221,7 @@ def pose_difference(T: FloatArray, other: FloatArray) -> FloatArray:
 def _projection(
     T: FloatArray, X: FloatArray, image: ArmImage
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Return weighted residuals (M, 2), their slopes (M, 2, 3) by X, and whether all are ahead."""
+    """Return weighted residuals (M, 2), their Jacobian (M, 2, 3), and whether all are in front."""
     R = T[:3, :3]
     p = (X - T[:3, 3]) @ R
     used = np.isfinite(image.deviation)

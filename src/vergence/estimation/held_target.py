@@ -1,4 +1,4 @@
-"""A target that an arm holds, followed in the frame of the arm's tip, where it hardly moves."""
+"""A target held by an arm, tracked in the frame of the arm's tip, where it hardly moves."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,28 +20,28 @@ class FollowedPose(Protocol):
 
     @property
     def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
+        """Why the target counts as lost; empty while it is tracked."""
         ...
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the frames show, or None if none of them concerns it."""
+        """Return the observation in the frames, or None if none of them is relevant."""
         ...
 
     def pose_at(self, frame: Frame) -> FloatArray:
-        """Return T_world_target (4, 4) as it is expected at an exposure; of a lost one the last."""
+        """Return the expected T_world_target (4, 4) at an exposure; the last one if lost."""
         ...
 
 
 class HeldTarget:
-    """Follows a target that an arm holds, with cameras that do not move with it.
+    """Tracks a target held by an arm, with cameras that do not move with it.
 
-    The filter works in the frame of the tip, in which the target hardly moves and the cameras do,
-    as the joints tell: what the arm does is known and need not be estimated. What is passed on is
-    the target in the world again, with the pose of the tip.
+    The filter works in the frame of the tip, in which the target hardly moves and the cameras move
+    as determined by the joints: the arm's motion is known and need not be estimated. The result is
+    converted back to the target's pose in the world, together with the pose of the tip.
 
     Args:
         perception: set up in the tip's frame, see `seen_from_tip` and `blocked_from_tip`.
-        tip_pose: gives T_world_tip (4, 4) from the joints at the exposure.
+        tip_pose: computes T_world_tip (4, 4) from the joints at the exposure.
     """
 
     def __init__(self, perception: FollowedPose, tip_pose: TipPose) -> None:
@@ -49,11 +49,11 @@ class HeldTarget:
 
     @property
     def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
+        """Why the target counts as lost; empty while it is tracked."""
         return self._perception.lost
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the images show and where the target is, or None without an image."""
+        """Return the observation in the images and the target's pose, or None without an image."""
         observation = self._perception.observe(frames)
         if observation is None or observation.target is None:
             return observation
@@ -62,13 +62,13 @@ class HeldTarget:
         return replace(observation, target=_in_world(held, self._tip_pose(newest.joints)))
 
     def pose_at(self, frame: Frame) -> FloatArray:
-        """Return T_world_target (4, 4) as it is expected at an exposure."""
+        """Return the expected T_world_target (4, 4) at an exposure."""
         T: FloatArray = se3_compose(self._tip_pose(frame.joints), self._perception.pose_at(frame))
         return T
 
 
 def seen_from_tip(camera_pose: CameraPose, tip_pose: TipPose) -> CameraPose:
-    """Return the function that gives T_hand_camera (4, 4) where the other gives T_world_camera."""
+    """Convert a function that returns T_world_camera (4, 4) to one that returns T_tip_camera."""
 
     def pose(camera: str, joints: Joints) -> FloatArray:
         T_hand_camera: FloatArray = se3_compose(
@@ -82,7 +82,7 @@ def seen_from_tip(camera_pose: CameraPose, tip_pose: TipPose) -> CameraPose:
 def blocked_from_tip(
     blocked_at: Callable[[Frame], Blocked], tip_pose: TipPose
 ) -> Callable[[Frame], Blocked]:
-    """Return what tells, of an eye and points in the tip's frame, which points are hidden."""
+    """Return an occlusion test for a viewpoint and points in the tip's frame."""
 
     def at(frame: Frame) -> Blocked:
         T, blocked = tip_pose(frame.joints), blocked_at(frame)
@@ -96,7 +96,7 @@ def blocked_from_tip(
 
 
 def _in_world(held: TargetState, T_world_tip: FloatArray) -> TargetState:
-    """Turn what is known in the tip's frame into world axes."""
+    """Convert a target state from the tip's frame to world axes."""
     turn = np.kron(np.eye(4), T_world_tip[:3, :3])
     return TargetState(
         held.time,

@@ -1,4 +1,4 @@
-"""Follows a known object, compares it with turned poses, and searches for it when lost."""
+"""Tracks a known object, compares rotated poses, and searches for it when lost."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,25 +18,26 @@ from vergence.estimation.object_search import search_object
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.look_alikes import Turn, between, symmetries
 
-_LEAST_FOUND = 0.75  # share of a lost object, for it to be found again
-_MISSED = 2  # images in a row without the object, from which on it is searched for elsewhere
+_LEAST_FOUND = 0.75  # fraction of a lost object that must be found
+_MISSED = 2  # consecutive images without the object, after which it is searched for elsewhere
 
 
 class HypothesisFollower:
-    """Follows an object from one or several starting poses.
+    """Tracks an object from one or several initial poses.
 
-    Where nothing is remembered of an object with edges, which is at the start and after a loss,
-    it is tried at turned poses, too. A pose that fits clearly better is taken instead; one that
-    fits as well is followed beside it until the images decide, and until then the object is
-    ambiguous. A lost object is searched for around where it was seen last, in every image.
+    When there is no memory of an object with edges, at the start and after a loss, rotated poses
+    are tried as well. One that fits clearly better replaces the given one; one that fits equally
+    well is tracked in parallel until the images decide, and until then the object is ambiguous. A
+    lost object is searched for around its last position, in every image.
 
     Args:
         tracker: finds the object's edges, or its outline.
         camera: the camera's model.
-        starts: poses (4, 4) in the first image, the likeliest first; may be rough, some 10 px.
+        starts: poses (4, 4) in the first image, the most likely first; errors of about 10 px are
+            allowed.
         time: of the first image, s.
         period: between images, s.
-        rule: when an image counts.
+        rule: when an image is accepted.
     """
 
     def __init__(
@@ -56,36 +57,36 @@ class HypothesisFollower:
         self._turns = symmetries(tracker.model) if self._by_edges else []
         self._rivals: list[Rival] = []
         self._evidence = Evidence()
-        self._last: FloatArray | None = None  # where it was seen last
+        self._last: FloatArray | None = None  # its last position
         self._missed = 0
         self._compared = False
-        self.note = ""  # which pose was taken instead of the given one
+        self.note = ""  # which pose replaced the given one
 
     @property
     def tracker(self) -> ObjectTracker:
-        """What measures the object."""
+        """The tracker that measures the object."""
         return self._tracker
 
     @property
     def in_color(self) -> bool:
-        """Whether images are to be in colour, (height, width, 3); else grey, (height, width)."""
+        """Whether images must be in colour, (height, width, 3); else grey, (height, width)."""
         return self._main.in_color
 
     @property
     def symmetries(self) -> list[Turn]:
-        """Turns after which the edges of the object are the same: no image distinguishes them."""
+        """Rotations that leave the object's edges unchanged; no image distinguishes them."""
         return self._turns
 
     @property
     def was_seen(self) -> bool:
-        """Whether it was seen at all; else it is not searched for."""
+        """Whether the object has ever been found; if not, it is not searched for."""
         return self._last is not None
 
     def follow(self, image: ImageArray, time: float) -> Step:
-        """Look at the next image.
+        """Process the next image.
 
         Raises:
-            InputError: if the image is not of the camera's size.
+            InputError: if the image does not have the camera's size.
         """
         if self._by_edges and not self._compared:
             self._compare(image, time)
@@ -105,7 +106,7 @@ class HypothesisFollower:
         )
 
     def _compare(self, image: ImageArray, time: float) -> None:
-        """Choose among turned poses, and keep those that cannot be distinguished."""
+        """Select among rotated poses, and keep those that cannot be distinguished."""
         chosen, rivals, note = compare_poses(
             self._tracker, image, self._camera, self._main.T_camera_target,
             self._main.start_covariance, self._turns, self._others, self._rule.least_of_all,
@@ -118,7 +119,7 @@ class HypothesisFollower:
         self._evidence, self._compared, self._others = Evidence(), True, ()
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
-        """Look for a lost object elsewhere; return the step as it is if it is not found."""
+        """Search for a lost object elsewhere; return the step unchanged if it is not found."""
         missed = self._missed + 1
         if missed < _MISSED or self._last is None:
             return step
@@ -136,7 +137,7 @@ class HypothesisFollower:
         return found
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
-        """Follow the turned poses, too; drop what explains less, take what explains more."""
+        """Track the rotated poses too; drop worse ones, adopt one that explains more."""
         if not self._rivals:
             return step
         self._evidence = self._evidence.and_seen(step.share, len(step.samples_found))
@@ -161,7 +162,7 @@ class HypothesisFollower:
         poses = tuple(seen.T_camera_target for seen in found)
         turns = " or ".join(str(between(step.T_camera_target, pose)) for pose in poses)
         reason = (
-            f"turned by {turns} it explains the images as well; an image from "
+            f"turned by {turns} it explains the images equally well; an image from "
             "another direction would decide"
         )
         return replace(step, sighting=Sighting.AMBIGUOUS, reason=reason, alternatives=poses)

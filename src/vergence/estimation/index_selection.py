@@ -1,4 +1,4 @@
-"""Choosing features by how well they are spread in the images, as the literature does."""
+"""Selection of features by their spread in the images, as in the literature."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ def spatial_index(places: FloatArray) -> float:
     """Return Q_s: the mean distance to the nearest other feature.
 
     Args:
-        places: of the chosen features of one image, (q, 2), in units of its diagonal. A feature
-            that is alone in its image counts as one diagonal away.
+        places: of the chosen features in one image, (q, 2), in units of its diagonal. A single
+            feature counts as one diagonal away.
     """
     count = len(places)
     if count < 2:
@@ -39,7 +39,7 @@ def angular_index(places: FloatArray) -> float:
     1 if the features are at equal angles; may be negative.
 
     Args:
-        places: of the chosen features of one image, (q, 2); 1 for one alone.
+        places: of the chosen features in one image, (q, 2). The index of a single one is 1.
     """
     count = len(places)
     if count < 2:
@@ -58,9 +58,9 @@ def spread_quality(places: FloatArray, cameras: IntArray, chosen: IntArray) -> f
     """Return Q = Σ_c (q_c / q) (Q_s + Q_a) over the cameras of the chosen features.
 
     Args:
-        places: of all candidates in units of their image's diagonal, (N, 2).
-        cameras: of all candidates, (N,), in rising order.
-        chosen: numbers of the chosen candidates, (q,).
+        places: of all candidates, in units of their image's diagonal, (N, 2).
+        cameras: of all candidates, (N,), in ascending order.
+        chosen: indices of the chosen candidates, (q,).
     """
     order = np.sort(chosen)
     total, start = 0.0, 0
@@ -81,11 +81,11 @@ def exchange(
     """Swap the best pair of a chosen and another feature while that raises Q by the margin.
 
     Args:
-        places: of all candidates in units of their image's diagonal, (N, 2).
-        cameras: of all candidates, (N,), in rising order.
-        chosen: numbers to start from, (q,).
-        margin: by how much a swap must raise Q.
-        rounds: swaps at most.
+        places: of all candidates, in units of their image's diagonal, (N, 2).
+        cameras: of all candidates, (N,), in ascending order.
+        chosen: initial indices, (q,).
+        margin: smallest increase of Q by a swap.
+        rounds: largest number of swaps.
     """
     chosen = chosen.copy()
     used = np.zeros(len(places), dtype=np.bool_)
@@ -112,28 +112,28 @@ def exchange(
 
 @dataclass(frozen=True, slots=True)
 class IndexSelection:
-    """Choice by the spatial and angular index of [Lippiello2005]'s reference [10].
+    """Selection by the spatial and angular indices of [Lippiello2005]'s reference [10].
 
-    Features chosen last time are kept while they are visible, free places are filled in turn from
-    each camera, and pairs are exchanged while that raises the quality by `margin` (hysteresis).
-    How the indexes of several cameras are joined is not in the text: here by the share of features
-    that each camera has, with distances in units of the image's diagonal.
+    Features chosen last time are kept while they are visible, free places are filled from each
+    camera in turn, and pairs are exchanged while that raises the quality by `margin` (hysteresis).
+    The paper does not say how the indices of several cameras are combined: here they are weighted
+    by the number of features of each camera, with distances in units of the image's diagonal.
     """
 
     margin: float = 0.02
-    rounds: int = 8  # exchanges a tick, at most
+    rounds: int = 8  # largest number of exchanges per tick
 
     def __post_init__(self) -> None:
         if not self.margin >= 0.0:
             raise InputError("IndexSelection", "margin", self.margin, "0 or more")
 
     def choose(self, candidates: Candidates, budget: int) -> BoolArray:
-        """Return which features to measure, (C, M), at most `budget` and only visible ones."""
+        """Return which features to measure, (C, M), at most `budget`, all visible."""
         mask = np.zeros(candidates.visible.shape, dtype=np.bool_)
         cameras, features = np.nonzero(candidates.visible)
         held = candidates.held[cameras, features]
         rank = np.cumsum(candidates.visible, axis=1)[cameras, features]
-        order = np.lexsort((cameras, rank, ~held))  # those held, then in turn from each camera
+        order = np.lexsort((cameras, rank, ~held))  # kept ones, then from each camera in turn
         chosen = order[: max(0, budget)]
         if len(chosen):
             diagonal = candidates.diagonal_px[cameras, None]

@@ -1,4 +1,4 @@
-"""The depth of image points, read off a depth image."""
+"""The depth of image points from a depth image."""
 
 from dataclasses import replace
 from typing import Protocol
@@ -8,9 +8,9 @@ import numpy as np
 from vergence.arrays import BoolArray, DepthArray, FloatArray
 from vergence.signals import Frame, Observation
 
-_RADIUS_PX = 3  # of the square around a point that tells its depth
-_VALID_SHARE = 0.5  # of that square, which has to be known
-_SPREAD_SHARE = 0.02  # of the depth, by which the square may scatter: more is an edge
+_RADIUS_PX = 3  # half size of the square around a point
+_VALID_SHARE = 0.5  # fraction of that square that must be known
+_SPREAD_SHARE = 0.02  # largest relative spread of depth in the square; more indicates an edge
 _ONE_SIGMA = (0.16, 0.5, 0.84)  # quantiles
 
 
@@ -19,17 +19,17 @@ class _Perception(Protocol):
 
 
 class WithMeasuredDepth:
-    """Adds to what a perception observes the depth that a depth camera measured at each point.
+    """Adds the depth measured by a depth camera to the points that a perception observes.
 
     Args:
-        perception: that finds the points.
+        perception: finds the points.
     """
 
     def __init__(self, perception: _Perception) -> None:
         self._perception = perception
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return what the frames show, with depth where they have it."""
+        """Return the observation in the frames, with depth where available."""
         observation = self._perception.observe(frames)
         if observation is None:
             return None
@@ -49,13 +49,14 @@ def depth_of_points(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the depth of points and its standard deviation, (M,) each, m.
 
-    It is the median of a small square. A point in a hole, or where the square sees surfaces at two
+    It is the median of a small square. A point in a hole, or a square that covers surfaces at two
     depths, gives NaN.
 
     Args:
-        depth_m: (height, width) m; None without one. Not finite or not above zero is not known.
+        depth_m: (height, width) m; None if there is none. Values that are not finite or not
+            positive are unknown.
         points_px: (M, 2).
-        found: (M,) which of them were found.
+        found: (M,) which points were found.
     """
     depth, deviation = np.full((2, len(points_px)), np.nan)
     if depth_m is None:

@@ -1,4 +1,4 @@
-"""A flat target's second pose, kept in mind while images cannot exclude it."""
+"""The second pose of a flat target, tracked while images cannot exclude it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,26 +17,26 @@ from vergence.estimation.view import Seen, together, view_of
 from vergence.geometry import so3_log
 from vergence.signals import Frame, Observation, TargetState
 
-_MOST = 2.0 * RIVAL  # evidence beyond which more changes nothing
-_INDEPENDENT = 0.5  # of each image's evidence: errors of images in a row are partly the same
-_CLEAR = 3.0 * RIVAL  # χ² by which one image alone excludes the other pose
-_MOST_OF_ONE = 3.0  # evidence of any other image: a bad one decides nothing
+_MOST = 2.0 * RIVAL  # limit on the accumulated evidence
+_INDEPENDENT = 0.5  # fraction of the evidence that counts: errors of consecutive images correlate
+_CLEAR = 3.0 * RIVAL  # χ² difference by which a single image excludes the other pose
+_MOST_OF_ONE = 3.0  # evidence of any other image, so that a bad one decides nothing
 
 
 class MirrorWatch:
-    """Watches over a perception of a flat target that an image fits in two poses.
+    """Supervises a perception of a flat target whose image may fit two poses.
 
-    The second pose is the first mirrored in depth. Once images have excluded it, it stays excluded
-    for as long as the two poses are apart: nothing turns from one into the other. Where they meet,
-    the target seen straight on, the target may leave on either side. The filter continues with one
-    of them, and this class adds up what each image says for it: the difference in χ² of the two.
-    Until that is odds of a thousand to one, the stated covariance reaches from one pose to the
-    other; if it is odds against, the filter begins again at the other.
+    The second pose is the first one mirrored in depth. Once images have excluded it, it remains
+    excluded as long as the two poses are apart, since no motion leads from one to the other. Where
+    they meet, with the target seen frontally, the true pose may follow either. The filter continues
+    with one of them, and this class accumulates the evidence of each image for it: the difference
+    of their χ². Until the odds are a thousand to one, the stated covariance reaches from one pose
+    to the other; if the odds turn against the filter, it is restarted at the other pose.
 
     Args:
-        perception: of the target, which is watched.
+        perception: of the target, to be supervised.
         rig: its cameras.
-        camera_pose: gives the pose of a camera from the joints at the exposure.
+        camera_pose: computes the pose of a camera from the joints at the exposure.
         points: the target's features, (M, 3), m, in one plane.
     """
 
@@ -49,31 +49,31 @@ class MirrorWatch:
     ) -> None:
         self._perception, self._rig, self._camera_pose = perception, rig, camera_pose
         self._points = points
-        self._evidence = _MOST  # for the filter's pose; a start is certain
+        self._evidence = _MOST  # for the filter's pose; the initial pose is certain
         self._doubtful = False
 
     @property
     def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
+        """Why the target counts as lost; empty while it is tracked."""
         return self._perception.lost
 
     @property
     def doubtful(self) -> bool:
-        """Whether the last images left a second pose open."""
+        """Whether the last images did not exclude a second pose."""
         return self._doubtful
 
     def pose_at(self, frame: Frame) -> FloatArray:
-        """Return T_world_target (4, 4) as it is expected at an exposure."""
+        """Return the expected T_world_target (4, 4) at an exposure."""
         return self._perception.pose_at(frame)
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the images show and where the target is, or None without an image."""
+        """Return the observation in the images and the target's pose, or None without an image."""
         observation = self._perception.observe(frames)
         self._doubtful = False
         if observation is None:
             return None
         if observation.target is None:
-            self._evidence = _MOST  # it is found again by images that decide
+            self._evidence = _MOST  # it was found again by images that decide
             return observation
         seen = self._seen(frames, observation)
         if seen.size < LEAST_POINTS:
@@ -90,12 +90,12 @@ class MirrorWatch:
             self._perception.restart(
                 seen.time, rival.pose, scale * np.asarray(np.linalg.inv(rival.information))
             )
-            self._evidence, rival = 0.0, own  # so the pose that was given up is in its reach
+            self._evidence, rival = 0.0, own  # so the previous pose is within its covariance
             observation = replace(observation, target=self._perception.state)
         return self._with_doubt(observation, rival)
 
     def _seen(self, frames: Sequence[Frame], observation: Observation) -> Seen:
-        """Return the points that the images show."""
+        """Return the points that the images contain."""
         joints = {(frame.camera, frame.time): frame.joints for frame in frames}
         views = []
         for view in observation.views:
@@ -105,7 +105,7 @@ class MirrorWatch:
         return together(views)
 
     def _with_doubt(self, observation: Observation, rival: PoseMinimum | None) -> Observation:
-        """Return the observation, its covariance as wide as the other pose is away if need be."""
+        """Return the observation, its covariance inflated to the other pose if necessary."""
         target = observation.target
         if rival is None or target is None or self._evidence >= RIVAL:
             return observation
@@ -114,7 +114,7 @@ class MirrorWatch:
 
 
 def _two_poses(seen: Seen, believed: FloatArray) -> tuple[PoseMinimum | None, PoseMinimum | None]:
-    """Return the minimum next to a pose (4, 4), and the best of the others."""
+    """Return the minimum closest to a pose (4, 4), and the best of the others."""
     minima = pose_minima(seen, believed)
     if not minima:
         return None, None

@@ -1,4 +1,4 @@
-"""One camera follows one known object: predict, look, fuse, and say when it is lost."""
+"""Tracks one known object with one camera: predict, measure, update, and detect a loss."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -24,46 +24,46 @@ from vergence.signals import ImagePoints
 from vergence.vision.known_object import ObjectModel
 
 CAMERA = "camera"
-LEAST_SHARE = 0.2  # with less of it, an object cannot be distinguished from its background
+LEAST_SHARE = 0.2  # below this fraction, an object cannot be distinguished from its background
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
 
 
 class Measurement(Protocol):
-    """What an image says about an object, in the form of points that a filter takes."""
+    """The measurement of an object in an image, as points for a filter."""
 
     points: FloatArray  # (M, 3) object's frame, m
     points_px: FloatArray  # (M, 2)
     covariance_px: FloatArray  # (M, 2, 2) px²
     T_camera_target: FloatArray  # (4, 4) the pose that fits this image
-    expected: int  # places that should be seen
-    usual: float  # share found, each place weighing as often as it was found recently
-    samples_px: FloatArray  # (N, 2) the places looked at
+    expected: int  # number of places that should be visible
+    usual: float  # fraction found, each place weighted by how often it was found recently
+    samples_px: FloatArray  # (N, 2) the places examined
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
 
     @property
     def unseen(self) -> FloatArray:
-        """Motions (δp, δθ) that do not show, (6, K), along camera axes, m and rad."""
+        """Motions (δp, δθ) that are not observable, (6, K), along camera axes, m and rad."""
         ...
 
     @property
     def shared(self) -> FloatArray:
-        """Covariance (6, 6) of the pose error that all images have in common."""
+        """Covariance (6, 6) of the pose error common to all images."""
         ...
 
     @property
     def astray(self) -> FloatArray:
-        """Covariance (6, 6) of what more is wrong while a turn is unknown."""
+        """Covariance (6, 6) of the additional error while a rotation is unknown."""
         ...
 
     @property
     def share(self) -> float:
-        """How much of what should be seen was found, 0 … 1."""
+        """Fraction of what should be visible that was found, 0 … 1."""
         ...
 
 
 class ObjectTracker(Protocol):
-    """Measures an object near where a pose predicts it: `EdgeTracker`, `SilhouetteTracker`."""
+    """Measures an object near its predicted pose: `EdgeTracker`, `SilhouetteTracker`."""
 
     @property
     def model(self) -> ObjectModel:
@@ -72,11 +72,11 @@ class ObjectTracker(Protocol):
 
     @property
     def free(self) -> str:
-        """Which turns no image shows; empty if there are none."""
+        """Which rotations no image can show; empty if there are none."""
         ...
 
     def free_motions(self, T_camera_target: FloatArray) -> FloatArray:
-        """Return the motions (δp, δθ) that no image shows, (6, K), along camera axes."""
+        """Return the motions (δp, δθ) that no image can show, (6, K), along camera axes."""
         ...
 
     @property
@@ -100,16 +100,16 @@ class ObjectTracker(Protocol):
         ...
 
     def remember(self, memory: Any, seen: Any) -> Any:
-        """Return the memory after an image that was accepted."""
+        """Return the memory after an accepted image."""
         ...
 
 
 class Sighting(StrEnum):
-    """What became of the object in an image."""
+    """The state of the object in an image."""
 
     SEEN = "seen"
-    AMBIGUOUS = "ambiguous"  # found, but a turned pose explains the images as well
-    PREDICTED = "predicted"  # not found in this image: the pose is what motion makes expect
+    AMBIGUOUS = "ambiguous"  # found, but a rotated pose explains the images equally well
+    PREDICTED = "predicted"  # not found in this image: the pose is predicted
     LOST = "lost"
 
 
@@ -119,35 +119,35 @@ class Step:
 
     time: float  # s, of exposure
     sighting: Sighting
-    reason: str  # why it is not seen; empty if it is
+    reason: str  # why it was not found; empty if it was
     T_camera_target: FloatArray  # (4, 4)
     velocity: FloatArray  # (6,) (v, ω) along camera axes, m/s and rad/s
     covariance: FloatArray  # (12, 12) of (δp, δθ, δv, δω) along camera axes, SI
-    deviation: tuple[float, float]  # m and rad, largest, but for turns that do not show
-    unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
-    share: float  # of what should be seen, how much was found, 0 … 1
-    samples_px: FloatArray  # (N, 2) the places looked at
+    deviation: tuple[float, float]  # m and rad, largest, except for unobservable rotations
+    unseen: FloatArray  # (6, K) unobservable motions (δp, δθ), with unit rotations
+    share: float  # fraction of what should be visible that was found, 0 … 1
+    samples_px: FloatArray  # (N, 2) the places examined
     samples_found: np.typing.NDArray[np.bool_]  # (N,)
-    alternatives: tuple[FloatArray, ...] = ()  # T_camera_target (4, 4) of turned poses, if any
-    share_decided: bool = False  # the image was rejected, and counts with lower shares
+    alternatives: tuple[FloatArray, ...] = ()  # T_camera_target (4, 4) of rotated poses, if any
+    share_decided: bool = False  # rejected, but would be accepted with lower thresholds
 
 
 @dataclass(frozen=True, slots=True)
 class FollowRule:
-    """When an image counts, and when the object is lost."""
+    """When an image is accepted, and when the object is lost."""
 
-    jolt_px: float = 3.0  # how far an unforeseen motion moves the object in the image, per frame
+    jolt_px: float = 3.0  # displacement in the image by an unpredicted motion, per frame
     least_share: float = 0.57  # of what is usually found, to accept an image
-    least_of_all: float = 0.5  # of all that should be seen
+    least_of_all: float = 0.5  # of all that should be visible
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
     least_points: int = 6  # measured, to accept an image; an edge has two
-    missed_max: int = 12  # images in a row without the object, after which it is lost
+    missed_max: int = 12  # consecutive images without the object, after which it is lost
     # Standard deviation of the rotation beyond which the pose is unknown.
     turn_max_rad: float = 0.25
-    distance_max: float = 0.2  # and of the position, as a share of the distance
+    distance_max: float = 0.2  # and of the position, relative to the distance
 
     def with_least_share(self, share: float) -> "FollowRule":
-        """Return the rule by which an image counts if it shows this share of the object."""
+        """Return the rule that accepts images which show this fraction of the object."""
         return replace(
             self,
             least_of_all=share,
@@ -156,7 +156,7 @@ class FollowRule:
         )
 
 
-# Lines across an outline are found or not each for itself, and half of it may be hidden.
+# Lines across an outline are found independently, and half of it may be occluded.
 OUTLINE_RULE = FollowRule(
     least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25
 )
@@ -166,22 +166,22 @@ class _Doubt(NamedTuple):
     """Why an image is rejected."""
 
     reason: str = ""  # empty if it is not
-    share_decided: bool = False  # whether it counts with `LEAST_SHARE`
+    share_decided: bool = False  # whether it is accepted with `LEAST_SHARE`
 
 
 class ObjectFollower:
-    """Follows an object from a starting pose.
+    """Tracks an object from an initial pose.
 
     Args:
         tracker: finds the object's edges, or its outline.
         camera: the camera's model.
-        T_camera_target: pose in the first image, (4, 4); may be rough, some 10 px.
+        T_camera_target: pose in the first image, (4, 4); errors of about 10 px are allowed.
         time: of the first image, s.
         period: between images, s.
-        rule: when an image counts.
-        memory: what the object looks like, if it was followed before.
-        known: standard deviation of the pose in the first image, m and rad; that of `jolt_px` if
-            less.
+        rule: when an image is accepted.
+        memory: appearance of the object, if it was tracked before.
+        known: standard deviation of the pose in the first image, m and rad; at least that of
+            `jolt_px`.
     """
 
     def __init__(
@@ -215,7 +215,7 @@ class ObjectFollower:
 
     @property
     def tracker(self) -> ObjectTracker:
-        """What measures the object."""
+        """The tracker that measures the object."""
         return self._tracker
 
     @property
@@ -225,16 +225,16 @@ class ObjectFollower:
 
     @property
     def memory(self) -> Any:
-        """What the object looks like."""
+        """The appearance of the object."""
         return self._memory
 
     @property
     def in_color(self) -> bool:
-        """Whether images are to be in colour, (height, width, 3); else grey, (height, width)."""
+        """Whether images must be in colour, (height, width, 3); else grey, (height, width)."""
         return getattr(self._tracker, "channels", 1) == 3
 
     def restart(self, T_camera_target: FloatArray, time: float) -> None:
-        """Look for the object around a pose (4, 4) again; what it looks like is not forgotten."""
+        """Search for the object around a pose (4, 4) again; its appearance is kept."""
         self._unseen = self._tracker.free_motions(T_camera_target)
         self._belief: Belief = self._filter.start(
             time,
@@ -245,9 +245,9 @@ class ObjectFollower:
         self._missed = 0
 
     def carry(self, T_now_before: FloatArray) -> None:
-        """Take in that the camera has moved: its pose (4, 4) before, in its frame now.
+        """Account for a motion of the camera: its previous pose (4, 4) in its present frame.
 
-        Velocities stay those against the surroundings, along the camera's axes.
+        Velocities remain those relative to the surroundings, along the camera's axes.
         """
         turn = np.kron(np.eye(4), T_now_before[:3, :3])
         belief = self._belief
@@ -261,15 +261,15 @@ class ObjectFollower:
         self._shared = turn[:6, :6] @ self._shared @ turn[:6, :6].T
 
     def follow(self, image: ImageArray, time: float) -> Step:
-        """Look at the next image.
+        """Process the next image.
 
         Raises:
-            InputError: if the image is not of the camera's size.
+            InputError: if the image does not have the camera's size.
         """
         belief = self._filter.predict(self._belief, time)
         seen, doubt = self._look(image, belief, belief.T_world_target)
         if doubt.reason and self._missed == 0:
-            # It may have stopped: look where it was, too.
+            # It may have stopped: search at its last position as well.
             again = self._look(image, belief, self._belief.T_world_target)
             seen, doubt = again if not again[1].reason else (seen, doubt)
         reason = doubt.reason
@@ -323,9 +323,9 @@ class ObjectFollower:
         return _Doubt(reason, reason != "" and not self._shortfall(seen, surprise, lowest))
 
     def _shortfall(self, seen: Measurement, surprise: float, rule: FollowRule) -> str:
-        """Return what an image shows too little of; empty if it shows enough.
+        """Return what an image does not show sufficiently; empty if it is sufficient.
 
-        The farther an image is from the prediction, the more of the object it has to show.
+        The farther an image is from the prediction, the more of the object it must show.
         """
         sought = self._tracker.sought
         for share, least, what in (
@@ -340,13 +340,13 @@ class ObjectFollower:
         return ""
 
     def _deviation(self) -> tuple[float, float]:
-        """Return the largest deviation of the position, m, and of the turns that show, rad."""
+        """Return the largest deviations of position, m, and of observable rotations, rad."""
         P = shown_covariance(self._belief, self._unseen, self._shared)
         deviation = np.sqrt(np.diag(P)[:6])
         return float(deviation[:3].max()), float(deviation[3:].max())
 
     def _vague(self) -> str:
-        """Return why the pose is too uncertain to be told; empty if it is not."""
+        """Return why the pose is too uncertain to be reported; empty if it is not."""
         place, turn = self._deviation()
         distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
         if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
@@ -359,7 +359,7 @@ class ObjectFollower:
 
 
 def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:
-    """Return the Mahalanobis distance squared of a pose from what was predicted."""
+    """Return the squared Mahalanobis distance of a pose from the prediction."""
     turn = T_camera_target[:3, :3] @ belief.T_world_target[:3, :3].T
     error = np.concatenate(
         (

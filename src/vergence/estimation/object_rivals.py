@@ -1,8 +1,8 @@
-"""Turned poses of an object that an image supports as well as the one believed.
+"""Rotated poses of an object that an image supports as well as the believed one.
 
-They are searched for where nothing is remembered yet: at the start, and after a loss. Places along
-the edges are found or not for each pose, and places beside each other mostly agree, so the shares
-found are compared with the number of those that are independent.
+They are searched for when there is no memory, at the start and after a loss. Places along the edges
+are found or not for each pose, and neighbouring places mostly agree, so the fractions found are
+compared by the number of independent places.
 """
 
 from collections.abc import Sequence
@@ -15,26 +15,26 @@ from vergence.camera import Camera
 from vergence.estimation.object_follower import ObjectFollower, ObjectTracker
 from vergence.vision.known_object.look_alikes import Turn, apart_rad, between, turns_of
 
-DECIDED = 3.0  # standard deviations between two shares
-_ALIKE = 4.0  # places beside each other that are found or missed together
-_IMAGES_ALIKE = 5.0  # and images one after the other
+DECIDED = 3.0  # standard deviations between two fractions
+_ALIKE = 4.0  # neighbouring places that are found or missed together
+_IMAGES_ALIKE = 5.0  # and consecutive images
 _SAME_RAD = 0.1
-_SAME = 0.05  # of the distance
+_SAME = 0.05  # relative to the distance
 
 
 class Evidence(NamedTuple):
-    """How much of an object was found where a pose expects it."""
+    """How much of an object was found where a pose predicts it."""
 
     found: float = 0.0  # independent places
     expected: float = 0.0
 
     def and_seen(self, share: float, places: int) -> "Evidence":
-        """Return it with one more image."""
+        """Return the evidence with one more image."""
         count = places / _ALIKE / (_IMAGES_ALIKE if self.expected else 1.0)
         return Evidence(self.found + share * count, self.expected + count)
 
     def over(self, other: "Evidence") -> float:
-        """Return by how many standard deviations more was found than of another pose."""
+        """Return by how many standard deviations more was found than for another pose."""
         if not (self.expected and other.expected):
             return 0.0
         shares = np.array([self.found / self.expected, other.found / other.expected])
@@ -44,7 +44,7 @@ class Evidence(NamedTuple):
 
 
 class Rival(NamedTuple):
-    """A turned pose that is followed beside the one believed."""
+    """A rotated pose that is tracked in parallel to the believed one."""
 
     follower: ObjectFollower
     evidence: Evidence
@@ -54,7 +54,7 @@ class Candidate(NamedTuple):
     """A pose fitted to an image."""
 
     T_camera_target: FloatArray  # (4, 4)
-    share: float  # of what should be seen, how much was found
+    share: float  # fraction of what should be visible that was found
     evidence: Evidence
 
 
@@ -68,21 +68,21 @@ def compare_poses(
     others: Sequence[FloatArray],
     least_share: float,
 ) -> tuple[FloatArray, list[FloatArray], str]:
-    """Compare a pose with turned ones on an image.
+    """Compare a pose with rotated ones on an image.
 
     Args:
         tracker: of the object's edges.
         image: grey, (height, width).
         camera: the camera's model.
-        T: the pose that is given, (4, 4).
-        covariance: (6, 6), how far around each pose to search.
-        symmetries: turns that take the object to itself.
-        others: further poses that are possible.
-        least_share: of what should be seen, to believe in a pose at all.
+        T: the given pose, (4, 4).
+        covariance: (6, 6), size of the search around each pose.
+        symmetries: rotations that map the object onto itself.
+        others: further candidate poses.
+        least_share: fraction of what should be visible, required of any pose.
 
     Returns:
-        The pose to take; the poses that cannot be told from it; and, where it is not the given one,
-        why, else nothing.
+        The best pose; the poses that cannot be distinguished from it; and, if it is not the given
+        one, the reason, else "".
     """
 
     def fitted(start: FloatArray) -> Candidate:
@@ -101,7 +101,7 @@ def compare_poses(
         turn = between(given.T_camera_target, chosen.T_camera_target)
         note = (
             f"the first pose fits {given.share:.0%} of the edges; turned by {turn} it fits "
-            f"{chosen.share:.0%}, and that is taken"
+            f"{chosen.share:.0%}, and that pose is used"
         )
     near = [fit.T_camera_target for fit in fits if chosen.evidence.over(fit.evidence) < DECIDED]
     return chosen.T_camera_target, _distinct([chosen.T_camera_target], near, alike), note
@@ -110,7 +110,7 @@ def compare_poses(
 def _distinct(
     known: Sequence[FloatArray], poses: Sequence[FloatArray], alike: Sequence[FloatArray]
 ) -> list[FloatArray]:
-    """Return the poses that show an object otherwise than known ones, and than one another."""
+    """Return the poses that show an object differently from known ones and from each other."""
     new: list[FloatArray] = []
     for T in poses:
         if not any(_same(T @ S, other) for other in (*known, *new) for S in alike):

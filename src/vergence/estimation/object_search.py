@@ -1,4 +1,4 @@
-"""Where an object is that was lost: the places around where it was seen last are tried in turn."""
+"""Search for a lost object at positions around the last one, nearest first."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,10 +10,10 @@ from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
 from vergence.vision.known_object.pose_fit import shifted
 
-_STEP_PX = 32.0  # between places; each is searched farther than half of it
+_STEP_PX = 32.0  # between positions; each search covers more than half of it
 _FARTHEST_PX = 128.0
-_WIDENING_PX = 32.0  # by each image without the object
-_APART_PX = 8.0  # of two places where it may be
+_WIDENING_PX = 32.0  # per image without the object
+_APART_PX = 8.0  # between two positions where it may be
 
 
 def search_object(
@@ -26,17 +26,17 @@ def search_object(
     missed: int,
     least_share: float,
 ) -> FloatArray | None:
-    """Return the pose (4, 4) at which most of an object is found; None if no one place shows it.
+    """Return the pose (4, 4) at which most of an object is found; None if no single one stands out.
 
     Args:
         tracker: measures the object.
-        image: as the tracker takes it.
+        image: in the form that the tracker takes.
         camera: the camera's model.
-        T_last: pose where it was seen last, (4, 4).
-        covariance: (6, 6), how far around each place to search.
-        memory: what the object looked like.
-        missed: images since then: the longer ago, the farther away it may be.
-        least_share: of what should be seen, and of what usually is, that has to be found.
+        T_last: last pose, (4, 4).
+        covariance: (6, 6), size of the search around each position.
+        memory: appearance of the object.
+        missed: images since then; the search widens with each.
+        least_share: fraction of what should be visible, and of what usually is, that must be found.
     """
     found = []
     for T in _places(T_last, pack_lens(camera), min(_WIDENING_PX * missed, _FARTHEST_PX)):
@@ -55,7 +55,7 @@ def search_object(
 
 
 def _places(T: FloatArray, lens: FloatArray, farthest_px: float) -> Iterator[FloatArray]:
-    """Yield the pose moved across the image, (4, 4) each, the nearest first."""
+    """Yield poses moved across the image, (4, 4) each, the nearest first."""
     count = int(farthest_px // _STEP_PX)
     steps = _STEP_PX * np.arange(-count, count + 1)
     shifts = np.array(np.meshgrid(steps, steps)).reshape(2, -1).T

@@ -1,4 +1,4 @@
-"""An object without sharp edges, followed by its outline with a camera that may move."""
+"""Tracks an object without sharp edges by its outline, with a camera that may move."""
 
 from collections.abc import Sequence
 
@@ -17,22 +17,22 @@ from vergence.estimation.object_follower import (
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, ImagePoints, Observation, TargetState
 
-_WIDE_PX = 100.0  # stated deviation of points that are not seen
+_WIDE_PX = 100.0  # stated deviation of points that are not visible
 
 
 class OutlinePerception:
-    """Follows one target with one camera by its outline; a stage of the loop.
+    """Tracks one target with one camera by its outline; a stage of the loop.
 
-    The filter works in the camera's frame, into which the camera's own motion carries what is
-    believed, as the joints tell it. A target that is lost is searched for where it was seen last.
+    The filter works in the camera frame; the camera's own motion, known from the joints, is applied
+    to its state. A lost target is searched for at its last position.
 
     Args:
-        name: of the camera; images of others do not concern it.
+        name: of the camera; images of other cameras are ignored.
         camera: its model.
         tracker: measures the object.
-        camera_pose: gives the camera's pose from the joints at the exposure.
-        T_world_target: where the target is at the start, (4, 4), as far as it is known.
-        known: standard deviation of that, m and rad.
+        camera_pose: computes the camera's pose from the joints at the exposure.
+        T_world_target: assumed initial pose of the target, (4, 4).
+        known: its standard deviation, m and rad.
         begin: time of the first image, s.
         period: between images, s.
         points: that represent the target, in its frame, (M, 3), m.
@@ -60,15 +60,15 @@ class OutlinePerception:
 
     @property
     def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
+        """Why the target counts as lost; empty while it is tracked."""
         return self._lost
 
     def pose_at(self, frame: Frame) -> FloatArray:
-        """Return T_world_target (4, 4) where it was seen last."""
+        """Return the last T_world_target (4, 4)."""
         return self._last_seen
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the images show and where the target is, or None without an image."""
+        """Return the observation in the images and the target's pose, or None without an image."""
         own = [f for f in frames if f.camera == self._name and f.image is not None]
         if not own:
             return None
@@ -106,7 +106,7 @@ class OutlinePerception:
         return step
 
     def _state(self, step: Step) -> TargetState:
-        """Return what is believed, along the axes of the world."""
+        """Return the estimate in world axes."""
         turn = np.kron(np.eye(4), self._T_world_camera[:3, :3])
         return TargetState(
             step.time,
@@ -117,7 +117,7 @@ class OutlinePerception:
         )
 
     def _view(self, frame: Frame, step: Step) -> ImagePoints:
-        """Return the points that represent the target, with the covariance that its pose has."""
+        """Return the points that represent the target, with covariances from that of its pose."""
         seen = step.sighting is Sighting.SEEN
         place = transform_points(step.T_camera_target, self._points.copy())
         front = place[:, 2] > 0.0
@@ -132,7 +132,7 @@ class OutlinePerception:
         return ImagePoints(self._name, frame.time, points_px, covariance, found, reasons)
 
     def _spread(self, place: FloatArray, step: Step) -> FloatArray:
-        """Return the covariance (M, 2, 2), px², of points (M, 3) in the camera, by the pose's."""
+        """Return the covariances (M, 2, 2), px², of points (M, 3) in the camera, by the pose's."""
         aside = place - step.T_camera_target[:3, 3]
         depth = place[:, 2, None, None]
         slope = np.zeros((len(place), 2, 3))  # of the image points by the places

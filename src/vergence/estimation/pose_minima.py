@@ -1,9 +1,9 @@
 """All poses at which the reprojection error of known points has a local minimum.
 
 One image of a nearly flat or distant target fits two poses: the true one and its mirror image in
-depth, whose residuals differ by less than the noise. A single descent finds one of them, and the
-curvature there says nothing of the other. So the descents start from rotations spread over SO(3),
-each with the translation that a linear fit gives it, and from the mirror images of the known pose.
+depth, whose residuals differ by less than the noise. A single descent finds one of them, and its
+curvature does not reveal the other. The descents therefore start from rotations spread over SO(3),
+each with the translation from a linear fit, and from the mirror images of the known pose.
 """
 
 from functools import cache
@@ -19,9 +19,9 @@ from vergence.estimation.motion import correct_pose
 from vergence.estimation.view import Seen
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
 
-STEPS = 30  # most steps of a descent
-APART_RAD = 0.05  # rotations nearer than this are one minimum
-APART = 0.05  # and positions, as a share of the distance from the camera
+STEPS = 30  # largest number of steps of a descent
+APART_RAD = 0.05  # rotations closer than this are the same minimum
+APART = 0.05  # and positions, relative to the distance from the camera
 
 
 class PoseMinimum(NamedTuple):
@@ -37,7 +37,7 @@ def pose_minima(seen: Seen, known: FloatArray) -> list[PoseMinimum]:
 
     Args:
         seen: the points, without wrong matches, in any number of images.
-        known: one of the minima, T_world_target (4, 4): the spread of the starts is turned to it.
+        known: one of the minima, T_world_target (4, 4); the initial rotations are relative to it.
     """
     arguments = seen.poses, seen.points, seen.measured, seen.covariance
     starts = [known, *_mirrored(known, seen)]
@@ -59,7 +59,7 @@ def pose_minima(seen: Seen, known: FloatArray) -> list[PoseMinimum]:
 
 
 def is_apart(T_a: FloatArray, T_b: FloatArray, T_camera_world: FloatArray) -> bool:
-    """Return whether two poses T_world_target are more than rounding and step size apart."""
+    """Return whether two poses T_world_target differ by more than rounding and step size."""
     between = se3_compose(se3_inverse(T_a), T_b)
     depth = abs(float(T_camera_world[2, :3] @ T_a[:3, 3] + T_camera_world[2, 3]))
     turned = float(np.linalg.norm(so3_log(np.ascontiguousarray(between[:3, :3]))))
@@ -72,8 +72,8 @@ def with_linear_translation(
 ) -> FloatArray:
     """Return the pose (4, 4) with rotation R whose translation fits the points best.
 
-    Each measured (u, v) leaves (C_0 - u C_2)·(R X + t) + c_0 - u c_2 = 0, linear in t, and the
-    same for v, where C and c are rotation and translation of T_camera_world.
+    Each measured (u, v) gives (C_0 - u C_2)·(R X + t) + c_0 - u c_2 = 0, linear in t, and the same
+    for v, where C and c are rotation and translation of T_camera_world.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for n in range(len(points)):
@@ -105,7 +105,7 @@ def descend(
     """Minimise the χ² of the points over the pose (Levenberg-Marquardt).
 
     Returns:
-        the pose (4, 4), its information (6, 6), and χ²: infinite if a point lies behind a camera.
+        The pose (4, 4), its information (6, 6), and χ²; infinite if a point lies behind a camera.
     """
     rows = whitened_rows(T, poses, points, measured, covariance)
     square, damping = np.sum(rows[:, POSE] ** 2), 1e-3
@@ -137,11 +137,11 @@ def descend(
 
 
 def _mirrored(T_world_target: FloatArray, seen: Seen) -> list[FloatArray]:
-    """Return the target mirrored in depth in each image, with its flattest axis turned back.
+    """Return the target mirrored in depth in each image, with its flattest axis reversed.
 
-    Weak perspective cannot tell depths from their negatives. S = I - 2 c cᵀ along the line of
-    sight c mirrors the depths, I - 2 n nᵀ along the direction n of least extent makes the result a
-    rotation again, and leaves a flat target as it is.
+    Weak perspective cannot distinguish depths from their negatives. S = I - 2 c cᵀ along the line
+    of sight c mirrors the depths; I - 2 n nᵀ along the direction n of least extent makes the result
+    a rotation again, and leaves a flat target unchanged.
     """
     centre = seen.points.mean(axis=0)
     n = np.linalg.svd(seen.points - centre)[2][2]
@@ -160,7 +160,7 @@ def _mirrored(T_world_target: FloatArray, seen: Seen) -> list[FloatArray]:
 
 @cache
 def _spread_rotations() -> list[FloatArray]:
-    """Return the 24 rotations that take a cube to itself, without the identity."""
+    """Return the 24 rotations that map a cube to itself, except the identity."""
     axes = product((-1.0, 0.0, 1.0), repeat=3)
     rotations = []
     for axis in axes:

@@ -18,9 +18,9 @@ from vergence.estimation.view import Seen, View, chosen_points, together
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
 
 GATE = 13.8  # χ² with 2 degrees of freedom, one in a thousand
-LEAST_POINTS = 4  # in the image the search starts from
-CONTRADICTION = 16.0  # χ² for each degree of freedom, above which no noise explains the points
-RIVAL = 13.8  # by how much χ² of a second pose must be larger: odds of one to a thousand
+LEAST_POINTS = 4  # in the image from which the search starts
+CONTRADICTION = 16.0  # χ² per degree of freedom, above which no noise explains the points
+RIVAL = 13.8  # χ² difference that excludes a second pose: odds of one to a thousand
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,24 +30,24 @@ class PoseFit:
     time: float  # s
     T_world_target: FloatArray  # (4, 4)
     covariance: FloatArray  # (6, 6) of (δp, δθ), world axes
-    inliers: int  # points explained, of all images
-    points: int  # points there were
-    weight: float = 1.0  # probability among the poses that explain the points as well
+    inliers: int  # points explained, in all images
+    points: int  # number of points
+    weight: float = 1.0  # probability among the poses that explain the points equally well
 
     def __bool__(self) -> bool:
-        """A fit is true."""
+        """A fit is true as a condition."""
         return True
 
 
 @dataclass(frozen=True, slots=True)
 class NoPose:
-    """Why there is none."""
+    """Why there is no pose."""
 
     reason: str
-    alternatives: tuple[PoseFit, ...] = ()  # if several poses explain the points, likeliest first
+    alternatives: tuple[PoseFit, ...] = ()  # if several poses explain the points, best first
 
     def __bool__(self) -> bool:
-        """A failure is false."""
+        """A failure is false as a condition."""
         return False
 
 
@@ -56,16 +56,16 @@ def pose_from_points(views: Sequence[View]) -> PoseFit | NoPose:
 
     Candidates come from the images (perspective-n-point on deterministic samples, so that wrong
     matches do no harm). Each is refined by least squares over the points of all images that agree
-    with it, and the one that explains most is taken, if it explains three points out of five.
-    Where no image shows four points, all points are taken to be right. Then all local minima over
-    the same points are compared: a nearly flat or distant target seen by one camera has two, and
-    one of them alone would be a wrong pose with a small covariance.
+    with it, and the one that explains most points is chosen, if it explains three out of five. If
+    no image contains four points, all points are assumed correct. Then all local minima over the
+    same points are compared: a nearly flat or distant target seen by one camera has two, and
+    reporting only one of them would risk a wrong pose with a small covariance.
 
     Args:
         views: images with usable points.
 
     Returns:
-        The pose; or why there is none, with all candidates if the points do not decide.
+        The pose, or why there is none, with all candidates if the points do not decide.
     """
     if not views:
         return NoPose("no image")
@@ -94,14 +94,14 @@ def settle(
 ) -> PoseFit | NoPose:
     """Return the pose if all its rivals explain the points clearly worse, else all of them.
 
-    Posterior odds of two minima are exp(-½ Δχ²). Where even the best leaves more than the stated
-    noise, the noise is taken to be as large as what is left.
+    Posterior odds of two minima are exp(-½ Δχ²). If even the best residuals exceed the stated
+    noise, the noise is assumed to be as large as the residuals.
 
     Args:
         seen: the points without wrong matches.
         time: of the fit, s.
         known: one of the minima, T_world_target (4, 4).
-        total: how many points there were with the wrong matches.
+        total: number of points including wrong matches.
         others: poses that explain as many points, but not the same ones.
     """
     minima = pose_minima(seen, known)
@@ -164,7 +164,7 @@ class _Fit:
 
 
 def _rivals(best: _Fit, other: _Fit, seen: Seen) -> bool:
-    """Return whether a fit to other points is as good as the best and yet a different pose."""
+    """Return whether a fit to other points is as good as the best but a different pose."""
     if other.inliers < best.inliers or other.square > best.square + RIVAL:
         return False
     return not np.array_equal(best.kept, other.kept) and is_apart(
@@ -173,7 +173,7 @@ def _rivals(best: _Fit, other: _Fit, seen: Seen) -> bool:
 
 
 def _candidates(view: View) -> list[FloatArray]:
-    """Return poses T_world_target to start from, by perspective-n-point on samples of an image."""
+    """Return initial poses T_world_target, by perspective-n-point on samples of an image."""
     T_world_camera = se3_inverse(view.T_camera_world)
     rng = np.random.default_rng(view.size)  # the same samples for the same number of points
     return [
@@ -186,7 +186,7 @@ def _candidates(view: View) -> list[FloatArray]:
 def _samples(count: int, rng: np.random.Generator, most: int = 30) -> list[IntArray]:
     """Return all points, then sets of four.
 
-    Of thirty sets one is without a wrong match, in 998 of 1000 cases, while a third are wrong.
+    If a third of the matches are wrong, one of thirty sets has none in 998 of 1000 cases.
     """
     samples = [np.arange(count)]
     if count > LEAST_POINTS:
@@ -201,7 +201,7 @@ def _perspective_n_point(points: FloatArray, normalized: FloatArray) -> list[Flo
     centre = np.asarray(points.mean(axis=0), dtype=np.float64)
     _, spread, axes = np.linalg.svd(points - centre)
     flat = spread[2] < 1e-6 * spread[0]
-    # In axes along their own spread, flat points lie at z = 0 as the method for them wants.
+    # In principal axes, flat points lie at z = 0, as the method for them requires.
     R = np.asarray(axes.T * np.linalg.det(axes), dtype=np.float64)
     T_own_target = se3_inverse(se3(R, centre))
     own: FloatArray = np.ascontiguousarray((points - centre) @ R)
@@ -224,7 +224,7 @@ def _perspective_n_point(points: FloatArray, normalized: FloatArray) -> list[Flo
 
 
 def _refine(T_world_target: FloatArray, seen: Seen, rounds: int = 8) -> _Fit | None:
-    """Gauss-Newton over the points that agree; at first agreeing as the better three in five do."""
+    """Gauss-Newton over the points that agree; initially the best three in five."""
     pose, poses = T_world_target, seen.poses
     for k in range(rounds + 1):
         rows = whitened_rows(pose, poses, seen.points, seen.measured, seen.covariance)

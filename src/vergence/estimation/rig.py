@@ -1,4 +1,4 @@
-"""All cameras at once, packed for kernels."""
+"""All cameras together, packed for kernels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,13 +14,13 @@ from vergence.errors import NOTHING, Absent, InputError, nearest
 
 @dataclass(frozen=True, slots=True)
 class CameraRig:
-    """The cameras of a cell by number: names, models, and their lenses as one array."""
+    """The cameras of a cell by index: names, models, and their lenses as one array."""
 
     names: tuple[str, ...]
     cameras: tuple[Camera, ...]
     lenses: FloatArray  # (C, 11) fx, fy, cx, cy, width, height, k1, k2, p1, p2, k3
-    noise_px: FloatArray  # (C,) standard deviation expected of a measured point
-    numbers: Mapping[str, int] = field(repr=False)  # of each camera, by name
+    noise_px: FloatArray  # (C,) expected standard deviation of a measured point
+    numbers: Mapping[str, int] = field(repr=False)  # index of each camera, by name
 
     @classmethod
     def of(cls, cameras: Mapping[str, Camera], noise_px: float | Mapping[str, float]) -> Self:
@@ -31,7 +31,7 @@ class CameraRig:
             noise_px: expected standard deviation of a measured point, one for all or by name.
 
         Raises:
-            InputError: if there is no camera, or a noise is missing or not above zero.
+            InputError: if there is no camera, or a noise is missing or not positive.
         """
         if not cameras:
             raise InputError("CameraRig", "cameras", Absent("none"), "at least one camera")
@@ -55,7 +55,7 @@ def _noise_of(name: str, noise_px: float | Mapping[str, float]) -> float:
     else:
         value = float(noise_px)
     if not value > 0.0:
-        raise InputError("CameraRig", f"noise_px.{name}", value, "a number of pixels above zero")
+        raise InputError("CameraRig", f"noise_px.{name}", value, "a positive number of pixels")
     return value
 
 

@@ -1,4 +1,4 @@
-"""What the filter of [Lippiello2005] believes about the target."""
+"""The state of the filter of [Lippiello2005]."""
 
 from dataclasses import dataclass, field
 
@@ -33,15 +33,15 @@ def twist_jacobian(w: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class RpyBelief:
-    """State w = (o, φ, ϑ, ψ, rates) and its covariance at one time; a value."""
+    """State w = (o, φ, ϑ, ψ, rates) and its covariance at one time; immutable."""
 
     time: float  # s
     vector: FloatArray  # (12,) w: m, rad, m/s, rad/s
     vector_covariance: FloatArray  # (12, 12)
     consistency: Consistency = field(default_factory=Consistency)
     seen: float = -np.inf  # s, exposure of the last image that was used
-    doubts: int = 0  # images in a row of which no point could be used
-    disagreeing: float = 0.0  # share of the last points that could not be used, fading
+    doubts: int = 0  # consecutive images of which no point could be used
+    disagreeing: float = 0.0  # fading fraction of recent points that could not be used
 
     @property
     def T_world_target(self) -> FloatArray:
@@ -64,5 +64,5 @@ class RpyBelief:
 
     @property
     def honest_covariance(self) -> FloatArray:
-        """The covariance, (12, 12), enlarged while the innovations say that it is too small."""
+        """The covariance, (12, 12), inflated while the innovations show that it is too small."""
         return self.covariance * self.consistency.scale

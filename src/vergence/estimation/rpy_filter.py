@@ -68,12 +68,11 @@ class RpyPoseFilter:
     """The extended Kalman filter of [Lippiello2005] section III, kept for reproduction.
 
     State w = (o, φ, ϑ, ψ, rates), eq. (7) to (18), with these corrections: the noise of a
-    measurement is in normalized coordinates (the paper gives px²: divide by the focal length in
-    pixels, squared); the zero block of (14) has 6 columns; the Joseph form replaces (12b); points
-    pass a gate, against the prediction and against all other points, since without one a single
-    wrong corner throws the filter off its target. Angles
-    are never wrapped inside. Near pitch ±90° the state is singular and the estimate unreliable:
-    `PoseFilter` has no such place.
+    measurement is in normalized coordinates (the paper gives px²: divide by the squared focal
+    length in pixels); the zero block of (14) has 6 columns; the Joseph form replaces (12b); points
+    must pass a gate, against the prediction and against all other points, since without one a
+    single wrong corner makes the filter diverge. Angles are never wrapped internally. Near pitch
+    ±90° the state is singular and the estimate unreliable; `PoseFilter` has no singularity.
     """
 
     # Velocity noise in Q per frame, section V.
@@ -89,7 +88,7 @@ class RpyPoseFilter:
 
     @cached_property
     def noise(self) -> FloatArray:
-        """The diagonal of Q, (12,), a frame."""
+        """The diagonal of Q, (12,), per frame."""
         return np.repeat([0.0, 0.0, self.velocity_noise, self.angle_rate_noise], 3)
 
     def start(
@@ -99,17 +98,17 @@ class RpyPoseFilter:
         velocity: FloatArray | None = None,
         covariance: FloatArray | None = None,
     ) -> RpyBelief:
-        """Return the belief to start from, at rest or with a twist (v, ω).
+        """Return the initial belief, at rest or with a twist (v, ω).
 
         Args:
             time: s.
             T_world_target: a rough pose, (4, 4).
             velocity: (v, ω) along world axes, (6,); zero by default.
-            covariance: of (δp, δθ, δv, δω), world axes, (12, 12); by default 3 cm, 0.1 rad,
-                0.2 m/s, 0.5 rad/s. The paper's is zero: then the first two gains are zero.
+            covariance: of (δp, δθ, δv, δω), world axes, (12, 12); by default 3 cm, 0.1 rad, 0.2
+                m/s, 0.5 rad/s. The paper's is zero, which makes the first two gains zero.
 
         Raises:
-            InputError: if the covariance is not one, or anything is not finite.
+            InputError: if the covariance is not valid, or any value is not finite.
         """
         given = first_values("RpyPoseFilter", T_world_target, velocity, covariance)
         pose, twist, covariance = given
@@ -117,11 +116,11 @@ class RpyPoseFilter:
         w = np.concatenate((pose[:3, 3], rpy, twist))
         if twist[3:].any():
             w[9:] = np.linalg.pinv(rpy_rates_to_omega(rpy)) @ twist[3:]
-        to_state = np.linalg.pinv(twist_jacobian(w))  # singular at pitch ±90°, yet no error
+        to_state = np.linalg.pinv(twist_jacobian(w))  # singular at pitch ±90°, but not an error
         return RpyBelief(time, w, to_state @ covariance @ to_state.T)
 
     def predict(self, belief: RpyBelief, time: float) -> RpyBelief:
-        """Return the belief at another time; Q counts in proportion to the frames between."""
+        """Return the belief at another time; Q is scaled by the number of frames in between."""
         dt = time - belief.time
         if dt == 0.0:
             return belief
@@ -130,7 +129,7 @@ class RpyPoseFilter:
         return replace(belief, time=time, vector=w, vector_covariance=P)
 
     def update(self, belief: RpyBelief, seen: Seen) -> Update:
-        """Predict to an exposure and correct by its points, eq. (11) to (13)."""
+        """Predict to an exposure and update by its points, eq. (11) to (13)."""
         belief = self.predict(belief, seen.time)
         if seen.size == 0:
             return unused(belief, seen.size, Verdict.EMPTY)
@@ -155,10 +154,10 @@ class RpyPoseFilter:
     def _correct(
         self, rows: FloatArray, P: FloatArray, kept: BoolArray
     ) -> tuple[BoolArray, FloatArray, FloatArray, float]:
-        """Return the points kept, the correction, P after it, and the innovation squared.
+        """Return the points kept, the correction, the updated P, and the squared innovation.
 
-        A point must also agree with what the prediction and all other points say together: while
-        the pose is uncertain, as at the start, the prediction alone lets wrong corners pass.
+        A point must also agree with the prediction and all other points together: while the pose is
+        uncertain, as at the start, the prediction alone lets wrong corners pass.
         """
         while True:
             used = keep_rows(rows, kept)

@@ -1,4 +1,4 @@
-"""Some of the points that another perception observes."""
+"""A subset of the points that another perception observes."""
 
 from dataclasses import replace
 from typing import Protocol
@@ -11,16 +11,16 @@ class ObservesPoints(Protocol):
     """Observes points in the images that arrive."""
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return what was seen in the frames that arrived, or None if nothing was."""
+        """Return the observation in the frames that arrived, or None if there is none."""
         ...
 
 
 class SelectedPoints:
-    """Observes the points of another perception that are kept, such as those that match.
+    """Observes a subset of another perception's points, such as those that match.
 
     Args:
         perception: observes all of them.
-        kept: which of them are kept, (M,).
+        kept: mask of the subset, (M,).
     """
 
     def __init__(self, perception: ObservesPoints, kept: BoolArray) -> None:

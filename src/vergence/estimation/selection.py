@@ -1,4 +1,4 @@
-"""Choosing few features over all cameras: by the information they bring, by default."""
+"""Selection of a few features over all cameras, by default according to their information."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -12,24 +12,24 @@ from vergence.estimation.measurement import POSE, point_rows
 
 
 class Candidates(NamedTuple):
-    """What a selection may choose from: features in the images of this tick."""
+    """The input of a selection: the features in the images of this tick."""
 
     visible: BoolArray  # (C, M)
-    points_px: FloatArray  # (C, M, 2) predicted places
+    points_px: FloatArray  # (C, M, 2) predicted positions
     points: FloatArray  # (M, 3) features in the target's frame, m
     T_world_target: FloatArray  # (C, 4, 4) predicted for each camera's exposure
     T_camera_world: FloatArray  # (C, 4, 4) at the exposures
     noise: FloatArray  # (C, 2) expected standard deviation, normalized coordinates
     diagonal_px: FloatArray  # (C,) of the images
     pose_covariance: FloatArray  # (6, 6) of (δp, δθ), predicted
-    held: BoolArray  # (C, M) chosen last time
+    held: BoolArray  # (C, M) selected last time
 
 
 class Selection(Protocol):
-    """A way to choose features."""
+    """A method of selecting features."""
 
     def choose(self, candidates: Candidates, budget: int) -> BoolArray:
-        """Return which features to measure, (C, M), at most `budget` and only visible ones."""
+        """Return which features to measure, (C, M), at most `budget`, all visible."""
         ...
 
 
@@ -41,7 +41,7 @@ def candidate_rows(
     noise: FloatArray,
     visible: BoolArray,
 ) -> tuple[FloatArray, IntArray]:
-    """Return the whitened rows (N, 2, 6) of the visible features and their flat numbers (N,)."""
+    """Return the whitened rows (N, 2, 6) of the visible features and their flat indices (N,)."""
     count = 0
     for c in range(visible.shape[0]):
         for m in range(visible.shape[1]):
@@ -80,7 +80,7 @@ def information_factor(H: FloatArray, P: FloatArray) -> float:
 
 @njit(cache=True)
 def absorb(H: FloatArray, P: FloatArray) -> None:
-    """Overwrite P by P - P Hᵀ (I + H P Hᵀ)⁻¹ H P, one row of H (2, 6) after the other."""
+    """Replace P by P - P Hᵀ (I + H P Hᵀ)⁻¹ H P, one row of H (2, 6) after the other."""
     for n in range(len(H)):
         PH = np.zeros(POSE)
         for i in range(POSE):
@@ -98,20 +98,20 @@ def absorb(H: FloatArray, P: FloatArray) -> None:
 def greedy_information(
     rows: FloatArray, weights: FloatArray, pose_covariance: FloatArray, budget: int
 ) -> IntArray:
-    """Choose rows one by one, each with the largest w det(I + H P Hᵀ) on top of those before.
+    """Select rows one by one, each with the largest w det(I + H P Hᵀ) given those before.
 
-    The logarithm of the determinant is submodular: what a feature brings only falls as others are
-    chosen. So the value of an earlier round is an upper bound, and only features whose bound beats
-    the best of this round are looked at again. The choice is that of the plain greedy algorithm.
+    The log determinant is submodular: the gain of a feature only decreases as others are selected.
+    A value from an earlier round is therefore an upper bound, and only features whose bound exceeds
+    the best of this round are evaluated again. The result is that of the plain greedy algorithm.
 
     Args:
         rows: whitened candidates, (N, 2, 6).
         weights: w >= 1 of each candidate, (N,).
-        pose_covariance: P before, (6, 6).
-        budget: how many to choose.
+        pose_covariance: initial P, (6, 6).
+        budget: number to select.
 
     Returns:
-        The numbers of the chosen candidates, in order of choice.
+        The indices of the selected candidates, in order of selection.
     """
     P = pose_covariance.copy()
     count = min(budget, len(rows))
@@ -149,7 +149,7 @@ def choose_by_information(
     pose_covariance: FloatArray,
     budget: int,
 ) -> BoolArray:
-    """Return the choice of `greedy_information` as a mask (C, M); those held count `hold` times."""
+    """Return `greedy_information` as a mask (C, M); features held have weight `hold`."""
     rows, numbers = candidate_rows(T_world_target, T_camera_world, points, noise, visible)
     chosen = np.zeros(visible.shape, dtype=np.bool_)
     if len(rows) == 0 or budget <= 0:
@@ -166,11 +166,12 @@ def choose_by_information(
 
 @dataclass(frozen=True, slots=True)
 class InformationSelection:
-    """Greedy choice by the information gained about the pose, ½ log det(I + H P Hᵀ).
+    """Greedy selection by the information gained about the pose, ½ log det(I + H P Hᵀ).
 
-    It knows what the filter is still unsure of and which camera would tell, so it holds with four
-    features where the indexes of image geometry do not. A feature chosen last time counts `hold`
-    times as much: it stays until another is clearly better, so that the set does not flicker.
+    It accounts for what the filter is still uncertain about and which camera would resolve it, so
+    four features suffice where the indices of image geometry fail. A feature selected last time has
+    the weight `hold`: it stays until another is clearly better, so the set does not change all the
+    time.
     """
 
     hold: float = 1.2
@@ -180,7 +181,7 @@ class InformationSelection:
             raise InputError("InformationSelection", "hold", self.hold, "1 or more")
 
     def choose(self, candidates: Candidates, budget: int) -> BoolArray:
-        """Return which features to measure, (C, M), at most `budget` and only visible ones."""
+        """Return which features to measure, (C, M), at most `budget`, all visible."""
         chosen: BoolArray = choose_by_information(
             candidates.T_world_target,
             candidates.T_camera_world,

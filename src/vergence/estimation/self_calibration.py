@@ -1,4 +1,4 @@
-"""What servoing beside a stationary target tells of latency, mounting and focal length."""
+"""Latency, mounting and focal length, estimated from servoing relative to a stationary target."""
 
 from typing import NamedTuple
 
@@ -11,38 +11,38 @@ from vergence.robot import Arm
 
 NAMES = ("latency_s", "rotation_x", "rotation_y", "rotation_z", "x_m", "y_m", "z_m", "focal")
 _PRIOR = np.array([0.1, 0.2, 0.2, 0.2, 0.05, 0.05, 0.05, 0.1])  # deviations before any data
-_TOLD = np.array([0.003, *3 * [np.deg2rad(0.15)], *3 * [1e-3], 0.005])  # deviations worth telling
-_PRIOR_DEPTH = 0.5  # of the points: a share of the believed depth
-_MOST = 120  # exposures that are kept
-_APART_PX = 2.0  # mean motion of the image from one that is kept to the next
-_LATEST_S = 0.25  # of stamps: where the joints were at earlier exposures is not known
-_FEWEST = 12  # exposures, below which nothing is told
-_STEP_S = 1e-3  # over which a rate is taken
-_STEPS = 25  # of Levenberg and Marquardt
-_SETTLED = 1e-6  # of the cost, by which a step improves it no more
-_OUTLYING = 4.0  # medians of the residuals, beyond which a point counts ever less
-_LEAST_PX = 0.05  # no measurement is better
+_TOLD = np.array([0.003, *3 * [np.deg2rad(0.15)], *3 * [1e-3], 0.005])  # deviations for reporting
+_PRIOR_DEPTH = 0.5  # of the points, relative to the believed depth
+_MOST = 120  # number of exposures to keep
+_APART_PX = 2.0  # mean motion of the image between two kept exposures
+_LATEST_S = 0.25  # latest stamps: joints at earlier exposures are unknown
+_FEWEST = 12  # number of exposures below which nothing is reported
+_STEP_S = 1e-3  # interval for computing a rate
+_STEPS = 25  # of the Levenberg-Marquardt method
+_SETTLED = 1e-6  # relative change of the cost at convergence
+_OUTLYING = 4.0  # medians of the residuals, beyond which a point is increasingly downweighted
+_LEAST_PX = 0.05  # lower bound on the accuracy of a measurement
 
 
 class SelfCalibration(NamedTuple):
-    """What the data tell; each value with its standard deviation."""
+    """The estimated values, each with its standard deviation."""
 
-    latency_s: float  # by which stamps are later than the exposure
-    T_believed_camera: FloatArray  # (4, 4) of the true camera in the assumed one
+    latency_s: float  # delay of the stamps after the exposure
+    T_believed_camera: FloatArray  # (4, 4) of the true camera in the believed one
     focal: float  # true focal length over the believed one
-    deviations: FloatArray  # (8,) of `NAMES`: s, rad, m, a share
-    told: BoolArray  # (8,) whether the motion was enough to tell it
+    deviations: FloatArray  # (8,) of `NAMES`: s, rad, m, relative
+    told: BoolArray  # (8,) whether the motion was sufficient to estimate it
     rms_px: float  # of the residuals
-    reason: str = ""  # why nothing is told at all
+    reason: str = ""  # why nothing is estimated at all
 
     @property
     def rotation_rad(self) -> float:
-        """Angle by which the camera is turned from where it was believed to be."""
+        """Angle between the true and the believed orientation of the camera."""
         return float(np.linalg.norm(so3_log(self.T_believed_camera[:3, :3].copy())))
 
     @property
     def distance_m(self) -> float:
-        """Distance of the camera from where it was believed to be."""
+        """Distance between the true and the believed position of the camera."""
         return float(np.linalg.norm(self.T_believed_camera[:3, 3]))
 
     def __bool__(self) -> bool:
@@ -57,17 +57,17 @@ class _State(NamedTuple):
 
 
 class SelfCalibrator:
-    """Collects what a run shows, and estimates from it when it is asked.
+    """Collects the data of a run, and estimates the calibration from it on request.
 
-    A stationary point P is seen by a camera on the arm at p = s π(E⁻¹ T(q(t - τ))⁻¹ P), with the
-    latency τ of the stamps, the pose E of the true camera in the believed one, the focal length s
-    times the believed one, and T(q) the arm's kinematics up to the believed camera. Points and all
-    these are fitted to the images of the run together; weak priors hold what the motion leaves
-    open, and the deviation that remains says what that is.
+    A camera on the arm sees a stationary point P at p = s π(E⁻¹ T(q(t - τ))⁻¹ P), with the latency
+    τ of the stamps, the pose E of the true camera in the believed one, the focal length s times the
+    believed one, and T(q) the arm's kinematics up to the believed camera. Points and parameters are
+    fitted jointly to the images of the run; weak priors hold what the motion does not determine,
+    and the remaining deviation states which values these are.
 
     Args:
-        arm: up to the camera, where it is believed to be.
-        camera: its intrinsics, as they are believed.
+        arm: up to the believed camera.
+        camera: its believed intrinsics.
     """
 
     def __init__(self, arm: Arm, camera: Camera) -> None:
@@ -76,13 +76,13 @@ class SelfCalibrator:
         self._images: list[tuple[float, FloatArray, BoolArray]] = []  # normalized points
 
     def joints(self, time: float, position: FloatArray) -> None:
-        """Take joint positions (n,); times increase."""
+        """Add joint positions (n,); times must increase."""
         self._joints.append((time, position))
 
     def image(self, time: float, points_px: FloatArray, found: BoolArray) -> None:
-        """Take the same points (M, 2) as they are seen in one image, with those found (M,)."""
+        """Add the same points (M, 2) as measured in one image, with a mask of those found (M,)."""
         if self._images and len(self._images[0][1]) != len(points_px):
-            self._images.clear()  # other features
+            self._images.clear()  # the features have changed
         points = self._camera.normalize(points_px)
         found = found & np.isfinite(points).all(axis=1)
         if self._images:
@@ -92,13 +92,13 @@ class SelfCalibrator:
                 return
         self._images.append((time, points, found))
         if len(self._images) > _MOST:
-            del self._images[1::2]  # the same span, half as dense
+            del self._images[1::2]  # the same span at half the density
 
     def estimate(self, depth_m: float) -> SelfCalibration:
-        """Return what the data tell so far.
+        """Return the estimates so far.
 
         Args:
-            depth_m: of the points in the first image, as it is believed.
+            depth_m: believed depth of the points in the first image.
         """
         known_from = self._joints[0][0] + _LATEST_S if self._joints else np.inf
         images = [image for image in self._images if image[0] >= known_from]
@@ -116,7 +116,7 @@ class SelfCalibrator:
 
 
 class _Problem:
-    """The images of a run, and the fit of all unknowns to them."""
+    """The images of a run, and the joint fit of all unknowns to them."""
 
     def __init__(
         self,
@@ -167,7 +167,7 @@ class _Problem:
         return state, information, noise_px
 
     def _trust(self, residuals: FloatArray) -> FloatArray:
-        """Return a weight (K M 2,) of each coordinate: a point that is tracked wrongly has none."""
+        """Return a weight (K M 2,) of each coordinate; 0 for a wrongly tracked point."""
         size = np.linalg.norm(residuals.reshape(-1, 2), axis=1)
         seen = self._found.ravel()
         scale = max(_OUTLYING * float(np.median(size[seen])), _LEAST_PX)
@@ -175,7 +175,7 @@ class _Problem:
         return np.repeat(trust, 2)
 
     def _first_points(self) -> FloatArray:
-        """Return the points in the world, each at the believed depth where it is seen first."""
+        """Return the points in the world, each at the believed depth where it is first seen."""
         first = self._found.argmax(axis=0)
         poses = self._poses(self._stamps)
         rays = np.array([[*self._points[k, j], 1.0] for j, k in enumerate(first)])
@@ -185,7 +185,7 @@ class _Problem:
         )
 
     def _poses(self, times: FloatArray) -> FloatArray:
-        """Return T_world_camera (K, 4, 4), as it is believed, at some times."""
+        """Return the believed T_world_camera (K, 4, 4) at given times."""
         q = self._joints_at(np.clip(times, *self._span))
         return np.array([self._arm.forward_kinematics(each) for each in q])
 
@@ -235,14 +235,14 @@ class _Problem:
         return 1.0 / np.concatenate((_PRIOR, deviations)) ** 2
 
     def _off(self, state: _State) -> FloatArray:
-        """Return how far a state is from what was believed."""
+        """Return the deviation of a state from the believed one."""
         rotation = so3_log(np.ascontiguousarray(state.T[:3, :3]))
         first = [state.latency_s, *rotation, *state.T[:3, 3], state.focal - 1.0]
         return np.concatenate((first, (state.points - self._start.points).ravel()))
 
 
 def _moved(state: _State, step: FloatArray) -> _State:
-    """Return a state moved by a step of its parameters; the camera's is along its own axes."""
+    """Return a state moved by a step of its parameters, for the camera along its own axes."""
     T = state.T @ se3(so3_exp(step[1:4].copy()), step[4:7].copy())
     points = state.points + step[8:].reshape(-1, 3)
     return _State(state.latency_s + step[0], T, state.focal + step[7], points)

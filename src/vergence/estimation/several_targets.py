@@ -1,4 +1,4 @@
-"""Several targets, each followed by a filter of its own, in the images of the same cameras."""
+"""Several targets, each tracked by its own filter, in the images of the same cameras."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,14 +13,14 @@ class _Perception(Protocol):
 
 
 class SeveralTargets:
-    """Follows the other targets of a cell beside the one that the task is about.
+    """Tracks the other targets of a cell in addition to the task's.
 
-    What is observed of them comes with the next observation of that one; the loop does not hold
-    the arm for any of them.
+    Observations of the others are delivered with the next observation of the task's target; the
+    loop does not hold the arm for any of them.
 
     Args:
         perception: of the task's target.
-        others: follow the others, by name.
+        others: perceptions of the others, by name.
     """
 
     def __init__(self, perception: _Perception, others: Mapping[str, FollowedPose]) -> None:
@@ -28,7 +28,7 @@ class SeveralTargets:
         self._seen: dict[str, Observation] = {}  # since the last observation
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the images show, and where the targets are, or None without an image."""
+        """Return the observation in the images with all targets, or None without an image."""
         observation = self._perception.observe(tuple(frames))
         for name, other in self._others.items():
             if (seen := other.observe(frames)) is not None:

@@ -1,4 +1,4 @@
-"""Features chosen so far apart that their windows do not overlap, as [Lippiello2005] has it."""
+"""Selection of features whose windows do not overlap, as in [Lippiello2005]."""
 
 import numpy as np
 
@@ -8,16 +8,16 @@ from vergence.arrays import BoolArray, FloatArray
 def keep_apart(
     visible: BoolArray, points_px: FloatArray, held: BoolArray, distance_px: float
 ) -> BoolArray:
-    """Return which visible features of each image to choose from, (C, M).
+    """Return which visible features of each image to select from, (C, M).
 
-    One after the other, those chosen last time first, each is left out if it is closer than the
-    distance to one that stays.
+    In sequence, with those selected last time first, each feature closer than the distance to an
+    accepted one is rejected.
 
     Args:
         visible: (C, M).
-        points_px: predicted places, (C, M, 2).
-        held: chosen last time, (C, M).
-        distance_px: least distance in an image; 0 keeps all.
+        points_px: predicted positions, (C, M, 2).
+        held: selected last time, (C, M).
+        distance_px: smallest distance in an image; 0 accepts all.
     """
     if distance_px <= 0.0:
         return visible

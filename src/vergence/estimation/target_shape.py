@@ -1,4 +1,4 @@
-"""The target as perception knows it: its features, and the surface that can hide them."""
+"""The model of the target for perception: its features, and the surface that can occlude them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,25 +10,25 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
 
-TOUCHING = 1e-3  # of the target's size: a feature this near a face lies on it
+TOUCHING = 1e-3  # relative to the target's size: a feature this close to a face lies on it
 
 
 @dataclass(frozen=True, slots=True)
 class TargetShape:
     """Features of a rigid target with the faces around them, in the target's frame.
 
-    Without a surface (`from_points`) every feature is taken to be seen from all sides.
+    Without a surface (`from_points`), every feature is assumed visible from all sides.
     """
 
     points: FloatArray  # (M, 3) features, m
-    normals: FloatArray  # (M, K, 3) unit normals of the faces around each, filled up with zeros
-    face_counts: IntArray  # (M,) how many there are; 0: seen from all sides
+    normals: FloatArray  # (M, K, 3) unit normals of the faces around each, padded with zeros
+    face_counts: IntArray  # (M,) number of faces; 0: visible from all sides
     triangles: FloatArray  # (F, 3, 3) corners of the surface's triangles, m
-    size: float  # m, diagonal of the box around it all
+    size: float  # m, diagonal of the bounding box
 
     @classmethod
     def from_points(cls, points: ArrayLike) -> Self:
-        """Make a target of bare points, (M, 3), m.
+        """Return a target of points without a surface, (M, 3), m.
 
         Raises:
             InputError: if there is no point.
@@ -37,15 +37,15 @@ class TargetShape:
 
     @classmethod
     def from_mesh(cls, points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Self:
-        """Make a target of features on the surface of a mesh, convex or not.
+        """Return a target of features on the surface of a mesh, convex or not.
 
         Args:
             points: features, (M, 3), m.
             vertices: of the mesh, (V, 3), m.
-            faces: three vertices a triangle, counter-clockwise seen from outside, (F, 3).
+            faces: three vertices per triangle, counter-clockwise seen from outside, (F, 3).
 
         Raises:
-            InputError: if there is no point, or a face names a vertex that is not there.
+            InputError: if there is no point, or a face refers to a vertex that does not exist.
         """
         features = frozen(points, (None, 3), "points")
         if not len(features):
@@ -53,7 +53,7 @@ class TargetShape:
         corners = frozen(vertices, (None, 3), "vertices")
         index = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         if index.size and not (index.min() >= 0 and index.max() < len(corners)):
-            raise InputError("TargetShape", "faces", "a vertex that is not there", "0 … V - 1")
+            raise InputError("TargetShape", "faces", "a vertex that does not exist", "0 … V - 1")
         triangles = corners[index]
         everything = np.vstack((features, triangles.reshape(-1, 3)))
         size = float(np.linalg.norm(np.ptp(everything, axis=0)))
@@ -67,7 +67,7 @@ class TargetShape:
 
     @classmethod
     def box(cls, edges: ArrayLike) -> Self:
-        """Make a box around the origin with its eight corners as features.
+        """Return a box around the origin with its eight corners as features.
 
         Args:
             edges: lengths along x, y and z, (3,), m.
@@ -108,7 +108,7 @@ def _distinct(normals: Iterable[FloatArray]) -> list[FloatArray]:
 
 
 def _touches(point: FloatArray, triangle: FloatArray, normal: FloatArray, tolerance: float) -> bool:
-    """Return whether a point in the plane of a triangle is on it, or so little beside it."""
+    """Return whether a point in the plane of a triangle is on it, within a tolerance."""
     for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
         inward = np.cross(normal, b - a)
         if inward @ (point - a) < -tolerance * np.linalg.norm(inward):

@@ -10,36 +10,36 @@ from vergence.signals import Frame, ImagePoints, Observation, SearchWindows
 
 
 class MeasuredPoints(Protocol):
-    """Where points are in one image."""
+    """The measurement of points in one image."""
 
     @property
     def points_px(self) -> FloatArray:
-        """Their places, (M, 2); where a point was not found, the expected one."""
+        """Their positions, (M, 2); the expected one where a point was not found."""
         ...
 
     @property
     def covariance_px(self) -> FloatArray:
-        """Of the places, (M, 2, 2) px²."""
+        """Covariances of the positions, (M, 2, 2) px²."""
         ...
 
     @property
     def found(self) -> BoolArray:
-        """Which were found, (M,)."""
+        """Which points were found, (M,)."""
         ...
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why not, (M,); empty where found."""
+        """Reasons why points were not found, (M,); empty where found."""
         ...
 
     @property
     def windows(self) -> SearchWindows | None:
-        """Where they were searched for."""
+        """The windows in which they were searched for."""
         ...
 
 
 class TracksPoints(Protocol):
-    """Measures the same points in one image after the other."""
+    """Measures the same points in successive images."""
 
     def track(self, image: ImageArray) -> MeasuredPoints:
         """Measure the points in a new image, (height, width) grey."""
@@ -47,12 +47,12 @@ class TracksPoints(Protocol):
 
 
 class TrackedPoints:
-    """Observes the points that a tracker follows in one camera's images.
+    """Observes the points that a tracker tracks in one camera's images.
 
     Args:
-        camera: the camera's name; other cameras' frames are passed over.
-        tracker: has been shown the points already.
-        count: how many points there are; as many as the tracker says if None.
+        camera: the camera's name; frames of other cameras are ignored.
+        tracker: has been initialised with the points.
+        count: number of points; that of the tracker if None.
     """
 
     def __init__(self, camera: str, tracker: TracksPoints, count: int | None = None) -> None:
@@ -64,8 +64,8 @@ class TrackedPoints:
         """Return the points in the frames that arrived, or None if none did.
 
         Raises:
-            ShapeError: if the tracker measures more points or fewer.
-            InputError: if it says that it found a point and not where.
+            ShapeError: if the tracker measures more or fewer points.
+            InputError: if it reports a point as found without a finite position.
         """
         views = tuple(self._view(frame) for frame in frames if frame.camera == self._camera)
         return Observation(views[-1].time, views) if views else None
@@ -80,7 +80,7 @@ class TrackedPoints:
         if len(found) != count or len(tracks.reasons) != count:
             raise ShapeError("found and reasons of the tracker", found.shape, (count,))
         if not (np.isfinite(points_px[found]).all() and np.isfinite(covariance_px[found]).all()):
-            raise InputError("tracker", "points_px", "found, but not finite", "finite places")
+            raise InputError("tracker", "points_px", "found, but not finite", "finite positions")
         return ImagePoints(
             frame.camera,
             frame.time,

@@ -1,9 +1,9 @@
-"""Turns of a target that no measurement shows: kept as predicted, and said to be unknown.
+"""Rotations of a target that measurements do not observe: kept as predicted, reported as unknown.
 
-An image of a ball shows none of its turns, that of a can not the one about its axis, that of a mug
-not while its handle is hidden. Such a turn w may go with a motion of the origin: F = [δp; w] are
-the motions (6, K) that do not show, the turns of unit length and orthogonal. With E = [0; w] the
-projector Π = I - F Eᵀ takes them out of an error (δp, δθ) and leaves everything else as it is.
+An image of a ball shows none of its rotations, that of a can not the one about its axis, that of a
+mug not while its handle is hidden. Such a rotation w may involve a motion of the origin:
+F = [δp; w] are the unobservable motions (6, K), with unit, orthogonal rotations. With E = [0; w],
+the projector Π = I - F Eᵀ removes them from an error (δp, δθ) and leaves everything else unchanged.
 """
 
 from dataclasses import replace
@@ -14,21 +14,21 @@ from vergence.arrays import FloatArray
 from vergence.estimation.belief import Belief
 from vergence.geometry import se3, so3_exp, so3_log
 
-UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of an angle that may be anything
-MOST_RAD = 0.3  # up to which a turn that does not show is followed by its growing deviation
+UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of a uniformly distributed angle
+MOST_RAD = 0.3  # up to which an unobservable rotation is represented by its growing deviation
 _MOST = np.array((MOST_RAD**2, 9.0))  # rad² and rad²/s²
-_FIXED_RAD = 1e-4  # while a measurement is taken in
-_DAMPING = 0.8  # of a speed that does not show, per image
+_FIXED_RAD = 1e-4  # during an update by a measurement
+_DAMPING = 0.8  # of an unobservable velocity, per image
 
 
 def without_unseen(belief: Belief, motions: FloatArray) -> Belief:
-    """Return a predicted belief in which the motions that do not show are fixed.
+    """Return a predicted belief in which the unobservable motions are fixed.
 
-    What errors of measurement say of such a motion is noise, which would let the target spin.
+    What measurement errors say about such a motion is noise, which would make the target spin.
 
     Args:
         belief: predicted to the image.
-        motions: that do not show in it, (6, K), along the axes of the world, m and rad.
+        motions: unobservable in it, (6, K), along world axes, m and rad.
     """
     if not motions.shape[1]:
         return belief
@@ -37,11 +37,11 @@ def without_unseen(belief: Belief, motions: FloatArray) -> Belief:
 
 
 def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Belief:
-    """Return an updated belief that knows of the motions that do not show what was predicted.
+    """Return an updated belief whose unobservable motions are as predicted.
 
     Args:
         predicted: the belief before the update.
-        updated: what an update made of it `without_unseen`.
+        updated: the update of its `without_unseen`.
         motions: (6, K), as there.
     """
     if not motions.shape[1]:
@@ -63,7 +63,7 @@ def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Beli
 
 
 def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return a covariance (12, 12) in which motions that no image shows are not known."""
+    """Return a covariance (12, 12) in which motions that no image shows are unknown."""
     P = _projected(covariance, motions) + _along(motions, MOST_RAD**2)
     return np.ascontiguousarray(0.5 * (P + P.T))
 
@@ -71,15 +71,16 @@ def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
 def told_covariance(
     belief: Belief, motions: FloatArray, shared: FloatArray, astray: FloatArray
 ) -> FloatArray:
-    """Return the covariance (12, 12) of a belief to be told to others.
+    """Return the covariance (12, 12) of a belief to be reported.
 
-    A turn that has not shown for so long that its deviation reached the bound may be anything.
+    A rotation that has been unobservable until its deviation reached the bound may have any angle.
 
     Args:
         belief: after an image.
-        motions: that do not show, (6, K).
-        shared: covariance of the pose error that all images have in common, (6, 6).
-        astray: and of what more is wrong while a turn is unknown, (6, 6); in proportion before.
+        motions: unobservable, (6, K).
+        shared: covariance of the pose error common to all images, (6, 6).
+        astray: covariance of the additional error while a rotation is unknown, (6, 6); in
+            proportion before.
     """
     P = belief.honest_covariance.copy()
     P[:6, :6] += shared
@@ -94,7 +95,7 @@ def told_covariance(
 def shown_covariance(
     belief: Belief, motions: FloatArray, shared: FloatArray | None = None
 ) -> FloatArray:
-    """Return the covariance (12, 12) with the motions that do not show all but fixed."""
+    """Return the covariance (12, 12) with the unobservable motions practically fixed."""
     P = belief.honest_covariance.copy()
     if shared is not None:
         P[:6, :6] += shared
@@ -102,7 +103,7 @@ def shown_covariance(
 
 
 def unseen_variance(belief: Belief, motions: FloatArray) -> FloatArray:
-    """Return the variances of turns that do not show, and of their speeds, (2, K), rad and s."""
+    """Return the variances of unobservable rotations and of their velocities, (2, K), rad and s."""
     turns, P = motions[3:], belief.covariance
     blocks = np.stack((P[3:6, 3:6], P[9:12, 9:12]))
     return np.asarray(np.einsum("ik,nij,jk->nk", turns, blocks, turns))
@@ -115,7 +116,7 @@ def pose_error(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
 
 
 def _projected(covariance: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return Π P Πᵀ, of pose and velocity alike."""
+    """Return Π P Πᵀ, for pose and velocity alike."""
     projector = np.eye(6)
     projector[:, 3:] -= motions @ motions[3:].T
     both = np.kron(np.eye(2), projector)
