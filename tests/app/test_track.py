@@ -271,7 +271,7 @@ def test_a_round_object_is_followed_by_its_outline(
     assert track("--json", out="here", **options) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["seen"] == 8
-    assert answer["unseen_turns"] == "no turn of it shows in its outline"
+    assert answer["unseen_turns"] == "its outline shows none of its rotations"
     assert answer["last"]["position_m"] == pytest.approx(ball_place(7), abs=2e-3)
     assert np.sqrt(np.diag(answer["last"]["covariance"])[3:]) == pytest.approx(np.pi / np.sqrt(3))
     grey = cv2.imread(str(tmp_path / "round" / "3.png"), cv2.IMREAD_GRAYSCALE)

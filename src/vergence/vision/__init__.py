@@ -1,4 +1,4 @@
-"""Image points from windows of images, and what two views of them tell."""
+"""Vision: image points from windows of images, and two-view geometry."""
 
 from vergence.vision.board import Board
 from vergence.vision.board_file import read_board

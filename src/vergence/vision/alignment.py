@@ -1,7 +1,7 @@
 """Affine alignment of a patch to a template, with gain and bias, inverse compositional.
 
 The model is I(p + A u) = g T(u) + b, where u runs over the template's pixels relative to the
-feature point. Its derivatives are taken of the template and are made once; a step is then one
+feature point. Derivatives are those of the template and are computed once; a step is then one
 resampling of the image and one product ([Baker2004], the inverse compositional algorithm).
 """
 
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.pyramid import Patch, load_window
 
-PATCH_PX = 24  # side of the patch that is aligned
-AREA_PX = 48  # side of the part of the image that it is searched for in
+PATCH_PX = 24  # side of the aligned patch
+AREA_PX = 48  # side of the image area in which it is searched for
 FREE, RIGID = 0, 1  # whether the affine matrix may change
 WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
-CONVERGED_PX = 0.06  # a step; what is left after it is a tenth
-NOISE_GREY = 16.0  # grey levels; scales the prior on the affine matrix, nothing else
-FORM_DEVIATION = 0.02  # how far the affine matrix strays from what is expected
+CONVERGED_PX = 0.06  # length of a step; the error left after it is a tenth
+NOISE_GREY = 16.0  # grey levels; only scales the prior on the affine matrix
+FORM_DEVIATION = 0.02  # standard deviation of the affine matrix from the expected one
 FORM_PRIOR = (NOISE_GREY / FORM_DEVIATION) ** 2
 
 
@@ -37,16 +37,16 @@ ROOT_WEIGHTS = _root_weights()  # (n,)
 
 
 class AlignmentTemplate(NamedTuple):
-    """A patch of an image and all that an alignment to it needs."""
+    """A patch of an image with everything that an alignment to it needs."""
 
     jacobian: Patch  # (8, n) by x, y, a11, …, a22, gain, bias; n = 24 × 24; weighted
     inverse: FloatArray  # (2, 8, 8) inverse of JᵀJ + prior; and with a rigid affine matrix
-    facts: FloatArray  # (4,) feature point less patch centre x and y, px; mean; sum of squares
+    facts: FloatArray  # (4,) feature point minus patch centre x and y, px; mean; sum of squares
     spread: FloatArray  # (2, 2) covariance of x, y, px², for noise of one grey level
 
 
 class Alignment(NamedTuple):
-    """What an alignment ended with."""
+    """The result of an alignment."""
 
     x: float  # px, the feature point
     y: float  # px
@@ -57,10 +57,10 @@ class Alignment(NamedTuple):
 
 
 class Resampling(NamedTuple):
-    """Memory that an alignment writes to."""
+    """Work memory of an alignment."""
 
     area: Patch  # (48, 48) the part of the image that is resampled
-    sample: Patch  # (n,) the resampled patch, less the template's mean; weighted
+    sample: Patch  # (n,) the resampled patch minus the template's mean; weighted
     weight_x: Patch  # (24,)
     weight_y: Patch  # (24,)
     corner: NDArray[np.int32]  # (24,) flat index of the upper left of four pixels
@@ -85,7 +85,7 @@ def make_resampling(memory: Patch, index: NDArray[np.int32]) -> Resampling:
 def fill_template(
     image: ImageArray, anchor_x: int, anchor_y: int, x: float, y: float, out: AlignmentTemplate
 ) -> None:
-    """Take the patch at an anchor for the feature point (x, y) as template."""
+    """Use the patch at an anchor for the feature point (x, y) as template."""
     side = PATCH_PX
     window = np.empty((side + 2, side + 2), np.float32)
     load_window(image, anchor_x, anchor_y, window)
@@ -124,11 +124,11 @@ def fill_template(
 def resample(
     x: float, y: float, A: FloatArray, template: AlignmentTemplate, work: Resampling
 ) -> None:
-    """Sample the area bilinearly at (x, y) + A u for every template pixel u, less the mean.
+    """Sample the area bilinearly at (x, y) + A u for every template pixel u, and subtract the mean.
 
     The positions of a row are computed first, as vector code, then its pixels are gathered; the
-    unsigned indices avoid numba's negative-index check. What lies outside is taken from the
-    nearest pixel inside.
+    unsigned indices avoid numba's negative-index check. Outside the area, the nearest pixel inside
+    is used.
     """
     first, last = -(PATCH_PX / 2 - 0.5), np.float32(AREA_PX - 1.001)
     flat = work.area.reshape(AREA_PX * AREA_PX)
@@ -168,19 +168,19 @@ def product(a: Patch, b: Patch) -> np.float32:
 def align(
     x: float, y: float, A: FloatArray, template: AlignmentTemplate, form: int, work: Resampling
 ) -> Alignment:
-    """Align the area of the image to a template; A is changed in place, its start is the prior.
+    """Align the area of the image to a template; A is updated in place, starting from the prior.
 
     Each step solves (JᵀJ + Λ) q = JᵀI + Λ g e, where q = (g δ, g - 0, b), Λ is the weight of the
-    prior and e is how far A has come from its start, and puts the inverse of the step δ before
-    the warp.
+    prior and e the deviation of A from its initial value, and composes the warp with the inverse of
+    the step δ.
 
     Args:
-        x: where the feature is expected in the area, px.
-        y: likewise.
+        x: expected column of the feature in the area, px.
+        y: expected row, px.
         A: affine matrix from template to image, (2, 2).
-        template: what to align to.
-        form: FREE, or RIGID to keep A as it is.
-        work: the area, and memory.
+        template: the template.
+        form: FREE, or RIGID to keep A constant.
+        work: the area, and work memory.
     """
     strayed, right, q = np.zeros(4), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
     gain, steps = 1.0, 0
@@ -228,11 +228,11 @@ def align(
 
 @njit(cache=True, inline="always")
 def agreement(template: AlignmentTemplate, work: Resampling) -> tuple[float, float]:
-    """Correlation, and root mean square residual less gain and bias, of the last resampling."""
+    """Return correlation, and rms residual without gain and bias, of the last resampling."""
     sample, total = work.sample, product(ROOT_WEIGHTS, ROOT_WEIGHTS)
     mean = product(ROOT_WEIGHTS, sample) / total
     own = max(product(sample, sample) - total * mean * mean, 1e-6)
-    # the template's values have no mean
+    # the template's values have zero mean
     joint, other = product(template.jacobian[6], sample), max(template.facts[3], 1e-6)
     correlation = joint / np.sqrt(own * other)
     residual = np.sqrt(max(own - joint * joint / other, 0.0) / (total - UNKNOWNS))

@@ -19,10 +19,10 @@ from vergence.vision.board_finders import (
 )
 from vergence.vision.marks.coded import DICTIONARIES
 
-DICTIONARY = "aruco_5x5_250"  # of markers, where nothing else is said
+DICTIONARY = "aruco_5x5_250"  # of markers, by default
 PATTERNS = ("squares", "circles", "asymmetric_circles")
 _MOST = 200  # corners in a row or column
-_QUIET = 0.5  # white around the squares, in squares
+_QUIET = 0.5  # white margin around the squares, in squares
 _CIRCLE = 0.25  # radius of a circle, in squares
 
 
@@ -30,15 +30,16 @@ _CIRCLE = 0.25  # radius of a circle, in squares
 class Board:
     """A flat board: a chessboard, a ChArUco board with a marker in each white square, or circles.
 
-    Corners are those inside, where four squares meet, row by row; of a grid of circles they are the
-    centres. The board's frame has its origin in the first, x along the rows, y along the columns,
-    and z into the board. In an asymmetric grid every other row is moved by one `square_m`, circles
-    in a row are two apart, and rows one: 4 columns and 11 rows is OpenCV's.
+    Corners are the inner ones, where four squares meet, row by row; for a grid of circles they are
+    the centres. The board's frame has its origin in the first corner, x along the rows, y along the
+    columns, and z into the board. In an asymmetric grid every other row is shifted by one
+    `square_m`, circles in a row are two apart, and rows one, as in OpenCV's grid of 4 columns and
+    11 rows.
     """
 
     columns: int  # inner corners, or circles, in a row
     rows: int
-    square_m: float  # side of a square, or distance of two circles
+    square_m: float  # side of a square, or distance between two circles
     marker_m: float | None = None  # side of a marker; None without markers
     dictionary: str = DICTIONARY  # of the markers
     pattern: str = PATTERNS[0]
@@ -75,36 +76,36 @@ class Board:
 
     @property
     def outline_m(self) -> tuple[float, float]:
-        """Width and height with the white around, m."""
+        """Width and height including the white margin, m."""
         width, height = 2.0 * self.center[:2] + (2 + 2 * _QUIET) * self.square_m
         return float(width), float(height)
 
     @property
     def center(self) -> FloatArray:
-        """The middle in the board's frame, (3,), m."""
+        """The centre in the board's frame, (3,), m."""
         middle: FloatArray = 0.5 * self.points.max(axis=0)
         return middle
 
     def find(self, image: ImageArray, name: str) -> Sighting | None:
-        """Find the board in a grey image; None where it is not seen, or not enough of it."""
+        """Find the board in a grey image; None if it, or enough of it, is not visible."""
         found = self._corners(image)
         return None if found is None else Sighting(name, self.points[found.numbers], found.pixels)
 
     def seen_instead(self, image: ImageArray) -> str:
-        """Return in words which other board a grey image shows; empty if none."""
+        """Return which other board a grey image shows, as text; empty if none."""
         from vergence.vision.board_diagnosis import other_board
 
         return other_board(self, image)
 
     def orientations(self, seen: Sighting) -> tuple[Sighting, ...]:
-        """Return a sighting as it is, and turned in each way in which the board looks the same."""
+        """Return a sighting in each orientation in which the board looks the same."""
         return tuple(
             seen._replace(points=transform_points(self._turned(quarters), seen.points))
             for quarters in self._symmetry()
         )
 
     def _symmetry(self) -> tuple[int, ...]:
-        """Return by how many quarters of a turn the board may be turned and looks the same.
+        """Return by how many quarter turns the board can be rotated and looks the same.
 
         A chessboard whose numbers of corners are both even or both odd has the same colours upside
         down. An asymmetric grid with an even number of rows has the same circles.
@@ -117,13 +118,13 @@ class Board:
         return (0,) if counted % 2 else (0, 2)
 
     def _turned(self, quarters: int) -> FloatArray:
-        """Return the turn (4, 4) of the board about its middle, in its plane."""
+        """Return the rotation (4, 4) of the board about its centre, in its plane."""
         R = np.round(so3_exp(np.array([0.0, 0.0, 0.5 * np.pi * quarters])))
         T: FloatArray = se3(R, self.center - R @ self.center)
         return T
 
     def image(self, square_px: int) -> ImageArray:
-        """Return the board as a grey image for printing or rendering, white around included."""
+        """Return the board as a grey image for printing or rendering, with its white margin."""
         import cv2
 
         quiet = round(_QUIET * square_px)
@@ -142,13 +143,13 @@ class Board:
         return np.asarray(bordered, dtype=np.uint8)
 
     def _circles(self, square_px: int) -> ImageArray:
-        """Return dark circles on white, one square of white around their centres."""
+        """Return dark circles on white, with a margin of one square around their centres."""
         import cv2
 
         centers = (self.points[:, :2] / self.square_m + 1.0) * square_px - 0.5
         width, height = (centers.max(axis=0) + square_px + 0.5).astype(int)
         image = np.full((height, width), 255, np.uint8)
-        bits = 4  # of a fraction of a pixel
+        bits = 4  # fractional bits of a pixel
         for u, v in np.round(centers * 2**bits).astype(int).tolist():
             radius = round(_CIRCLE * square_px * 2**bits)
             cv2.circle(image, (u, v), radius, 0, cv2.FILLED, cv2.LINE_AA, bits)

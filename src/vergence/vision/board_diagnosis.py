@@ -1,4 +1,4 @@
-"""What else an image shows where a board was not found."""
+"""Describes what an image shows if a board was not found."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from vergence.vision.board import Board
 from vergence.vision.board_finders import chessboard_size
 from vergence.vision.marks.coded import DICTIONARIES
 
-_FEWEST_MARKERS = 4  # fewer may be chance
-_SMALLER = ("_50", "_100", "_250")  # dictionaries that the one of 1000 markers contains
+_FEWEST_MARKERS = 4  # fewer may be false detections
+_SMALLER = ("_50", "_100", "_250")  # dictionaries contained in the one of 1000 markers
 _LARGEST = tuple(name for name in DICTIONARIES if not name.endswith(_SMALLER))
 
 
 def other_board(board: Board, image: ImageArray) -> str:
-    """Return in words which board an image shows instead of one; empty if none is seen.
+    """Return which board an image shows instead of the expected one, as text; empty if none.
 
-    Wrong dictionary, wrong counts and a board of another kind are distinguished.
+    Distinguishes a wrong dictionary, wrong counts and a board of another kind.
     """
     if board.marker_m is not None:
         return _other_markers(board, image) or _chessboard(board, image)
@@ -57,7 +57,7 @@ def _other_markers(board: Board, image: ImageArray) -> str:
 def _markers(image: ImageArray, dictionaries: tuple[str, ...]) -> tuple[str, IntArray]:
     """Return the dictionary of which most different markers are seen, and their numbers.
 
-    Of dictionaries that contain each other it is the smallest that has them all.
+    Of dictionaries that contain each other, the smallest that has all of them is returned.
     """
     import cv2
 

@@ -15,7 +15,7 @@ def read_board(path: str | Path) -> Board:
     """Read the description of a board.
 
     Raises:
-        InputError: if it is not there or cannot be used.
+        InputError: if the file does not exist or cannot be used.
     """
     path, source = Path(path), str(path)
     if not path.is_file():
@@ -36,7 +36,7 @@ def read_board(path: str | Path) -> Board:
 def make_board(
     sizes: Mapping[str, float], dictionary: str, source: str, pattern: str = ""
 ) -> Board:
-    """Make a board of columns, rows, square_mm and perhaps marker_mm.
+    """Return a board of the given columns, rows, square_mm and, if present, marker_mm.
 
     Raises:
         InputError: naming the source, if there is no such board.

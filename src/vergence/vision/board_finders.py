@@ -1,4 +1,4 @@
-"""The corners of boards in an image, by OpenCV's finders."""
+"""Finds the corners of boards in an image with OpenCV."""
 
 from typing import Any, NamedTuple
 
@@ -7,23 +7,23 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.brightness import brightened
 
-_ROOM = 0.35  # of the least distance of two corners: half a window for refining one
-_FEWEST_CORNERS = 8  # of a ChArUco board, for an image to count
-_BENT = 0.2  # of a square: how far distortion may move a corner
+_ROOM = 0.35  # relative to the smallest distance of two corners: half a window for refining one
+_FEWEST_CORNERS = 8  # of a ChArUco board, for an image to be used
+_BENT = 0.2  # relative to a square: largest displacement of a corner by distortion
 _SMALLEST_CIRCLE_PX = 20.0  # area
 
 
 class Corners(NamedTuple):
     """Corners that were found."""
 
-    numbers: Any  # which of the board's corners they are: an index of its points
+    numbers: Any  # indices of the board's corners
     pixels: FloatArray  # (n, 2)
 
 
 def find_chessboard(image: ImageArray, columns: int, rows: int) -> Corners | None:
-    """Find all inner corners of a chessboard; None where not all of them are seen.
+    """Find all inner corners of a chessboard; None if not all of them are visible.
 
-    None of OpenCV's finders sees every whole and sharp board: they are asked in turns.
+    None of OpenCV's finders detects every complete, sharp board, so they are tried in turn.
     """
     import cv2
 
@@ -39,10 +39,9 @@ def find_chessboard(image: ImageArray, columns: int, rows: int) -> Corners | Non
 
 
 def _in_order(image: ImageArray, pixels: FloatArray, size: tuple[int, int]) -> Corners:
-    """Return the corners from the one beside a white square on, where the colours tell which.
+    """Return the corners starting beside a white square, where the colours determine which that is.
 
-    They do where one number of corners is even and the other odd; finders differ in where they
-    begin.
+    They do if one number of corners is even and the other odd; finders differ in where they start.
     """
     columns, rows = size
     if (columns + rows) % 2 == 0:
@@ -59,7 +58,7 @@ def _in_order(image: ImageArray, pixels: FloatArray, size: tuple[int, int]) -> C
 
 
 def chessboard_size(image: ImageArray) -> tuple[int, int] | None:
-    """Return columns and rows of inner corners of a chessboard of any size; None without one."""
+    """Return columns and rows of inner corners of a chessboard of any size; None if none."""
     import cv2
 
     best = None
@@ -75,17 +74,17 @@ def chessboard_size(image: ImageArray) -> tuple[int, int] | None:
 
 
 def _is_grid(corners: FloatArray) -> bool:
-    """Whether corners (R, C, 2) lie as those of a flat board, but for some distortion."""
+    """Whether corners (R, C, 2) form a flat grid, up to some distortion."""
     y, x = np.mgrid[: corners.shape[0], : corners.shape[1]]
     return _on_plane(np.column_stack((x.ravel(), y.ravel())), corners.reshape(-1, 2))
 
 
 def _on_plane(grid: FloatArray, pixels: FloatArray) -> bool:
-    """Whether corners (N, 2) of a board lie in an image as a plane has them, in the same order.
+    """Whether image points (N, 2) are the projection of a board's corners, in the same order.
 
     Args:
         grid: the corners on the board, (N, 2), neighbours one or √2 apart.
-        pixels: where they are in the image, (N, 2).
+        pixels: their image points, (N, 2).
     """
     import cv2
 
@@ -100,7 +99,7 @@ def _on_plane(grid: FloatArray, pixels: FloatArray) -> bool:
 def charuco_board(
     columns: int, rows: int, square_m: float, marker_m: float, dictionary: str, old: bool = False
 ) -> Any:
-    """Return OpenCV's ChArUco board of inner corners; old: as OpenCV laid it out before 4.6."""
+    """Return OpenCV's ChArUco board of inner corners; old: in OpenCV's layout before 4.6."""
     import cv2
 
     known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
@@ -110,15 +109,15 @@ def charuco_board(
 
 
 def find_charuco(image: ImageArray, boards: tuple[Any, ...], columns: int) -> Corners | None:
-    """Find the corners of a ChArUco board, of the layout of which most are seen.
+    """Find the corners of a ChArUco board, in the layout of which most are visible.
 
     Args:
         image: grey.
-        boards: OpenCV's, one for each layout.
+        boards: OpenCV's boards, one for each layout.
         columns: inner corners in a row.
 
     Returns:
-        None where too few are seen, or all in one line.
+        The corners; None if too few are visible, or all lie on a line.
     """
     import cv2
 
@@ -135,9 +134,9 @@ def find_charuco(image: ImageArray, boards: tuple[Any, ...], columns: int) -> Co
 
 
 def find_circles(image: ImageArray, columns: int, rows: int, *, asymmetric: bool) -> Corners | None:
-    """Find the centres of a grid of dark circles; None where not all of them are seen.
+    """Find the centres of a grid of dark circles; None if not all of them are visible.
 
-    OpenCV's finders may find all circles and put them in a wrong order: that is no grid.
+    OpenCV's finders may find all circles but return them in a wrong order, which is rejected.
     """
     import cv2
 
@@ -160,10 +159,10 @@ def find_circles(image: ImageArray, columns: int, rows: int, *, asymmetric: bool
 
 
 def _refined(image: ImageArray, corners: Any, size: tuple[int, int]) -> FloatArray:
-    """Move all corners of a chessboard to where its edges cross.
+    """Move all corners of a chessboard to the crossings of its edges.
 
-    The finder itself is off by some hundredths of a pixel, alike for a whole image, and the pose of
-    the board with it.
+    The finder itself has an error of some hundredths of a pixel, common to a whole image, which
+    would affect the pose of the board.
     """
     import cv2
 

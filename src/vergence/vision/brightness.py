@@ -1,19 +1,19 @@
-"""Dark images, made as bright as others, for thresholds that are in grey values."""
+"""Brightens dark images, for thresholds in grey values."""
 
 import numpy as np
 
 from vergence.arrays import ImageArray
 
-_WHITE = 200.0  # what the brightest places of an image are brought to
-_BRIGHTEST = 0.99  # of its pixels that are darker than those
-_MOST = 12.0  # gain: beyond it there is nothing but noise
-_DARK = 1.5  # gain, below which an image stays as it is
+_WHITE = 200.0  # grey value of the brightest parts of an image after brightening
+_BRIGHTEST = 0.99  # fraction of its pixels that are darker than those
+_MOST = 12.0  # gain, beyond which only noise is amplified
+_DARK = 1.5  # gain, below which an image is not changed
 _SMOOTH_PX = 0.8  # standard deviation of the smoothing against noise
-_EVERY = 4  # row and column that is looked at
+_EVERY = 4  # row and column that is evaluated
 
 
 def gain_of(image: ImageArray) -> float:
-    """Return by what the grey values of an image are multiplied to use their range, 1 … 12."""
+    """Return the factor that makes the grey values of an image use their range, 1 … 12."""
     few = image[::_EVERY, ::_EVERY]
     counts = np.cumsum(np.bincount(few.ravel(), minlength=256))
     bright = int(np.searchsorted(counts, _BRIGHTEST * few.size)) if few.size else 255
@@ -21,11 +21,11 @@ def gain_of(image: ImageArray) -> float:
 
 
 def brightened(image: ImageArray, *, smooth: bool = False) -> ImageArray:
-    """Return a dark grey image (height, width) made bright; itself if it is not dark.
+    """Return a dark grey image (height, width) brightened; the image itself if it is not dark.
 
     Args:
         image: grey.
-        smooth: whether it is smoothed, too, before it is rounded.
+        smooth: whether to smooth it as well, before rounding.
     """
     import cv2
 

@@ -1,18 +1,18 @@
-"""What counts as a usable image."""
+"""Validation of images."""
 
 import numpy as np
 
 from vergence.arrays import ImageArray
 
-SMALLEST_PX = 24  # the patch that is aligned
+SMALLEST_PX = 24  # side of the aligned patch
 _BRIGHTEST = 300.0  # somewhat above 255, as after sharpening
 
 
 def grey_image(image: object) -> tuple[ImageArray | None, str]:
     """Return an image as contiguous grey levels, or None and the reason why it cannot be used.
 
-    Grey levels that are no bytes are rounded and clipped to 0 … 255; an image of 12 bits, or of
-    floats from 0 to 1, would be white or black that way, and is refused.
+    Grey levels that are not bytes are rounded and clipped to 0 … 255. An image of 12 bits, or of
+    floats from 0 to 1, would become white or black, and is rejected.
     """
     array = np.asarray(image)
     if image is None or array.size == 0:

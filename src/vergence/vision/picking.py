@@ -1,4 +1,4 @@
-"""Picking of points that the tracker can hold on to, [Nelson1995] section 2.3."""
+"""Selection of points that can be tracked well, [Nelson1995] section 2.3."""
 
 from typing import NamedTuple
 
@@ -10,20 +10,20 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray, frozen
 from vergence.vision.image import grey_image
 from vergence.vision.pyramid import Patch
 
-WINDOW = 8  # entries along a side of the window, at every level
+WINDOW = 8  # samples along a side of the window, at every level
 LEVELS = (4, 2, 1)  # pixels averaged along each axis
-BORDER_PX = 16  # half of the widest window
-WEAKEST_GREY = 2.0  # grey levels a pixel: gradients below are taken for noise
+BORDER_PX = 16  # half of the largest window
+WEAKEST_GREY = 2.0  # grey levels per pixel: smaller gradients are considered noise
 STRAIGHT = 0.02  # ratio of the eigenvalues below which a window shows an edge, not a corner
-QUALITY = 0.02  # of the best point's worth
+QUALITY = 0.02  # relative to the best point's worth
 
 
 class Picked(NamedTuple):
     """Points for a tracker, the best first."""
 
     points_px: FloatArray  # (N, 2), N at most what was asked for
-    worth: FloatArray  # (N,) grey levels a pixel: the weakest gradient over directions and levels
-    reason: str  # empty if as many were found as asked for, else why not
+    worth: FloatArray  # (N,) grey levels per pixel: the weakest gradient over directions and levels
+    reason: str  # empty if the requested number was found, else why not
 
     def __bool__(self) -> bool:
         """Whether any point was found."""
@@ -32,11 +32,11 @@ class Picked(NamedTuple):
 
 @njit(cache=True)
 def weakest_gradient(image: Patch, window: int, out: FloatArray) -> None:
-    """Square root of the smaller eigenvalue of the mean gradient matrix of a window.
+    """Compute the square root of the smaller eigenvalue of a window's mean gradient matrix.
 
-    It is 0 on a straight edge, along which noise alone has a gradient.
+    It is 0 on a straight edge, along which only noise has a gradient.
 
-    Each entry of out belongs to the window from its own row and column on; [Tomasi1991].
+    Each element of out belongs to the window that starts at its row and column; [Tomasi1991].
     """
     height, width = image.shape
     xx, xy, yy = np.zeros((height, width)), np.zeros((height, width)), np.zeros((height, width))
@@ -56,13 +56,13 @@ def weakest_gradient(image: Patch, window: int, out: FloatArray) -> None:
 
 @njit(cache=True)
 def weighted(values: FloatArray, window: int) -> FloatArray:
-    """Mean over windows that weighs the middle most, so that a corner comes to lie there."""
+    """Mean over windows with the largest weight in the centre, so that corners are centred."""
     return box_mean(box_mean(values, window // 2), window // 2 + 1)
 
 
 @njit(cache=True)
 def box_mean(values: FloatArray, window: int) -> FloatArray:
-    """Mean over the windows of a size, each stored at its upper left."""
+    """Mean over windows of a given size, each stored at its upper left."""
     height, width = values.shape
     total = np.zeros((height + 1, width + 1))
     for i in range(height):
@@ -81,9 +81,9 @@ def box_mean(values: FloatArray, window: int) -> FloatArray:
 
 @njit(cache=True)
 def worth_of_anchors(image: ImageArray) -> FloatArray:
-    """The weakest gradient over all levels for the windows at every anchor pixel, (height, width).
+    """Return the weakest gradient over all levels for the window at every anchor, (height, width).
 
-    The levels have windows of 32, 16 and 16 px, as the search has them.
+    The levels have windows of 32, 16 and 16 px, as in the search.
     """
     height, width = image.shape
     out = np.zeros((height, width))
@@ -108,7 +108,7 @@ def worth_of_anchors(image: ImageArray) -> FloatArray:
 
 @njit(cache=True)
 def spread_out(order: NDArray[np.int64], width: int, apart: float, count: int) -> FloatArray:
-    """Take anchors in order, each at least a distance from all taken before; at most count."""
+    """Select anchors in order, each at least a distance from all selected before; at most count."""
     out, taken = np.empty((count, 2)), 0
     for flat in order:
         x, y = flat % width, flat // width
@@ -128,15 +128,15 @@ def spread_out(order: NDArray[np.int64], width: int, apart: float, count: int) -
 def pick_features(
     image: ImageArray, count: int, mask: BoolArray | None = None, apart_px: float = 16.0
 ) -> Picked:
-    """Pick the points of an image that stay good at every level of the tracker's pyramid.
+    """Select points of an image that are well-textured at every level of the tracker's pyramid.
 
     The worth of a point is the smallest, over the three levels, of the square root of the smaller
-    eigenvalue of the mean gradient matrix [[Ix², Ix Iy], [Ix Iy, Iy²]]: what the weakest direction
-    at the weakest level still offers.
+    eigenvalue of the mean gradient matrix [[Ix², Ix Iy], [Ix Iy, Iy²]]: the gradient in the weakest
+    direction at the weakest level.
 
     Args:
         image: grey, (height, width).
-        count: how many points are desired.
+        count: requested number of points.
         mask: where they may lie, (height, width); None for everywhere.
         apart_px: smallest distance between two of them.
 

@@ -1,8 +1,9 @@
 """Windows of an image and their averages: the three resolutions of [Nelson1995] section 2.3.
 
-A window of even size n is named by its anchor pixel a: it covers the pixels a - n/2 … a + n/2 - 1,
-so its centre is a - 1/2 whatever n is. The templates of all three levels share one anchor and
-thereby one centre, and averaging blocks moves nothing.
+A window of even size n is identified by its anchor pixel a: it covers the pixels a - n/2 … a + n/2
+- 1, so its centre is a - 1/2 whatever n is. The templates of all three levels share one anchor and
+  hence
+one centre, and averaging blocks causes no shift.
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ def anchor_of(coordinate: float) -> int:
 
 @njit(cache=True, fastmath=True)
 def load_window(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) -> None:
-    """Copy the window of out's size; beyond the border the nearest pixel is repeated."""
+    """Copy a window of out's size; beyond the border the nearest pixel is repeated."""
     height, width = image.shape
     rows, columns = out.shape
     top, left = anchor_y - rows // 2, anchor_x - columns // 2
@@ -41,7 +42,7 @@ def load_window(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) -> 
 
 @njit(cache=True, fastmath=True)
 def halve(window: Patch, out: Patch) -> None:
-    """Average 2 × 2 entries of a window into each entry of out."""
+    """Average 2 × 2 samples of a window into each sample of out."""
     rows, columns = out.shape
     scale = np.float32(0.25)
     for i in range(rows):
@@ -54,9 +55,10 @@ def halve(window: Patch, out: Patch) -> None:
 
 @njit(cache=True, fastmath=True)
 def average_rows(rows: ImageArray, start: int, total: NDArray[np.uint16], out: Patch) -> None:
-    """Average 4 × 4 pixels of four rows into each entry of out, from a column on.
+    """Average 4 × 4 pixels of four rows into each sample of out, starting at a column.
 
-    First down, then along: both loops become vector code. total is memory for four times out.
+    First by columns, then by rows, so that both loops are vectorised. total is work memory of four
+    times the size of out.
     """
     first, second, third, fourth = rows[0], rows[1], rows[2], rows[3]
     begin, four, scale = np.uint64(start), np.uint64(4), np.float32(1.0 / 16.0)
@@ -72,7 +74,7 @@ def average_rows(rows: ImageArray, start: int, total: NDArray[np.uint16], out: P
 
 @njit(cache=True)
 def load_quarter(image: ImageArray, anchor_x: int, anchor_y: int, out: Patch) -> None:
-    """Average 4 × 4 pixels of the window at an anchor into each entry of out, as load_window."""
+    """Average 4 × 4 pixels of the window at an anchor into each sample of out, as load_window."""
     height, width = image.shape
     rows, columns = out.shape
     top, left = anchor_y - 2 * rows, anchor_x - 2 * columns

@@ -1,13 +1,13 @@
 """The search of [Nelson1995] section 2.3: the displacement that minimises the SSD, eq. (19).
 
-Coarse, middle and full resolution, on windows of the image alone. Departures from the paper, each
-because it makes the search right more often: the mean of template and window is taken out, so that
-a change of brightness costs nothing; a level of half the coarse resolution and twice its window
-joins the coarse level, so that one of many equal marks is told by its surroundings; where several
-minima of the coarse level come near the best, all are followed to full resolution and compared
-there; a far window has to match a little better than a near one.
+Coarse, middle and full resolution, on windows of the image alone. It departs from the paper in ways
+that make the search succeed more often: the means of template and window are subtracted, so that a
+change of brightness has no effect; a level of half the coarse resolution and twice its window is
+added to the coarse level, so that one of many equal marks is identified by its surroundings; if
+several minima of the coarse level are close to the best, all are followed to full resolution and
+compared there; a far window must match slightly better than a near one.
 
-Kernels that only kernels call are inlined: numba would compile each, and all it calls, once more.
+Kernels that only kernels call are inlined: numba would compile each again, with all its callees.
 """
 
 from collections.abc import Callable
@@ -19,24 +19,24 @@ from numba import njit
 from vergence.arrays import ImageArray
 from vergence.vision.pyramid import Patch, halve, load_quarter, load_window
 
-RANGE_PX = 32  # the search reaches this far to every side
+RANGE_PX = 32  # search distance to every side
 COARSE, MIDDLE = 4, 2  # pixels averaged along each axis
-SIDE = 8  # entries along a side of the averaged templates
+SIDE = 8  # samples along a side of the averaged templates
 POSITIONS = 2 * RANGE_PX // COARSE + 1  # along each axis of the coarse level
 WIDE_POSITIONS = RANGE_PX // COARSE + 1
-MINIMA = 5  # of the coarse level that are followed at most
-MIDDLE_REACH = 3  # middle pixels searched around each of them
-FULL_REACH = 2  # pixels searched around the middle minimum
-WIDE_SHARE = 1.0  # weight of the surroundings against the coarse template
+MINIMA = 5  # largest number of coarse minima that are followed
+MIDDLE_REACH = 3  # search distance around each of them in middle pixels
+FULL_REACH = 2  # search distance around the middle minimum in pixels
+WIDE_SHARE = 1.0  # weight of the surroundings relative to the coarse template
 DISTANCE_COST = 0.6  # at 32 px, in units of the template's variance
-WORTH_FOLLOWING = 2.0  # times the lowest: minima that are followed
+WORTH_FOLLOWING = 2.0  # multiples of the lowest: minima that are followed
 STRUCK_OUT = 1e30
 
 SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None]
 
 
 class SsdTemplate(NamedTuple):
-    """What the search searches for: one window at four resolutions, all with the same centre."""
+    """The template of the search: one window at four resolutions, all with the same centre."""
 
     wide: Patch  # (8, 8) 64 × 64 px averaged
     coarse: Patch  # (8, 8) 32 × 32 px averaged
@@ -59,19 +59,19 @@ def template_in(memory: Patch) -> SsdTemplate:
 
 
 class SsdWorkspace(NamedTuple):
-    """Memory that the search writes to, so that it allocates none."""
+    """Work memory of the search, so that it allocates none."""
 
     coarse: Patch  # (32, 32) 128 × 128 px around the anchor, averaged
     wide: Patch  # (16, 16) the same at half that resolution
-    window: Patch  # (28, 28) what is searched at the middle level
+    window: Patch  # (28, 28) search window of the middle level
     middle: Patch  # (14, 14) the same averaged
-    full: Patch  # (20, 20) what is searched at full resolution
+    full: Patch  # (20, 20) search window at full resolution
     strip: Patch  # (320,) one column of positions
     surface: Patch  # (17, 17) SSD of the coarse level
     wide_surface: Patch  # (9, 9)
     small: Patch  # (7, 7) SSD of the middle level
     tiny: Patch  # (5, 5) SSD at full resolution
-    candidates: Patch  # (6, 2) displacement x, y of the minima that were followed
+    candidates: Patch  # (6, 2) displacements x, y of the minima followed
 
 
 WORKSPACE_SIZE = 3436
@@ -108,9 +108,9 @@ def make_template(
 
 
 def _surface_kernel(side: int) -> SurfaceKernel:
-    """Make the SSD kernel for templates of one size; only fixed lengths become vector code.
+    """Return the SSD kernel for templates of one size; only fixed lengths are vectorised.
 
-    Indices are unsigned, since numba then need not think of negative ones.
+    Indices are unsigned, which avoids numba's negative-index check.
     """
     width, count64, blocks = np.uint64(side), np.uint64(side * side), range(0, side, 8)
     weight = np.float32(1.0 / (side * side))
@@ -142,17 +142,17 @@ def _surface_kernel(side: int) -> SurfaceKernel:
     return surface
 
 
-# SSD of a template at count × count positions of an area from (corner, corner) on, template and
-# window both freed of their mean: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each column
-# of positions is copied to a strip as wide as the template, in which the windows lie one below the
-# other without a gap, so that the sums run over flat memory.
+# SSD of a template at count × count positions of an area from (corner, corner) on, with the means
+# of template and window subtracted: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each
+# column of positions is copied to a strip as wide as the template, in which the windows are stored
+# contiguously one below the other, so that the sums run over flat memory.
 ssd_surface_8 = _surface_kernel(8)
 ssd_surface_16 = _surface_kernel(16)
 
 
 @njit(cache=True, fastmath=True)
 def lowest(surface: Patch, rows: int, columns: int) -> tuple[int, int]:
-    """Row and column of the smallest entry: first the row, as vector code."""
+    """Return row and column of the smallest element: the row first, as vector code."""
     best, y, x = surface[0, 0], 0, 0
     for i in range(rows):
         row, least = surface[i], surface[i, 0]
@@ -167,7 +167,7 @@ def lowest(surface: Patch, rows: int, columns: int) -> tuple[int, int]:
 
 @njit(cache=True, inline="always")
 def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
-    """Take a minimum and its eight neighbours out of a surface."""
+    """Remove a minimum and its eight neighbours from a surface."""
     for i in range(max(y - 1, 0), min(y + 2, rows)):
         for j in range(max(x - 1, 0), min(x + 2, columns)):
             surface[i, j] = np.float32(STRUCK_OUT)
@@ -175,7 +175,7 @@ def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
 
 @njit(cache=True, inline="always")
 def vertex(before: float, here: float, after: float) -> float:
-    """Where the parabola through three neighbouring values is lowest, within half a pixel."""
+    """Return the position of the minimum of a parabola through three values, ±0.5 at most."""
     bend = before - 2.0 * here + after
     if bend <= 0.0:
         return 0.0
@@ -186,7 +186,7 @@ def vertex(before: float, here: float, after: float) -> float:
 def coarse_scores(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> None:
-    """Fill work.surface: SSD of the coarse level, of the surroundings, and the cost of distance."""
+    """Fill work.surface: SSD of the coarse level, of the surroundings, and the distance penalty."""
     load_quarter(image, anchor_x, anchor_y, work.coarse)
     halve(work.coarse, work.wide)
     # The area is 64 px wider than the window that is searched for; the coarse one is 32 px smaller.
@@ -198,13 +198,13 @@ def coarse_scores(
 
 @njit(cache=True, inline="always")
 def distance_cost(template: SsdTemplate) -> float:
-    """What a window pays for lying away from where it is expected, grey levels² a px²."""
+    """Return the penalty for the distance from the expected position, grey levels² per px²."""
     return float(DISTANCE_COST / RANGE_PX**2 * np.var(template.coarse))
 
 
 @njit(cache=True, fastmath=True)
 def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
-    """Add the wide level's SSD, interpolated, and the cost of distance to the coarse level's."""
+    """Add the wide level's SSD, interpolated, and the distance penalty to the coarse level's."""
     share, one, cost32 = np.float32(WIDE_SHARE / 4.0), np.uint64(1), np.float32(cost)
     for i in range(np.uint64(POSITIONS)):
         above, below, row = wide[i >> one], wide[(i + one) >> one], surface[i]
@@ -222,12 +222,12 @@ def search(
 ) -> tuple[int, int]:
     """Find a template within ±32 px of an anchor.
 
-    Of several candidates the best is the one with the lowest SSD over all levels at its very
-    place: on the grid of the coarse level marks of few pixels cannot be compared.
+    Of several candidates the best is the one with the lowest SSD over all levels at its exact
+    position: small marks cannot be compared on the grid of the coarse level.
 
     Returns:
-        How many candidates there are, and which is the best. In work.candidates are their
-        displacements x and y from the anchor, px, with the vertex of a parabola as fraction.
+        The number of candidates, and the index of the best. work.candidates contains their
+        displacements x and y from the anchor, px, interpolated by a parabola.
     """
     count = follow_minima(image, anchor_x, anchor_y, template, work)
     lowest_score, best = np.inf, 0
@@ -250,7 +250,7 @@ def search(
 def follow_minima(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> int:
-    """Follow the best minima of the coarse level, and that of the surroundings; how many."""
+    """Follow the best minima of the coarse level, and that of the surroundings; return how many."""
     coarse_scores(image, anchor_x, anchor_y, template, work)
     around_y, around_x = lowest(work.wide_surface, WIDE_POSITIONS, WIDE_POSITIONS)
     count, limit = 0, np.inf
@@ -278,7 +278,7 @@ def follow(
     work: SsdWorkspace,
     k: int,
 ) -> None:
-    """Make a place of the coarse level, refined at the middle level, candidate k."""
+    """Store a position of the coarse level, refined at the middle level, as candidate k."""
     strike_out(work.surface, POSITIONS, POSITIONS, row, column)
     dx, dy = COARSE * (column - POSITIONS // 2), COARSE * (row - POSITIONS // 2)
     move_x, move_y = search_middle(image, anchor_x + dx, anchor_y + dy, template, work)
@@ -287,7 +287,7 @@ def follow(
 
 @njit(cache=True, inline="always")
 def first_entries(memory: Patch, side: int) -> Patch:
-    """The first entries of memory as a square without gaps, (side, side)."""
+    """Return the first elements of memory as a contiguous square, (side, side)."""
     return memory.reshape(memory.size)[: side * side].reshape(side, side)
 
 
@@ -295,7 +295,7 @@ def first_entries(memory: Patch, side: int) -> Patch:
 def surroundings(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> float:
-    """SSD of the coarse template and of the surroundings at an anchor, grey levels² an entry."""
+    """Return the SSD of coarse template and surroundings at an anchor, grey levels² per sample."""
     area, around = first_entries(work.window, 16), first_entries(work.middle, 8)
     load_quarter(image, anchor_x, anchor_y, area)
     halve(area, around)
@@ -309,7 +309,7 @@ def surroundings(
 def search_middle(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[int, int]:
-    """Search the middle level around an anchor: displacement x and y in px."""
+    """Search the middle level around an anchor; return displacement x and y in px."""
     count = 2 * MIDDLE_REACH + 1
     load_window(image, anchor_x, anchor_y, work.window)
     halve(work.window, work.middle)
@@ -322,7 +322,7 @@ def search_middle(
 def search_full(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
 ) -> tuple[float, float, float]:
-    """Search full resolution around an anchor: displacement, and SSD in grey levels² an entry."""
+    """Search full resolution around an anchor; return displacement and SSD per sample."""
     count, tiny = 2 * FULL_REACH + 1, work.tiny
     load_window(image, anchor_x, anchor_y, work.full)
     ssd_surface_16(work.full, 0, template.full, count, work.strip, tiny)

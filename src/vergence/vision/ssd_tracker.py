@@ -46,13 +46,14 @@ _REASONS = {
 
 
 class SsdTracker:
-    """Follows image points by the pyramid search of [Nelson1995] section 2.3 and an alignment.
+    """Tracks image points by the pyramid search of [Nelson1995] section 2.3 and an alignment.
 
-    Each point is searched within ±32 px of where it is expected, on three resolutions of a window
-    of the image; then a patch around it is aligned, affinely and with gain and bias, to a key
-    template, which gives the place to a few hundredths of a pixel. Key templates are renewed when
-    the alignment measures a stretch of more than 1.2, never otherwise; so the place does not creep
-    with the number of images. A lost point is searched for again with the templates it had.
+    Each point is searched for within ±32 px of its expected position, at three resolutions of a
+    window of the image; then a patch around it is aligned, affinely and with gain and bias, to a
+    key template, which gives its position to a few hundredths of a pixel. Key templates are
+    replaced only when the alignment measures a stretch of more than 1.2, so drift does not
+    accumulate with the number of images. A lost point is searched for again with its previous
+    templates.
 
     Example:
         >>> tracker = SsdTracker(first_image, points_px)
@@ -64,12 +65,12 @@ class SsdTracker:
     """
 
     def __init__(self, image: ImageArray, points_px: ArrayLike) -> None:
-        """Take the templates.
+        """Create the templates.
 
         Args:
-            image: the first image, grey, (height, width). From one that cannot be used no
-                templates come, and the points are lost with that reason in every image.
-            points_px: the points in it, (M, 2), with fraction.
+            image: the first image, grey, (height, width). If it is unusable there are no templates,
+                and the points are lost for that reason in every image.
+            points_px: the points in it, (M, 2), at sub-pixel positions.
 
         Raises:
             ShapeError: if points_px is not (M, 2).
@@ -85,7 +86,7 @@ class SsdTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """Where the points were last found, (M, 2)."""
+        """Last positions at which the points were found, (M, 2)."""
         return self._state.places[:, :2].copy()
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
@@ -93,12 +94,12 @@ class SsdTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: where to look, (M, 2); None, or a row that is not finite, for where the
-                point was last found.
+            predicted_px: expected positions, (M, 2); None, or a row that is not finite, for the
+                last position of the point.
 
         Returns:
-            Places with covariance; a point that is not found keeps the place where it was
-            expected and has its reason.
+            Positions with covariances; a point that was not found has its expected position and a
+            reason.
 
         Raises:
             ShapeError: if predicted_px is not (M, 2).

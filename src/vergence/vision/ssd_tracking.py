@@ -1,4 +1,4 @@
-"""The pyramid search of [Nelson1995] as a part of a cell."""
+"""The pyramid search of [Nelson1995] as a part in a cell file."""
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.parts import part
@@ -7,8 +7,8 @@ from vergence.vision.ssd_tracker import SsdTracker
 
 @part("tracker", "ssd")
 class SsdTracking:
-    """Follows windows of the first image by a pyramid search and an alignment; see `SsdTracker`."""
+    """Tracks windows of the first image by a pyramid search and an alignment; see `SsdTracker`."""
 
     def start(self, image: ImageArray, points_px: FloatArray) -> SsdTracker:
-        """Return the tracker of points (M, 2) in the first image."""
+        """Return the tracker for points (M, 2) in the first image."""
         return SsdTracker(image, points_px)

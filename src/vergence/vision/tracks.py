@@ -1,4 +1,4 @@
-"""What a point tracker is and what it answers."""
+"""The interface of point trackers, and their result."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -9,15 +9,15 @@ from vergence.signals import CLOSES, CONTINUES, SearchWindows
 
 
 class Tracks(NamedTuple):
-    """Where the points are in one image."""
+    """The positions of points in one image."""
 
-    points_px: FloatArray  # (M, 2); where a point was not found, where it was expected
+    points_px: FloatArray  # (M, 2); the expected position of a point that was not found
     covariance_px: FloatArray  # (M, 2, 2) px²; where not found, of the search range
     found: BoolArray  # (M,)
-    reasons: tuple[str, ...]  # (M,) empty where found, else why not
+    reasons: tuple[str, ...]  # (M,) empty if found, else why not
     # (M,) root mean square, grey levels; NaN where nothing was compared, None if nothing ever is
     residuals: FloatArray | None = None
-    correlations: FloatArray | None = None  # (M,) with the template, -1 … 1; likewise
+    correlations: FloatArray | None = None  # (M,) with the template, -1 … 1, or as residuals
     windows: SearchWindows | None = None  # where the points were searched for
     joined: IntArray | None = None  # (M,) see `ImagePoints`; None if every point is a mark alone
 
@@ -32,13 +32,13 @@ def nothing_found(
     deviation_px: float = 100.0,
     joined: IntArray | None = None,
 ) -> Tracks:
-    """Answer that no point was found, all for one reason.
+    """Return tracks in which no point was found, for one reason.
 
     Args:
-        points_px: where they were expected, (M, 2).
+        points_px: expected positions, (M, 2).
         reason: why not.
         deviation_px: standard deviation to state for each.
-        joined: of a curve, (M,).
+        joined: for points of a curve, (M,).
     """
     count = len(points_px)
     return Tracks(
@@ -60,24 +60,24 @@ def closed(count: int) -> IntArray:
 
 
 class PointTracker(Protocol):
-    """Follows points from image to image."""
+    """Tracks points from image to image."""
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
         """Measure the points in a new image.
 
         Args:
             image: grey, (height, width).
-            predicted_px: where to look, (M, 2); None for where the points were last.
+            predicted_px: expected positions, (M, 2); None for the last positions.
         """
         ...
 
 
 @runtime_checkable
 class PointTracking(Protocol):
-    """A part that makes trackers: what a cell names, with its numbers."""
+    """A part that makes trackers: its name in a cell file, with its settings."""
 
     def start(self, image: ImageArray, points_px: FloatArray) -> PointTracker:
-        """Return the tracker of points that a first image shows.
+        """Return the tracker for points in a first image.
 
         Args:
             image: grey, (height, width).
@@ -105,6 +105,6 @@ class CurveTracking(PointTracking, Protocol):
             size: width and height of the image, px.
 
         Raises:
-            InputError: if they make no such curve.
+            InputError: if the points do not define such a curve.
         """
         ...

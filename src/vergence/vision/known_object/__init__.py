@@ -1,4 +1,4 @@
-"""A known rigid object: its geometry, corners in windows, edges or outline from image to image."""
+"""A known rigid object: its geometry, corners in windows, and tracking by edges or outline."""
 
 from vergence.vision.known_object.corner_extractor import (
     CornerExtractor,

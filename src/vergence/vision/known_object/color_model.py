@@ -1,8 +1,8 @@
-"""What colours an object and its surroundings have along its outline, by the outline's direction.
+"""Colours of an object and of its surroundings along its outline, by the outline's direction.
 
-The shading of a smooth surface depends on the direction of its normal, and on the outline that is
-the normal in the image. Sixteen directions, each mixed with its neighbours and with all others, so
-tell a shaded side from a dark background where histograms of the whole object do not.
+The shading of a smooth surface depends on the direction of its normal, which on the outline is the
+normal in the image. Histograms for sixteen directions, each mixed with its neighbours and with all
+others, therefore distinguish a shaded side from a dark background; one histogram would not.
 """
 
 from typing import NamedTuple
@@ -14,24 +14,24 @@ from vergence.arrays import FloatArray, ImageArray
 
 DIRECTIONS = 16
 GREY_LEVELS, COLOR_LEVELS = 64, 16  # of each channel
-MOST_ODDS = 3.0  # of one pixel's colour, natural logarithm: no pixel settles it alone
-# Shares this small tell little. A colour never seen is likelier that of something else than the
-# object's, whose colours are known.
+MOST_ODDS = 3.0  # of one pixel's colour, natural logarithm: no pixel decides alone
+# Fractions this small carry little information. A colour never seen before is more likely that of
+# something else than the object's, whose colours are known.
 _RARE_INSIDE, _RARE_OUTSIDE = 2e-4, 4e-4
-_NEIGHBOURS = 0.5  # weight of the directions beside one
+_NEIGHBOURS = 0.5  # weight of the neighbouring directions
 _ALL = 0.03  # weight of every direction
 
 
 class ColorModel(NamedTuple):
-    """How often each colour occurs in an object and beside it, B colours."""
+    """Frequency of each colour in an object and beside it, B colours."""
 
-    inside: FloatArray  # (16, B) shares, each row's sum 1; zeros before the first image
+    inside: FloatArray  # (16, B) fractions, each row's sum 1; zeros before the first image
     outside: FloatArray  # (16, B)
     odds: FloatArray  # (16, B) log of their ratio, bounded
 
     @property
     def known(self) -> bool:
-        """Whether any image was learned."""
+        """Whether any image has been learned."""
         return bool(self.inside.any())
 
 
@@ -50,7 +50,7 @@ def bin_of(image: ImageArray, row: int, column: int) -> int:
     """Return the bin of a pixel of an image (height, width, 1 or 3)."""
     if image.shape[2] == 1:
         return int(np.int64(image[row, column, 0]) // (256 // GREY_LEVELS))
-    code = np.int64(0)  # a byte alone would make an unsigned number, which is no index
+    code = np.int64(0)  # a byte alone would become unsigned, which is not an index
     for channel in range(3):
         level = np.int64(image[row, column, channel]) // (256 // COLOR_LEVELS)
         code = code * COLOR_LEVELS + level
@@ -59,7 +59,7 @@ def bin_of(image: ImageArray, row: int, column: int) -> int:
 
 @njit(cache=True)
 def add_color(counts: FloatArray, code: int) -> None:
-    """Add a pixel to counts (B,), spread over its bin and those beside it, as noise spreads it."""
+    """Add a pixel to counts (B,), spread over its bin and adjacent ones, as noise spreads it."""
     if len(counts) == GREY_LEVELS:
         for k in range(-1, 2):
             counts[min(max(code + k, 0), GREY_LEVELS - 1)] += 1.0 - 0.5 * abs(k)
@@ -77,7 +77,7 @@ def add_color(counts: FloatArray, code: int) -> None:
 
 @njit(cache=True)
 def direction_of(nu: float, nv: float) -> int:
-    """Return which direction a normal in the image has, 0 … DIRECTIONS - 1."""
+    """Return the direction index of a normal in the image, 0 … DIRECTIONS - 1."""
     turn = np.arctan2(nv, nu) / (2.0 * np.pi)
     return int(np.floor(turn * DIRECTIONS + 0.5)) % DIRECTIONS
 
@@ -90,7 +90,7 @@ def colors_of(inside: FloatArray, outside: FloatArray) -> ColorModel:
 
 @njit(cache=True)
 def mixed_colors(old: ColorModel, new: ColorModel, share: float) -> ColorModel:
-    """Return a model with a share of the new."""
+    """Return a mixture of two models with a given share of the new one."""
     return with_odds(
         (1.0 - share) * old.inside + share * new.inside,
         (1.0 - share) * old.outside + share * new.outside,
@@ -99,7 +99,7 @@ def mixed_colors(old: ColorModel, new: ColorModel, share: float) -> ColorModel:
 
 @njit(cache=True)
 def with_odds(inside: FloatArray, outside: FloatArray) -> ColorModel:
-    """Return the model of shares inside and outside, (16, B) each."""
+    """Return the model for fractions inside and outside, (16, B) each."""
     odds = np.empty_like(inside)
     unseen = np.log(_RARE_INSIDE / _RARE_OUTSIDE)
     for d in range(odds.shape[0]):
@@ -113,7 +113,7 @@ def with_odds(inside: FloatArray, outside: FloatArray) -> ColorModel:
 
 @njit(cache=True)
 def _shares(counts: FloatArray) -> FloatArray:
-    """Return counts (16, B) as shares, each direction with some of its neighbours and of all."""
+    """Return counts (16, B) as fractions, each direction mixed with its neighbours and with all."""
     shares, everywhere = np.empty_like(counts), np.zeros(counts.shape[1])
     for d in range(DIRECTIONS):
         everywhere += counts[d]

@@ -22,17 +22,17 @@ REASONS = (
     "fewer than two edges seen",
     "left its window",
 )
-CROWDED_VARIANCE = 1.0  # px², of a corner whose edges may have been taken for their neighbours
-_LEAST_COSINE = 0.05  # flatter faces make no edge to be told from its neighbour
+CROWDED_VARIANCE = 1.0  # px², of a corner whose edges may be confused with their neighbours
+_LEAST_COSINE = 0.05  # flatter faces make no edge distinguishable from its neighbour
 
 
 class CornerMeasurements(NamedTuple):
-    """What was found in the windows of one image."""
+    """The measurements in the windows of one image."""
 
-    points_px: FloatArray  # (M, 2); the predicted place where nothing was found
+    points_px: FloatArray  # (M, 2); the predicted position if nothing was found
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
-    reasons: tuple[str, ...]  # (M,) empty where found, else why not
+    reasons: tuple[str, ...]  # (M,) empty if found, else why not
 
 
 @njit(cache=True)
@@ -49,7 +49,7 @@ def measure_corners(
     half_px: FloatArray,
     contrast: float,
 ) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Measure the chosen corners; return places (M, 2), covariances (M, 2, 2) and codes (M,).
+    """Measure the chosen corners; return positions (M, 2), covariances (M, 2, 2) and codes (M,).
 
     Args:
         image: grey, (height, width).
@@ -59,10 +59,10 @@ def measure_corners(
         corner_edges: the edges at each, (C, K).
         edges: ends of the sharp edges, (E, 2, 3), m.
         edge_normals: of the faces at each, (E, 2, 3).
-        surface: triangles that hide, (F, 3, 3), m.
-        chosen: which corners, (M,).
-        half_px: half the sizes of the windows around their predicted places, (M, 2).
-        contrast: least step of an edge, grey values.
+        surface: occluding triangles, (F, 3, 3), m.
+        chosen: indices of the corners, (M,).
+        half_px: half sizes of the windows around their predicted positions, (M, 2).
+        contrast: smallest step of an edge, grey values.
     """
     places = np.empty((len(chosen), 2))
     covariances = np.zeros((len(chosen), 2, 2))
@@ -82,7 +82,7 @@ def measure_corners(
         u, v = pixel_of(lens, x / z, y / z)
         places[m, 0], places[m, 1] = u, v
         apart = 2.0 + 0.35 * min(half_px[m, 0], half_px[m, 1])
-        alone, crowded = 0, 0  # the arms that are alone come first, the others from the end
+        alone, crowded = 0, 0  # isolated arms come first, the others from the end
         for k in range(corner_edges.shape[1]):
             e = corner_edges[chosen[m], k]
             if e < 0 or not edge_faces_camera(T, X, edge_normals[e], _LEAST_COSINE):
@@ -98,7 +98,7 @@ def measure_corners(
                 alone += 1
             directions[row], lengths[row] = arm, length
         count = alone
-        if alone < 2:  # then the others have to do, and are trusted less
+        if alone < 2:  # then the others are used, with less weight
             for k in range(len(lengths) - crowded, len(lengths)):
                 directions[count], lengths[count] = directions[k], lengths[k]
                 count += 1
@@ -129,7 +129,7 @@ def measure_corners(
 def _lines(
     T: FloatArray, lens: FloatArray, edges: FloatArray, edge_normals: FloatArray
 ) -> FloatArray:
-    """Return both ends in the image of each edge that faces the camera, (E, 4); else NaN."""
+    """Return both ends in the image of each edge that faces the camera, (E, 4), else NaN."""
     lines = np.full((len(edges), 4), np.nan)
     for e in range(len(edges)):
         x0, y0, z0 = in_camera(T, edges[e, 0])
@@ -151,7 +151,7 @@ def _crowded(
     length: float,
     apart_px: float,
 ) -> bool:
-    """Return whether another edge runs beside an arm, so that one may be taken for the other."""
+    """Return whether another edge runs beside an arm, so that the two may be confused."""
     at = 0.5 * min(length, LONGEST_PX)
     x, y = u + at * direction[0], v + at * direction[1]
     for e in range(len(lines)):
@@ -179,9 +179,9 @@ def _arm(
     v: float,
     direction: FloatArray,
 ) -> float:
-    """Fill the direction in the image of an edge from X on; return its length, 0 if hidden.
+    """Fill the image direction of an edge from X on; return its length, 0 if occluded.
 
-    An edge that runs behind the camera is cut.
+    An edge that extends behind the camera is clipped.
     """
     first = 0.0
     for j in range(3):
@@ -213,13 +213,13 @@ def _arm(
 class CornerExtractor:
     """Measures corners of a known object to a fraction of a pixel, in windows only.
 
-    From the predicted pose follow the edges that meet in a corner. Each is searched for along lines
-    across its prediction; the steps that most profiles agree on make a line, and the lines are met
-    with the covariance that their scatter tells.
+    The edges that meet in a corner follow from the predicted pose. Each is searched for along lines
+    across its prediction; the steps that most profiles agree on form a line, and the lines are
+    intersected, with the covariance from their scatter.
     """
 
     model: ObjectModel
-    contrast: float = 6.0  # least step of an edge, grey values
+    contrast: float = 6.0  # smallest step of an edge, grey values
 
     def __post_init__(self) -> None:
         if not len(self.model.edges):
@@ -236,13 +236,13 @@ class CornerExtractor:
         features: IntArray,
         half_px: FloatArray,
     ) -> CornerMeasurements:
-        """Measure corners in windows around where a pose predicts them.
+        """Measure corners in windows around their predicted positions.
 
         Args:
             image: grey, of the camera's size, (height, width).
             camera: the camera's model.
             T_camera_target: predicted pose of the object in the camera, (4, 4).
-            features: which corners of the model, (M,).
+            features: indices of the model's corners, (M,).
             half_px: half the width and height of each window, (M, 2), px.
 
         Raises:

@@ -1,7 +1,7 @@
-"""One corner, from the edges that meet in it: each is found across its prediction, then they meet.
+"""Measures one corner: each edge is found across its prediction, then the edges are intersected.
 
-Works in two passes: the first looks as far as the window allows, the second only beside what the
-first one found. Nothing outside the window (and the few pixels that filters need) is read.
+Works in two passes: the first searches as far as the window allows, the second only near the result
+of the first. Nothing outside the window (and the few pixels that filters need) is read.
 """
 
 import numpy as np
@@ -11,19 +11,19 @@ from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.vision.known_object.profiles import MARGIN, find_steps, read_profile
 
 FOUND, OUTSIDE, NO_CONTRAST, INCONSISTENT, TOO_FEW, LEFT_WINDOW = range(6)
-NEAR_PX = 2.5  # closer to the corner the other edges disturb a profile
-LONGEST_PX = 30.0  # of an edge that is used, from the corner
-SAMPLES = 10  # profiles an edge
-STEPS = 3  # candidates a profile
-BLUR = 4  # samples by which a profile is longer than the search, to follow blurred edges
+NEAR_PX = 2.5  # closer to the corner, the other edges disturb a profile
+LONGEST_PX = 30.0  # length of an edge that is used, from the corner
+SAMPLES = 10  # profiles per edge
+STEPS = 3  # candidates per profile
+BLUR = 4  # samples added to a profile beyond the search, to follow blurred edges
 FINE_REACH = 3  # of the second pass, px
-SLOPE_MAX = 0.3  # of a found edge against its prediction, first pass
-TOLERANCE_PX = 1.0  # of a step from the line it belongs to
-SUPPORT = 0.6  # share of the profiles that must agree on a line
-LEAST_VARIANCE = 0.05**2  # px², of a single place: interpolation and aliasing
+SLOPE_MAX = 0.3  # of a found edge relative to its prediction, first pass
+TOLERANCE_PX = 1.0  # of a step from its line
+SUPPORT = 0.6  # fraction of the profiles that must agree on a line
+LEAST_VARIANCE = 0.05**2  # px², of a single position: interpolation and aliasing
 MODEL_VARIANCE = 0.1**2  # px², of a whole line: aliasing and modelling, which do not average out
 PARALLEL = 0.12  # sine of the angle below which two lines do not make a corner
-AGREEMENT_PX = 0.8  # how far a third edge may miss the corner
+AGREEMENT_PX = 0.8  # largest distance of a third edge from the corner
 
 
 @njit(cache=True)
@@ -48,9 +48,9 @@ def fit_corner(
             (K, 2); overwritten by those found.
         lengths: their expected lengths, px, (K,).
         half_px: half the width and height of the window, (2,).
-        contrast: least step of an edge, grey values.
-        corner: is filled with the place.
-        covariance: is filled with its covariance.
+        contrast: smallest step of an edge, grey values.
+        corner: set to the position.
+        covariance: set to its covariance.
     """
     height, width = image.shape
     if not (0.0 <= u <= width - 1.0 and 0.0 <= v <= height - 1.0):
@@ -90,7 +90,7 @@ def _meet(
     corner: FloatArray,
     covariance: FloatArray,
 ) -> int:
-    """Find each edge as a line (nu, nv, c, variance) at the corner, and where they meet."""
+    """Find each edge as a line (nu, nv, c, variance) at the corner, and their intersection."""
     count, empty, outside = 0, 0, 0
     for k in range(len(directions)):
         length = min(longest, 0.9 * lengths[k])
@@ -157,7 +157,7 @@ def _fit_line(
 def _vote(
     places: FloatArray, heights: FloatArray, counts: IntArray, spacing: float, reach: int
 ) -> tuple[float, float]:
-    """Return offset a and slope b of the line through two steps that most others support."""
+    """Return offset a and slope b of the line through two steps with the most support."""
     best, best_a, best_b = -1.0, 0.0, 0.0
     for i in range(SAMPLES):
         for m in range(i + SAMPLES // 2, SAMPLES):
@@ -185,7 +185,7 @@ def _support(
     b: float,
     sign: float,
 ) -> float:
-    """How much the profiles support a line; a high step counts somewhat more than a low one."""
+    """Return the support of a line by the profiles; higher steps count somewhat more."""
     total = 0.0
     for i in range(SAMPLES):
         expected = a + b * (NEAR_PX + i * spacing)
@@ -233,7 +233,7 @@ def _regress(
 
 @njit(cache=True)
 def _intersect(lines: FloatArray, corner: FloatArray, covariance: FloatArray) -> int:
-    """Meet lines by weighted least squares; fill corner and covariance; tell if they agree."""
+    """Intersect lines by weighted least squares; fill corner and covariance; return a code."""
     a, b, c, p, q, widest = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(lines)):
         nu, nv, distance, weight = lines[k, 0], lines[k, 1], lines[k, 2], 1.0 / lines[k, 3]

@@ -1,4 +1,4 @@
-"""One image of a known object in one call: search, vote, fit, search again beside the fit."""
+"""One image of a known object in one call: search, vote, fit, and search again near the fit."""
 
 import numpy as np
 from numba import njit
@@ -25,10 +25,10 @@ from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.shift_vote import vote_shift
 
 _FINE_REACH_PX = 5
-_DOUBLE_PX = 5.0  # edges nearer to each other are not distinguished
+_DOUBLE_PX = 5.0  # edges closer than this are not distinguished
 _LEARNED_PX = 1.0
-_RATE_GAIN = 0.1  # of one image: ten are remembered
-_REMEMBERED = 0.85  # share of the old in what an edge is remembered to look like
+_RATE_GAIN = 0.1  # weight of one image: averages over ten
+_REMEMBERED = 0.85  # weight of the old in the remembered appearance of an edge
 
 
 @njit(cache=True)
@@ -41,7 +41,7 @@ def measure_edges(
     rule: EdgeRule,
     memory: EdgeMemory,
 ) -> EdgeMeasurement:
-    """Find the edges near where a pose predicts them; see `EdgeTracker`.
+    """Find the edges near their predictions; see `EdgeTracker`.
 
     Args:
         image: grey, (height, width).
@@ -49,12 +49,12 @@ def measure_edges(
         T: predicted pose of the object in the camera, (4, 4).
         covariance: of its error (δp, δθ) along camera axes, (6, 6).
         geometry: of the object.
-        rule: how to search.
-        memory: what the edges looked like.
+        rule: settings of the search.
+        memory: appearance of the edges.
     """
     prior, _ = invert_spd(covariance)
     samples = _seen_samples(T, lens, geometry, _DOUBLE_PX)
-    samples = chosen_samples(samples, samples.place % 2 == 0)  # half of them show the way
+    samples = chosen_samples(samples, samples.place % 2 == 0)  # half of them suffice for the vote
     reach = _reach(T, lens, samples, covariance, rule)
     steps = _search(image, samples, reach, rule, memory)
     x, y = vote_shift(samples, steps, reach)
@@ -69,7 +69,7 @@ def measure_edges(
     return EdgeMeasurement(
         points,
         places,
-        # The less of the object is seen, the likelier some of it is something else.
+        # The less of the object is found, the more likely some of it is something else.
         covariances * (expected / max(count, 1)) ** 4,
         fit.T,
         expected,
@@ -85,7 +85,7 @@ def measure_edges(
 
 @njit(cache=True)
 def learn_edges(memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
-    """Return the memory after an image that was accepted; see `EdgeTracker.remember`."""
+    """Return the memory after an accepted image; see `EdgeTracker.remember`."""
     templates, known, rate = memory.templates.copy(), memory.known.copy(), memory.rate.copy()
     for n in range(len(seen.samples.edge)):
         e, k, j = seen.samples.edge[n], seen.samples.place[n], seen.fit.chosen[n]
@@ -123,7 +123,7 @@ def _search(
 def _reach(
     T: FloatArray, lens: FloatArray, samples: EdgeSamples, covariance: FloatArray, rule: EdgeRule
 ) -> int:
-    """Return three standard deviations of where the edges will be, px, within bounds."""
+    """Return three standard deviations of the edges' predicted positions, px, within bounds."""
     rows, widest = np.empty((2, 6)), 0.0
     for n in range(0, len(samples.edge), 5):
         pixel_rows(T, lens, samples.points[n], rows)
@@ -135,7 +135,7 @@ def _reach(
 
 @njit(cache=True)
 def _width(fit: PoseFit, steps: Steps) -> float:
-    """Return how wide the steps of edges are, px: what is nearer is blurred into one."""
+    """Return the width of the edges' steps, px; closer edges are blurred into one."""
     widths = np.empty(len(fit.chosen))
     count = 0
     for n in range(len(widths)):
@@ -149,9 +149,9 @@ def _width(fit: PoseFit, steps: Steps) -> float:
 def _usual(
     memory: EdgeMemory, samples: EdgeSamples, readable: BoolArray, found: BoolArray
 ) -> float:
-    """Return the share found of the places, each weighing as often as it was found recently.
+    """Return the fraction of places found, each weighted by how often it was found recently.
 
-    Some edges of an object are never seen, for want of contrast; they say nothing.
+    Some edges of an object are never visible, for lack of contrast, and have no weight.
     """
     total, seen = 0.0, 0.0
     for n in range(len(found)):

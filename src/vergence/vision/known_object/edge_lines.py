@@ -1,9 +1,9 @@
-"""What the samples of an edge say together: a line, told by two points.
+"""The line that the samples of an edge determine, represented by two points.
 
-A line has two numbers. They are passed on as the distances across the edge at two places, one
-standard deviation of the samples to either side of their middle, where least squares makes their
-errors independent. Each place is a point of the object measured well across its edge and hardly at
-all along it, which is a point with a long covariance to any filter of points.
+A line has two parameters. They are expressed as distances across the edge at two positions, one
+standard deviation of the samples to either side of their mean, where least squares makes their
+errors independent. Each position is a point of the object measured well across its edge but hardly
+along it, that is, a point with an elongated covariance for any filter of points.
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ from vergence.vision.known_object.pose_fit import PoseFit
 from vergence.vision.known_object.profiles import SHARP_WIDTH
 from vergence.vision.known_object.projection import pixel_rows
 
-LEAST_SAMPLES = 4  # for a direction
-LONG = 6  # samples from which on an edge says all it can: shorter ones share their bias with others
-BLUR_SHARE = 0.25  # of its width beyond a sharp edge's, by which a blurred edge may be wrong
+LEAST_SAMPLES = 4  # to determine a direction
+LONG = 6  # samples from which an edge has full weight: shorter ones share their bias with others
+BLUR_SHARE = 0.25  # relative to its width beyond a sharp edge's: possible error of a blurred edge
 SLIDING_PX = 100.0  # standard deviation along an edge
 
 
@@ -30,15 +30,15 @@ def edge_points(
     found: BoolArray,
     bias_px: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return points (M, 3), places (M, 2), covariances (M, 2, 2): two an edge, one a short one.
+    """Return points (M, 3), positions (M, 2), covariances (M, 2, 2): two per edge, one if short.
 
     Args:
-        fit: the pose fitted to the image; only what the image says is passed on, not the pose.
+        fit: the pose fitted to the image; only the image measurement is returned, not the pose.
         lens: packed camera, (11,).
-        samples: on the edges, those of one edge beside each other.
+        samples: on the edges, those of each edge consecutive.
         steps: across each of them.
-        found: which of them found their edge, (N,).
-        bias_px: standard deviation of what does not average out over an edge: model and lens.
+        found: mask of those that found their edge, (N,).
+        bias_px: standard deviation of errors that do not average out over an edge: model and lens.
     """
     count = len(samples.edge)
     points = np.empty((2 * count, 3))
@@ -86,7 +86,7 @@ def _line(
     places: FloatArray,
     covariances: FloatArray,
 ) -> int:
-    """Fill the two points of one edge, samples first … last - 1; return how many."""
+    """Fill the two points of one edge, samples first … last - 1; return their number."""
     nu, nv, width = 0.0, 0.0, 0.0
     n, ss, so, sss, sso, soo = 0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -110,7 +110,7 @@ def _line(
     middle, spread = ss / n, sss - ss * ss / n
     blur = BLUR_SHARE * max(width / n - SHARP_WIDTH, 0.0)
     systematic = (bias_px**2 + blur**2) * max(1.0, LONG / n)
-    if n < LEAST_SAMPLES or spread < 4.0 * n:  # too short for a direction: one place tells it
+    if n < LEAST_SAMPLES or spread < 4.0 * n:  # too short for a direction: one position
         middle_sample = first
         for i in range(first, last):
             if found[i]:
@@ -140,15 +140,15 @@ def _line(
 def _point_at(
     points: FloatArray, pixels: FloatArray, nu: float, nv: float, along: float, point: FloatArray
 ) -> None:
-    """Fill the point (3,) of an edge that is so far along it from its first sample, px.
+    """Fill the point (3,) of an edge at a distance along it from its first sample, px.
 
     Args:
         points: samples of the edge, in order along it, (N, 3).
         pixels: of them, (N, 2).
         nu: of the unit normal across the edge.
-        nv: likewise.
-        along: where.
-        point: is filled.
+        nv: of the unit normal across the edge.
+        along: the distance.
+        point: set to the point.
     """
     a, b = 0, len(points) - 1
     rising = nv * (pixels[b, 0] - pixels[0, 0]) > nu * (pixels[b, 1] - pixels[0, 1])

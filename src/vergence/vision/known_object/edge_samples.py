@@ -1,4 +1,4 @@
-"""Places along the sharp edges of an object, and the steps in the image beside each of them."""
+"""Places along the sharp edges of an object, and the image steps across each of them."""
 
 from typing import NamedTuple
 
@@ -10,31 +10,31 @@ from vergence.camera.lens import HEIGHT, WIDTH, pixel_of
 from vergence.vision.known_object.profiles import SHARP_WIDTH, find_steps, read_profile
 from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
 
-TEMPLATE = 4  # samples on each side of an edge that are remembered
+TEMPLATE = 4  # remembered samples on each side of an edge
 LEAST_HALF = 17  # samples of a profile to each side, to follow blurred edges
-LEAST_COSINE = 0.08  # flatter faces make no edge to be told from its neighbour
-BORDER_PX = 3.0  # nearer to the border of the image nothing is expected
-_ALONG = 1e-3  # of an edge's length, for its direction in the image
+LEAST_COSINE = 0.08  # flatter faces make no edge distinguishable from its neighbour
+BORDER_PX = 3.0  # nothing is expected closer to the border of the image
+_ALONG = 1e-3  # of an edge's length, for computing its direction in the image
 _USUAL_HEIGHT = 15.0  # grey values: a step of this height has half the weight of the highest
 
 
 class EdgeSamples(NamedTuple):
-    """Places on edges that should be seen in an image."""
+    """Places on edges that should be visible in an image."""
 
     edge: IntArray  # (N,) which edge
-    place: IntArray  # (N,) which of its places
+    place: IntArray  # (N,) index of the place on the edge
     points: FloatArray  # (N, 3) object's frame, m
     points_px: FloatArray  # (N, 2)
     normals: FloatArray  # (N, 2) unit normal of the edge in the image
 
 
 class Steps(NamedTuple):
-    """Steps in the image across each sample."""
+    """Image steps across each sample."""
 
     offsets: FloatArray  # (N, K) along the normal, px
     weights: FloatArray  # (N, K) 0 … 1; 0 where there is none
     widths: FloatArray  # (N, K) of the slope at half its height, px
-    likeness: FloatArray  # (N, K) correlation with what is remembered, -1 … 1; NaN if nothing is
+    likeness: FloatArray  # (N, K) correlation with the remembered one, -1 … 1; NaN if none
     looks: FloatArray  # (N, K, 2 TEMPLATE + 1) grey profile around each, mean 0, norm 1
     readable: BoolArray  # (N,) the profile lies within the image
 
@@ -48,15 +48,15 @@ def sample_edges(
     surface: FloatArray,
     places: IntArray,
 ) -> EdgeSamples:
-    """Return the places on sharp edges that are seen under a pose.
+    """Return the places on sharp edges that are visible at a pose.
 
     Args:
         T: pose of the object in the camera, (4, 4).
         lens: packed camera, (11,).
         edges: ends of the sharp edges, (E, 2, 3), m.
         edge_normals: of the faces at each, (E, 2, 3).
-        surface: triangles that hide, (F, 3, 3), m.
-        places: how many places each edge has, evenly spaced, (E,).
+        surface: occluding triangles, (F, 3, 3), m.
+        places: number of places on each edge, evenly spaced, (E,).
     """
     most = int(np.sum(places))
     edge, place = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
@@ -94,14 +94,14 @@ def sample_edges(
 
 @njit(cache=True)
 def without_doubles(samples: EdgeSamples, apart_px: float) -> EdgeSamples:
-    """Leave out the places that another edge runs beside, for one would be taken for the other.
+    """Drop the places that have another edge beside them, since the two could be confused.
 
-    So it is where a face is seen at a grazing angle. If that would leave less than half of the
-    places, all of them stay.
+    This happens where a face is seen at a grazing angle. If fewer than half of the places would
+    remain, all of them are kept.
 
     Args:
-        samples: on the edges, those of one edge beside each other.
-        apart_px: how far to the side another edge has to be.
+        samples: on the edges, those of each edge consecutive.
+        apart_px: smallest lateral distance of another edge.
     """
     count = len(samples.edge)
     alone = np.ones(count, dtype=np.bool_)
@@ -154,7 +154,7 @@ def _runs_beside(samples: EdgeSamples, n: int, first: int, last: int, apart_px: 
 
 @njit(cache=True)
 def chosen_samples(samples: EdgeSamples, chosen: BoolArray) -> EdgeSamples:
-    """Return some of the samples, chosen (N,)."""
+    """Return a subset of the samples, chosen (N,)."""
     return EdgeSamples(
         samples.edge[chosen],
         samples.place[chosen],
@@ -174,23 +174,23 @@ def search_steps(
     templates: FloatArray,
     known: BoolArray,
 ) -> Steps:
-    """Find the steps across each sample, and how much each looks like what is remembered there.
+    """Find the steps across each sample, and their similarity to the remembered appearance.
 
     Args:
         image: grey, (height, width).
-        samples: where to look.
-        reach: how far to either side, px.
-        contrast: least height of a step, grey values.
-        candidates: how many to keep of each.
-        templates: what every place of every edge looked like, (E, places, 2 TEMPLATE + 1).
-        known: whether anything is remembered of it, (E, places).
+        samples: where to search.
+        reach: search distance to either side, px.
+        contrast: smallest height of a step, grey values.
+        candidates: number of steps to keep per sample.
+        templates: remembered appearance of every place on every edge, (E, places, 2 TEMPLATE + 1).
+        known: whether there is one, (E, places).
     """
     count = len(samples.edge)
     offsets, weights = np.zeros((count, candidates)), np.zeros((count, candidates))
     likeness = np.full((count, candidates), np.nan)
     looks = np.zeros((count, candidates, 2 * TEMPLATE + 1))
     readable = np.zeros(count, dtype=np.bool_)
-    # What an edge looks like is read around a step at the end of the reach, too.
+    # The appearance of an edge is read around a step at the end of the reach as well.
     profile = np.empty(2 * max(reach + TEMPLATE + 2, LEAST_HALF) + 1)
     places, heights = np.empty(candidates), np.empty(candidates)
     widths = np.zeros((count, candidates))
@@ -216,7 +216,7 @@ def search_steps(
 
 @njit(cache=True)
 def look_at(profile: FloatArray, offset: float, look: FloatArray) -> None:
-    """Fill look with the profile around an offset from its middle, mean 0 and norm 1."""
+    """Fill look with the profile around an offset from its centre, mean 0 and norm 1."""
     place = len(profile) // 2 + offset - TEMPLATE
     first = int(place)
     share = place - first

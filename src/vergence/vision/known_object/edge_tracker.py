@@ -1,4 +1,4 @@
-"""Follows the edges of a known object from image to image."""
+"""Tracks the edges of a known object from image to image."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -23,31 +23,31 @@ from vergence.vision.known_object.object_model import ObjectModel
 
 _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
-_FEW = 0.7  # share of the edges found, below which other things are likely taken for some of them
+_FEW = 0.7  # fraction of the edges found, below which some of them are probably something else
 _WIDER = 4.0  # power by which the variances then grow
-_UNKNOWN_RATE = 0.5  # at which a place counts that was not looked at yet
+_UNKNOWN_RATE = 0.5  # weight of a place that has not been examined yet
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeTracker:
-    """Measures an object by all of its sharp edges that are seen.
+    """Measures an object by all of its visible sharp edges.
 
-    Steps of the grey value are searched across the predicted edges; a vote over shifts of the whole
-    image and a robust fit of the pose decide which of them are the edges. What each place along
-    the edges looked like before tells the object from its background. The edges, not the pose, are
-    the measurement.
+    Grey-value steps are searched for across the predicted edges; a vote over shifts of the whole
+    image and a robust fit of the pose decide which of them are the edges. The remembered appearance
+    of each place along the edges distinguishes the object from its background. The measurement
+    consists of the edges, not of the pose.
     """
 
     model: ObjectModel
-    contrast: float = 5.0  # least step of an edge, grey values of an image that is not dark
+    contrast: float = 5.0  # smallest step of an edge, grey values of an image that is not dark
     candidates: int = 5  # steps kept across each place
-    least_reach_px: float = 7.0  # how far to search, at least
-    most_reach_px: float = 24.0  # and at most
-    likeness: float = 0.4  # least correlation with what is remembered
-    bias_px: float = 0.25  # what does not average out along an edge: model, lens
+    least_reach_px: float = 7.0  # smallest search distance
+    most_reach_px: float = 24.0  # and largest
+    likeness: float = 0.4  # smallest correlation with the remembered appearance
+    bias_px: float = 0.25  # error that does not average out along an edge: model, lens
 
     geometry: EdgeGeometry = field(init=False, repr=False, compare=False)  # of the model
-    free: ClassVar[str] = ""  # turns that no image shows: corners tell them all
+    free: ClassVar[str] = ""  # rotations that no image shows: none, since corners determine all
     sought: ClassVar[str] = "edges"
 
     def __post_init__(self) -> None:
@@ -79,15 +79,15 @@ class EdgeTracker:
         pose_covariance: FloatArray,
         memory: EdgeMemory,
     ) -> EdgeMeasurement:
-        """Find the edges near where a pose predicts them.
+        """Find the edges near their predictions.
 
         Args:
             image: grey, of the camera's size, (height, width).
             camera: the camera's model.
             T_camera_target: predicted pose, (4, 4).
-            pose_covariance: of its error (δp, δθ) along camera axes, (6, 6); decides how far
-                to search.
-            memory: what the edges looked like.
+            pose_covariance: of its error (δp, δθ) along camera axes, (6, 6); determines the search
+                distance.
+            memory: appearance of the edges.
 
         Raises:
             InputError: if the image is not grey 8 bit or not of the camera's size.
@@ -116,17 +116,17 @@ class EdgeTracker:
         return seen
 
     def remember(self, memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
-        """Return the memory after an image that was accepted.
+        """Return the memory after an accepted image.
 
-        Places whose step is right where the fitted pose wants it are learned anew, little by
-        little, whatever they look like: backgrounds change, and faces turn.
+        Places whose step agrees with the fitted pose are learned gradually, whatever they look
+        like, because backgrounds change and faces turn.
         """
         learned: EdgeMemory = learn_edges(memory, seen)
         return learned
 
 
 def _places(model: ObjectModel) -> IntArray:
-    """Return how many places each edge has, (E,): as many as its length is worth."""
+    """Return the number of places on each edge, (E,), according to its length."""
     length = np.linalg.norm(model.edges[:, 1] - model.edges[:, 0], axis=1)
     share = length / length.sum()
     places: IntArray = np.clip(np.rint(_MOST_SAMPLES * share), 1, _MOST_PLACES).astype(np.int64)

@@ -20,15 +20,15 @@ _SHAPES = ("mesh", "box", "cylinder", "sphere", "ellipsoid", "capsule")
 def load_object_model(
     path: str | Path, scale: float = 1.0, sharp_rad: float = SHARP_RAD
 ) -> ObjectModel:
-    """Read an object: a mesh (OBJ, STL) or the geometry of an MJCF model at rest.
+    """Read an object: a mesh (OBJ, STL) or the geometry of an MJCF model in its initial state.
 
     Args:
         path: the file.
-        scale: metres in a unit of the file; 0.001 for a mesh in millimetres.
-        sharp_rad: the angle between the normals of two faces from which on their edge is sharp.
+        scale: metres per unit of the file; 0.001 for a mesh in millimetres.
+        sharp_rad: an edge is sharp if the normals of its two faces differ by at least this angle.
 
     Raises:
-        InputError: if there is no such file, it cannot be read, or nothing in it is drawn.
+        InputError: if the file does not exist, cannot be read, or has no visible geometry.
     """
     file = Path(path)
     kind = file.suffix.lower()
@@ -40,33 +40,33 @@ def load_object_model(
             str(path), "", Absent("no such file"), "an OBJ, STL or MJCF file that exists"
         )
     if not (np.isfinite(scale) and scale > 0.0):
-        raise InputError(str(path), "scale", scale, "metres in a unit of the file, above zero")
+        raise InputError(str(path), "scale", scale, "positive metres per unit of the file")
     compiled = _compile_mesh(file) if kind in MESHES else _compile_scene(file)
     vertices, triangles = _joined(compiled, str(path))
     return ObjectModel.from_mesh(str(path), vertices * scale, triangles, sharp_rad)
 
 
 def object_model_of(model: Any, body: str, sharp_rad: float = SHARP_RAD) -> ObjectModel:
-    """Return the object that a body of a compiled MuJoCo model is, with all that hangs on it.
+    """Return the object that a body of a compiled MuJoCo model forms, with all its descendants.
 
     Args:
         model: an `mjModel`.
-        body: name of the body whose frame the object's frame is.
+        body: name of the body, whose frame is the object's frame.
         sharp_rad: see `load_object_model`.
 
     Raises:
-        InputError: if there is no such body or nothing of it is drawn.
+        InputError: if there is no such body or it has no visible geometry.
     """
     vertices, triangles = _joined(model, body, _number(model, body))
     return ObjectModel.from_mesh(body, vertices, triangles, sharp_rad)
 
 
 def surface_of(model: Any, body: str) -> tuple[FloatArray, IntArray] | None:
-    """Return what is drawn of a body of a compiled MuJoCo model, with all that hangs on it.
+    """Return the visible surface of a body of a compiled MuJoCo model, with all its descendants.
 
     Returns:
-        Vertices (V, 3) in the body's frame, m, and triangles (F, 3) of them, counter-clockwise
-        seen from outside; None if nothing is drawn.
+        Vertices (V, 3) in the body's frame, m, and triangles (F, 3), counter-clockwise seen from
+        outside; None if nothing is visible.
 
     Raises:
         InputError: if there is no such body.
@@ -123,7 +123,7 @@ def _joined(model: Any, source: str, body: int = 0) -> tuple[FloatArray, IntArra
     """Return the visible geometry below a body as one mesh in that body's frame."""
     parts = list(_parts(model, body))
     if not parts:
-        allowed = f"one of {', '.join(_SHAPES)} among the geometry that is drawn (groups 0, 1, 2)"
+        allowed = f"one of {', '.join(_SHAPES)} among the visible geometry (groups 0, 1, 2)"
         raise InputError(source, "geom", Absent("none of finite size"), allowed)
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
     triangles = [tri + start for (_, tri), start in zip(parts, starts, strict=True)]
@@ -155,7 +155,7 @@ def _hangs_on(model: Any, body: int, ancestor: int) -> bool:
 
 
 def _shape(model: Any, geom: int) -> tuple[FloatArray, IntArray] | None:
-    """Return vertices and triangles in the geom's frame; None for a plane and its like."""
+    """Return vertices and triangles in the geom's frame; None for planes and similar geoms."""
     import mujoco
 
     size, kind = model.geom_size[geom], model.geom_type[geom]

@@ -1,7 +1,7 @@
-"""Turns of an object after which it may look the same: of its shape, or nearly so from here.
+"""Rotations after which an object looks the same, exactly or approximately from one viewpoint.
 
-A box turned by half a turn is the same box. A wedge seen from its high end, and many a machined
-part, is nearly the same, and its edges are then taken for one another.
+A box rotated by half a turn is the same box. A wedge seen from its high end, like many machined
+parts, is nearly the same, and its edges are then confused.
 """
 
 from itertools import product
@@ -13,14 +13,14 @@ from vergence.arrays import FloatArray
 from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
 from vergence.vision.known_object.object_model import ObjectModel
 
-_FOLDS = (2, 3, 4, 6)  # of symmetries that things have
-_SAME = 0.01  # of the object's size: edges nearer than this coincide
-_PLACES = 9  # along an edge, that are compared
+_FOLDS = (2, 3, 4, 6)  # of common symmetries
+_SAME = 0.01  # relative to the object's size: edges closer than this coincide
+_PLACES = 9  # compared along an edge
 _APART_RAD = 0.05
 
 
 class Turn(NamedTuple):
-    """A turn about an axis of the object."""
+    """A rotation about an axis of the object."""
 
     T_target_turned: FloatArray  # (4, 4)
     axis: FloatArray  # (3,) unit, object's frame
@@ -32,10 +32,10 @@ class Turn(NamedTuple):
 
 
 def turns_of(model: ObjectModel) -> list[Turn]:
-    """Return the turns about the middle of an object under which things may look the same.
+    """Return the rotations about an object's centre under which it may look the same.
 
-    Halves, thirds, quarters and sixths of a turn about the axes of its frame and about its own, and
-    those that take a cube to itself.
+    Halves, thirds, quarters and sixths of a turn about the axes of its frame and about its
+    principal axes, and those that map a cube to itself.
     """
     middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
     turns: list[Turn] = []
@@ -53,7 +53,7 @@ def turns_of(model: ObjectModel) -> list[Turn]:
 
 
 def symmetries(model: ObjectModel) -> list[Turn]:
-    """Return the turns that take the edges and vertices of an object to themselves."""
+    """Return the rotations that map the edges and vertices of an object to themselves."""
     places = _places_on_edges(model)
     return [
         turn
@@ -63,7 +63,7 @@ def symmetries(model: ObjectModel) -> list[Turn]:
 
 
 def between(T: FloatArray, T_other: FloatArray) -> Turn:
-    """Return by which turn of the object one pose becomes another."""
+    """Return the rotation of the object that turns one pose into another."""
     change = se3_compose(se3_inverse(T), T_other)
     w = so3_log(np.ascontiguousarray(change[:3, :3]))
     angle = float(np.linalg.norm(w))
@@ -76,7 +76,7 @@ def apart_rad(T: FloatArray, T_other: FloatArray) -> float:
 
 
 def _axes(model: ObjectModel) -> list[tuple[FloatArray, tuple[int, ...]]]:
-    """Return axes (3,) and the folds of the turns about each."""
+    """Return axes (3,) and the symmetry orders of the rotations about each."""
     centred = model.vertices - model.vertices.mean(axis=0)
     own = np.linalg.svd(centred, full_matrices=True)[2]
     axes: list[tuple[FloatArray, tuple[int, ...]]] = [(axis, _FOLDS) for axis in (*np.eye(3), *own)]

@@ -4,13 +4,13 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 
-SAME_PLACE = 1e-5  # of the mesh's size: vertices this near are one
-STRAIGHT_COSINE = np.cos(np.deg2rad(2.0))  # two edges that turn less are one line
-CORNER_SINE = np.sin(np.deg2rad(20.0))  # least turn at a corner
+SAME_PLACE = 1e-5  # relative to the mesh's size: vertices this close are one
+STRAIGHT_COSINE = np.cos(np.deg2rad(2.0))  # two edges at a smaller angle form one line
+CORNER_SINE = np.sin(np.deg2rad(20.0))  # smallest angle at a corner
 
 
 def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return vertices and triangles with those at the same place merged, slivers left out."""
+    """Return vertices and triangles with coincident vertices merged and slivers removed."""
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     grid = np.round(vertices / max(SAME_PLACE * size, 1e-300)).astype(np.int64)
     _, first, number = np.unique(grid, axis=0, return_index=True, return_inverse=True)
@@ -35,10 +35,11 @@ def triangle_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
 def sharp_edges(
     vertices: FloatArray, triangles: IntArray, normals: FloatArray, sharp_rad: float
 ) -> tuple[IntArray, FloatArray]:
-    """Return the vertices at the ends of each sharp edge (E, 2), and both sides' normals (E, 2, 3).
+    """Return the end vertices of each sharp edge (E, 2), and the normals on both sides (E, 2, 3).
 
-    An edge is sharp if the normals on its sides differ by more than an angle, or if it has not two
-    sides. At a border the second normal is the opposite of the first: one of them is always seen.
+    An edge is sharp if the normals on its sides differ by more than an angle, or if it does not
+    have two sides. At a border the second normal is the opposite of the first, so one of them is
+    always visible.
     """
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
@@ -85,7 +86,7 @@ def _end_of_line(
     edge: int,
     vertex: int,
 ) -> int:
-    """Follow a line from an edge over one of its vertices; mark what is passed; return its end."""
+    """Follow a line from an edge past one of its vertices; mark the edges; return its end."""
     while len(around[vertex]) == 2:
         following = next((e for e in around[vertex] if e != edge), edge)
         before = int(pairs[edge].sum()) - vertex
@@ -100,7 +101,7 @@ def _end_of_line(
 
 
 def corner_table(vertices: FloatArray, ends: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the vertices that are corners (C,), and the edges at each (C, K), filled with -1."""
+    """Return the vertices that are corners (C,), and the edges at each (C, K), padded with -1."""
     around: dict[int, list[int]] = {}
     for edge, pair in enumerate(ends.tolist()):
         for vertex in pair:

@@ -1,4 +1,4 @@
-"""Whether the sharp edges of an object show its pose, or its outline has to."""
+"""Decides whether the sharp edges of an object determine its pose, or its outline must."""
 
 import numpy as np
 
@@ -9,16 +9,16 @@ from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import outline_of
 
-LEAST_SHARE = 0.7  # of the outline on sharp edges
-_NEAR = 0.01  # of the object's size
+LEAST_SHARE = 0.7  # fraction of the outline on sharp edges
+_NEAR = 0.01  # relative to the object's size
 _CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
 _VIEWS_RAD = ((0.5, 0.3, 0.0), (1.3, 0.2, 0.4), (0.4, 1.2, -0.5), (2.2, 0.5, 0.6), (0.3, -0.9, 1.1))
 
 
 def shown_by_edges(model: ObjectModel) -> bool:
-    """Return whether an object has corners, and its outline runs along sharp edges mostly.
+    """Return whether an object has corners and most of its outline follows sharp edges.
 
-    A box does; a can has two sharp rims, but round sides.
+    A box qualifies; a can has two sharp rims, but round sides.
     """
     if not len(model.corners):
         return False
@@ -32,7 +32,7 @@ def has_corners(model: ObjectModel) -> bool:
 
 
 def as_followed(model: ObjectModel) -> ObjectModel:
-    """Return an object with the points that represent it: its corners, or those of a box inside."""
+    """Return an object with points that represent it: its corners, or those of a box inside."""
     return model if has_corners(model) or shown_by_edges(model) else model.boxed()
 
 
@@ -42,7 +42,7 @@ def _share_on_edges(model: ObjectModel, turn: FloatArray) -> float:
     T = se3(R, np.array((0.0, 0.0, 3.0 * model.size)) - R @ middle)
     closed = model.closed
     outline = outline_of(T, pack_lens(_CAMERA), model.vertices, model.triangles, closed, 100)
-    if outline is None:  # thinner than a cell, as a plate is from aside
+    if outline is None:  # thinner than a cell, such as a plate seen edge-on
         return 1.0
     start, along = model.edges[:, 0], model.edges[:, 1] - model.edges[:, 0]
     ahead = outline.points[:, None] - start

@@ -1,4 +1,4 @@
-"""A rigid object as vision knows it: sharp edges, corners where they meet, a surface that hides."""
+"""A rigid object for vision: sharp edges, the corners where they meet, and an occluding surface."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -26,8 +26,8 @@ class ObjectModel:
     """Geometry of a known object in its own frame, m.
 
     A sharp edge is where two faces meet at more than a threshold angle, or where a surface ends;
-    mesh edges in one line are one sharp edge. A corner is where sharp edges of different
-    directions meet. Round parts (the side of a cylinder) have neither.
+    collinear mesh edges form one sharp edge. A corner is where sharp edges of different directions
+    meet. Round parts (the side of a cylinder) have neither.
     """
 
     name: str
@@ -37,7 +37,7 @@ class ObjectModel:
     edges: FloatArray  # (E, 2, 3) ends of each sharp edge
     edge_normals: FloatArray  # (E, 2, 3) of the faces on its two sides; opposite at a border
     corners: FloatArray  # (C, 3)
-    corner_edges: IntArray  # (C, K) the sharp edges at each corner, filled up with -1
+    corner_edges: IntArray  # (C, K) the sharp edges at each corner, padded with -1
 
     @classmethod
     def from_mesh(
@@ -46,14 +46,15 @@ class ObjectModel:
         """Find the sharp edges and corners of a mesh.
 
         Args:
-            name: what to call it in messages, such as its file.
-            vertices: (V, 3), m; those at the same place are merged.
+            name: its name in messages, such as its file.
+            vertices: (V, 3), m; coincident ones are merged.
             triangles: three vertices each, counter-clockwise seen from outside, (F, 3).
-            sharp_rad: the angle between the normals of two faces from which on their edge is sharp.
+            sharp_rad: an edge is sharp if the normals of its two faces differ by at least this
+                angle.
 
         Raises:
-            InputError: if there is no triangle, anything is not finite, a triangle names a vertex
-                that is not there.
+            InputError: if there is no triangle, a value is not finite, or a triangle refers to a
+                vertex that does not exist.
         """
         places = frozen(vertices, (None, 3), "vertices")
         index = np.array(triangles, dtype=np.int64).reshape(-1, 3)
@@ -81,12 +82,12 @@ class ObjectModel:
 
     @classmethod
     def from_corners(cls, name: str, corners: ArrayLike) -> Self:
-        """Make a model of bare features, (C, 3), m: marks, or corners that a list names.
+        """Return a model of points only, (C, 3), m: marks, or listed corners.
 
-        It has no edges and hides nothing, so that its features can be measured as marks only.
+        It has no edges and occludes nothing, so its features can be measured as marks only.
 
         Raises:
-            InputError: if there is none, or one is not finite.
+            InputError: if there is no point, or one is not finite.
         """
         places = frozen(corners, (None, 3), "corners")
         if not len(places) or not np.isfinite(places).all():
@@ -105,10 +106,10 @@ class ObjectModel:
 
     @classmethod
     def from_face(cls, name: str, corners: ArrayLike) -> Self:
-        """Make a model of a flat four-sided face that is seen from one side.
+        """Return a model of a flat four-sided face that is visible from one side.
 
         Args:
-            name: what to call it in messages.
+            name: its name in messages.
             corners: (4, 3), m, clockwise as seen from that side.
         """
         model = cls.from_corners(name, corners)
@@ -125,10 +126,10 @@ class ObjectModel:
         )
 
     def boxed(self) -> Self:
-        """Return the model with the corners of a box inside for its own, (8, 3).
+        """Return the model with the corners of an inner box as its own, (8, 3).
 
-        They represent an object that is followed as a whole: no image shows them. The box is half
-        as large as the one around the object, of which half may be hidden or out of the image.
+        They represent an object that is tracked as a whole, and are not visible in images. The box
+        is half as large as the bounding box, half of which may be occluded or outside the image.
         """
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         low, high = 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high
@@ -138,9 +139,9 @@ class ObjectModel:
         )
 
     def coarsened(self, most: int) -> Self:
-        """Return a model of at most so many triangles, for its outline; itself if it has no more.
+        """Return a model with at most this many triangles, for its outline; itself if possible.
 
-        Vertices near each other are merged; edges and corners stay.
+        Close vertices are merged; edges and corners are kept.
         """
         coarse, step = self, self.size / 200.0
         while len(coarse.triangles) > most:
@@ -157,7 +158,7 @@ class ObjectModel:
 
     @property
     def size(self) -> float:
-        """Diagonal of the box around it, m."""
+        """Diagonal of its bounding box, m."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
     @property

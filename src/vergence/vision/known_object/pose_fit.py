@@ -1,7 +1,7 @@
-"""The pose under which the edges of an object run along steps of the image.
+"""The pose at which the edges of an object coincide with steps of the image.
 
-Iterated, robustly weighted least squares on the distances across the edges. Which of its steps a
-sample belongs to is decided anew in each iteration, with a tolerance that shrinks.
+Iterated, robustly weighted least squares on the distances across the edges. In each iteration,
+samples are assigned to steps again, with a shrinking tolerance.
 """
 
 from typing import NamedTuple
@@ -15,17 +15,17 @@ from vergence.robot.positive_definite import factor_spd, solve_factored
 from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 from vergence.vision.known_object.projection import pixel_rows
 
-INLIER = 2.5  # tolerances within which a step belongs to its edge
+INLIER = 2.5  # number of tolerances within which a step belongs to its edge
 LEAST_SPREAD_PX = 0.15
 
 
 class PoseFit(NamedTuple):
-    """A pose and what supports it."""
+    """A pose and its support."""
 
     T: FloatArray  # (4, 4) pose of the object in the camera
-    chosen: IntArray  # (N,) which step each sample belongs to; -1 for none
+    chosen: IntArray  # (N,) index of each sample's step; -1 for none
     residuals: FloatArray  # (N,) px, across the edge
-    spread_px: float  # robust standard deviation of the residuals that belong
+    spread_px: float  # robust standard deviation of the residuals of assigned samples
 
 
 @njit(cache=True)
@@ -40,18 +40,18 @@ def fit_pose(
     narrowest_px: float,
     iterations: int,
 ) -> PoseFit:
-    """Fit the pose to the steps, near enough to the start for slopes taken there.
+    """Fit the pose to the steps, linearised at the start.
 
     Args:
-        T_start: where to begin, (4, 4).
+        T_start: initial pose, (4, 4).
         T_prior: the predicted pose, (4, 4).
         prior: information of the prediction's error (δp, δθ) along camera axes, (6, 6).
         lens: packed camera, (11,).
         samples: on the edges.
         steps: across each sample.
         widest_px: tolerance of the first iteration.
-        narrowest_px: tolerance of the last.
-        iterations: how many.
+        narrowest_px: tolerance of the last iteration.
+        iterations: number of iterations.
     """
     slopes, start = _linearized(T_start, lens, samples)
     moved = np.zeros(6)
@@ -70,7 +70,7 @@ def fit_pose(
             for i in range(6):
                 share = certainty * weight * slopes[n, i]
                 b[i] += share * residual
-                for k in range(i + 1):  # the lower triangle is all that is read
+                for k in range(i + 1):  # only the lower triangle is read
                     A[i, k] += share * slopes[n, k]
         factor_spd(A)
         solve_factored(A, b)
@@ -92,9 +92,9 @@ def fit_pose(
 def _linearized(
     T: FloatArray, lens: FloatArray, samples: EdgeSamples
 ) -> tuple[FloatArray, FloatArray]:
-    """Return how each sample moves across its edge with (δp, δθ), (N, 6), and where it is, (N,).
+    """Return the motion of each sample across its edge by (δp, δθ), (N, 6), and its position, (N,).
 
-    NaN for samples behind the camera, which no step belongs to.
+    NaN for samples behind the camera, to which no step is assigned.
     """
     slopes, places = np.empty((len(samples.edge), 6)), np.empty(len(samples.edge))
     rows = np.empty((2, 6))
@@ -117,9 +117,9 @@ def _dot(a: FloatArray, b: FloatArray) -> float:
 def _likeliest(
     here: float, offsets: FloatArray, weights: FloatArray, tolerance: float
 ) -> tuple[int, float, float]:
-    """Return the step that most likely belongs to a sample, its residual, px, and its weight.
+    """Return the most likely step of a sample, its residual, px, and its weight.
 
-    The weight is Tukey's times that of the step; the step is -1 if none is near enough.
+    The weight is Tukey's times that of the step; the step is -1 if none is close enough.
     """
     farthest = (INLIER * tolerance) ** 2
     best, step, residual = 0.0, -1, np.nan

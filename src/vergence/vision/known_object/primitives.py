@@ -9,7 +9,7 @@ SIDES = 48  # of a cylinder: its facets meet at 7.5°, which is not sharp
 
 
 def box(half: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return a box around the origin, its half lengths (3,) given, m."""
+    """Return a box around the origin, with half lengths (3,), m."""
     signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = [tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))]
@@ -32,14 +32,14 @@ def cylinder(radius: float, half_length: float) -> tuple[FloatArray, IntArray]:
 
 
 def ellipsoid(half: ArrayLike) -> tuple[FloatArray, IntArray]:
-    """Return an ellipsoid around the origin, its half axes (3,) given, m."""
+    """Return an ellipsoid around the origin, with half axes (3,), m."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
     unit, triangles = _turned(np.cos(angle), np.sin(angle))
     return unit * np.asarray(half), triangles
 
 
 def capsule(radius: float, half_length: float) -> tuple[FloatArray, IntArray]:
-    """Return a capsule around z: a cylinder, its half length given, with half balls at its ends."""
+    """Return a capsule around z: a cylinder of a half length, with hemispheres at its ends."""
     angle = np.linspace(-np.pi / 2, 0.0, SIDES // 4 + 1)
     bow, rise = radius * np.cos(angle), radius * np.sin(angle) - half_length
     return _turned(np.append(bow, bow[::-1]), np.append(rise, -rise[::-1]))

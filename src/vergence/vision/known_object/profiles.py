@@ -1,18 +1,18 @@
-"""Grey profiles across an expected edge, and the places where they step."""
+"""Grey profiles across an expected edge, and the positions of their steps."""
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray, ImageArray
 
-MARGIN = 3  # samples of a profile beyond the range that is searched
-SHARP_WIDTH = 3.0  # px, of the slope of a sharp edge as the mask sees it
-BLURRED_WIDTH = 5.0  # px, from which on the middle of the slope is the better place
-SAME_PX = 0.75  # steps nearer than this are one
-_ASIDE_PX = np.sqrt(0.5)  # of the two places whose mean is a sample: as wide as 1 2 1 in pixels
-_NEAR, _FAR = 2.0 / 3.0, 1.0 / 3.0  # of the mask that tells slopes
-_SHARES = 256  # in which the four pixels around a place are mixed: integers are faster
-_PARTS = _SHARES**2  # of a pixel, in which places are counted
+MARGIN = 3  # samples of a profile beyond the searched range
+SHARP_WIDTH = 3.0  # px, of the slope of a sharp edge after the mask
+BLURRED_WIDTH = 5.0  # px, above which the middle of the slope is the better position
+SAME_PX = 0.75  # steps closer than this are one
+_ASIDE_PX = np.sqrt(0.5)  # distance of two positions averaged for a sample: as wide as 1 2 1
+_NEAR, _FAR = 2.0 / 3.0, 1.0 / 3.0  # of the mask that computes slopes
+_SHARES = 256  # resolution for mixing the four pixels around a position: integers are faster
+_PARTS = _SHARES**2  # resolution of positions in a pixel
 
 
 @njit(cache=True)
@@ -33,15 +33,15 @@ def grey_at(image: ImageArray, u: float, v: float) -> float:
 def read_profile(
     image: ImageArray, u: float, v: float, nu: float, nv: float, profile: FloatArray
 ) -> bool:
-    """Read grey values along the normal (nu, nv) through a pixel, each a mean along the edge.
+    """Read grey values along the normal (nu, nv) through a pixel, each averaged along the edge.
 
-    The middle of the profile is the pixel; samples are a pixel apart, each the mean of two places
-    beside each other along the edge. Returns False, and fills nothing, if any of it is outside the
-    image.
+    The pixel is the centre of the profile; samples are a pixel apart, each the mean of two
+    positions side by side along the edge. Returns False, and fills nothing, if any of it is outside
+    the image.
     """
     height, width = image.shape
     reach = len(profile) // 2
-    across, down = reach * abs(nu) + abs(nv), reach * abs(nv) + abs(nu)  # half the box around it
+    across, down = reach * abs(nu) + abs(nv), reach * abs(nv) + abs(nu)  # half the bounding box
     if not (across <= u < width - 1.0 - across and down <= v < height - 1.0 - down):
         return False
     x, y = int(_PARTS * (u - reach * nu)), int(_PARTS * (v - reach * nv))
@@ -57,8 +57,8 @@ def read_profile(
 
 @njit(cache=True)
 def _mixed_grey(image: ImageArray, x: int, y: int) -> int:
-    """Return _SHARES² times the grey value between four pixels, at a place in _PARTS of a pixel."""
-    one = np.uint32(1)  # unsigned: indices below zero need not be thought of
+    """Return _SHARES² times the grey value between four pixels, at (x, y) in _PARTS of a pixel."""
+    one = np.uint32(1)  # unsigned: avoids numba's negative-index check
     column, row = np.uint32(x // _PARTS), np.uint32(y // _PARTS)
     a, b = x % _PARTS // _SHARES, y % _PARTS // _SHARES
     top = (_SHARES - a) * image[row, column] + a * image[row, column + one]
@@ -78,22 +78,22 @@ def find_steps(
 ) -> int:
     """Find the steps of a profile: local maxima of |slope|, to a fraction of a pixel.
 
-    A blurred edge is a ramp whose slope has no one maximum; its middle is where the edge is. So
-    each maximum is followed to where the slope has fallen to half, on both sides. A
-    step beyond the reach is left out.
+    A blurred edge is a ramp whose slope has no distinct maximum; the edge is in its middle. Each
+    maximum is therefore followed to where the slope has fallen to half, on both sides. A step
+    beyond the reach is ignored.
 
     Args:
-        profile: grey values a pixel apart, odd in number.
-        reach: how far from its middle to look, px; the profile goes `MARGIN` further at least,
-            and as much further as ramps shall be followed.
-        contrast: least height of a step, grey values.
-        offsets: is filled with the places, px from the middle, the highest steps first.
-        heights: is filled with their signed heights, grey values.
-        widths: is filled with the widths of their slopes at half their height, px; a sharp edge has
-            about `SHARP_WIDTH`.
+        profile: grey values a pixel apart, an odd number.
+        reach: search distance from its centre, px; the profile extends at least `MARGIN` further,
+            and as far as ramps are to be followed.
+        contrast: smallest height of a step, grey values.
+        offsets: set to the positions, px from the centre, the highest steps first.
+        heights: set to their signed heights, grey values.
+        widths: set to the widths of their slopes at half their height, px; about `SHARP_WIDTH` for
+            a sharp edge.
 
     Returns:
-        How many were found, at most the length of `offsets`.
+        The number of steps found, at most the length of `offsets`.
     """
     middle = len(profile) // 2
     count = 0
@@ -118,7 +118,7 @@ def find_steps(
 
 @njit(cache=True)
 def _half_way(profile: FloatArray, k: int, side: int, height: float) -> float:
-    """Return where, to one side of sample k, the slope has fallen to half of its height there."""
+    """Return where, to one side of sample k, the slope has fallen to half its height there."""
     sign, half = np.copysign(1.0, height), 0.5 * abs(height)
     before = abs(height)
     place = k
@@ -134,7 +134,7 @@ def _half_way(profile: FloatArray, k: int, side: int, height: float) -> float:
 
 @njit(cache=True)
 def _height(profile: FloatArray, k: int) -> float:
-    """Height of a step at sample k: slope of a smoothing mask, 1 for a step of 1."""
+    """Return the height of a step at sample k: output of a smoothing mask, 1 for a unit step."""
     near, far = profile[k + 1] - profile[k - 1], profile[k + 2] - profile[k - 2]
     height: float = _NEAR * near + _FAR * far
     return height
@@ -150,7 +150,7 @@ def _insert(
     height: float,
     width: float,
 ) -> int:
-    """Keep the highest steps in order, of those at one place the first; return the new count."""
+    """Keep the highest steps in order, of coincident ones the first; return the new count."""
     for k in range(count):
         if abs(offsets[k] - offset) < SAME_PX:
             return count

@@ -1,6 +1,6 @@
-"""How a known object appears in one image: pixels, their dependence on the pose, what is hidden.
+"""The appearance of a known object in an image: pixels, their Jacobian by the pose, occlusion.
 
-A pose error is (δp, δθ) along camera axes: t + δp, exp(δθ) R, as the filters have it.
+A pose error is (δp, δθ) along camera axes: t + δp, exp(δθ) R, as in the filters.
 """
 
 import numpy as np
@@ -10,12 +10,12 @@ from vergence.arrays import FloatArray
 from vergence.camera.distortion import distortion_slope
 from vergence.camera.lens import K1, K2, K3, P1, P2, pixel_of
 
-HIDDEN_SLACK = 2e-3  # of its depth: by how much a point must be behind a face to be hidden
+HIDDEN_SLACK = 2e-3  # relative to its depth: distance behind a face at which a point is occluded
 
 
 @njit(cache=True)
 def in_camera(T: FloatArray, X: FloatArray) -> tuple[float, float, float]:
-    """Return a point of the object in the camera's frame."""
+    """Return a point of the object in the camera frame."""
     x = T[0, 0] * X[0] + T[0, 1] * X[1] + T[0, 2] * X[2] + T[0, 3]
     y = T[1, 0] * X[0] + T[1, 1] * X[1] + T[1, 2] * X[2] + T[1, 3]
     z = T[2, 0] * X[0] + T[2, 1] * X[1] + T[2, 2] * X[2] + T[2, 3]
@@ -51,10 +51,10 @@ def pixel_rows(
 
 @njit(cache=True)
 def face_table(T: FloatArray, surface: FloatArray) -> FloatArray:
-    """Return what is needed to tell what triangles hide, (F, 13), in normalized coordinates.
+    """Return the data for testing occlusion by triangles, (F, 13), in normalized coordinates.
 
-    Bounds (x, x, y, y), the plane 1/z = a x + b y + c (depth is linear in the image only so), and
-    the three corners. Triangles seen edge-on, or not wholly before the camera, hide nothing.
+    Bounds (x, x, y, y), the plane 1/z = a x + b y + c (only 1/z is linear in the image), and the
+    three corners. Triangles seen edge-on, or not entirely in front of the camera, occlude nothing.
 
     Args:
         T: pose of the object in the camera, (4, 4).
@@ -86,7 +86,7 @@ def face_table(T: FloatArray, surface: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def hidden(table: FloatArray, x: float, y: float, z: float) -> bool:
-    """Return whether a face of the table is before a point at normalized (x, y) and depth z."""
+    """Return whether a face of the table occludes a point at normalized (x, y) and depth z."""
     nearest = (1.0 + HIDDEN_SLACK) / z
     for n in range(len(table)):
         row = table[n]

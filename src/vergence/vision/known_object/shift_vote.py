@@ -8,21 +8,21 @@ from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 
 Table = NDArray[np.float32]
 
-SUPPORT_PX = 2.0  # of a step from where a shift wants the edge, within which it supports the shift
+SUPPORT_PX = 2.0  # distance of a step from the shifted edge within which it supports the shift
 _FINE = 8  # entries of a table per pixel
-_PEAKS = 3  # coarse maxima to start from
-_PEAK = 0.7  # of the best score, below which a coarse maximum is not climbed from
-_DISTANCE_COST = 0.25  # of its score, that the farthest shift loses
+_PEAKS = 3  # number of coarse maxima to start from
+_PEAK = 0.7  # relative to the best score, below which a coarse maximum is ignored
+_DISTANCE_COST = 0.25  # fraction of its score that the largest shift loses
 
 
 @njit(cache=True)
 def vote_shift(samples: EdgeSamples, steps: Steps, reach: int) -> tuple[float, float]:
-    """Return the shift of the whole image of the object, px, that most steps support.
+    """Return the shift of the object's whole image, px, that most steps support.
 
     Shifting by d moves an edge by n · d, and the best step within two pixels of it supports the
-    shift. What each sample gives to each distance across it is a table, made once. Every second
-    shift within the reach is tried, and from the best of them uphill pixel by pixel: support is
-    wider than their spacing. Small shifts win where support is equal.
+    shift. The support of each distance across each sample is tabulated once. Every second shift
+    within the reach is tried, and the best are improved by single pixels: support is wider than
+    their spacing. Of equally supported shifts the smallest wins.
     """
     tables = _support_tables(steps, reach)
     scores = _coarse_scores(samples, tables, reach)
@@ -44,7 +44,7 @@ def vote_shift(samples: EdgeSamples, steps: Steps, reach: int) -> tuple[float, f
 def _climb(
     samples: EdgeSamples, tables: Table, x: int, y: int, reach: int
 ) -> tuple[float, int, int]:
-    """Return the score, x and y of the maximum that going uphill by single pixels leads to."""
+    """Return the score, x and y of the maximum reached by hill climbing in single pixels."""
     best = _score(samples, tables, x, y, reach)
     while True:
         middle_x, middle_y = x, y
@@ -59,7 +59,7 @@ def _climb(
 
 @njit(cache=True)
 def _support_tables(steps: Steps, reach: int) -> Table:
-    """Return what each sample gives to distances across it, (N, W), 1/8 px apart each."""
+    """Return the support by each sample of distances across it, (N, W), 1/8 px apart."""
     count, candidates = steps.offsets.shape
     half = _FINE * (reach + 2)
     tables = np.zeros((count, 2 * half + 1), dtype=np.float32)
@@ -79,12 +79,12 @@ def _support_tables(steps: Steps, reach: int) -> Table:
 
 @njit(cache=True)
 def _coarse_scores(samples: EdgeSamples, tables: Table, reach: int) -> Table:
-    """Return the scores of every second shift, (S, S): rows y, columns x, none in the middle."""
+    """Return the scores of every second shift, (S, S): rows y, columns x, none in the centre."""
     half = tables.shape[1] // 2
     extent = reach // 2
     side = 2 * extent + 1
     scores = np.zeros((side, side), dtype=np.float32)
-    # Half of a row's width within the reach: beyond it a table has no entries.
+    # Half of a row's width within the reach, beyond which a table has no entries.
     wide = np.empty(side, dtype=np.int64)
     for row in range(side):
         y = 2 * (row - extent)
@@ -118,7 +118,7 @@ def _score(samples: EdgeSamples, tables: Table, x: int, y: int, reach: int) -> f
 
 @njit(cache=True)
 def _discount(x: int, y: int, reach: int) -> float:
-    """Return the share of its score that a shift keeps; -1 beyond the reach."""
+    """Return the fraction of its score that a shift keeps; -1 beyond the reach."""
     if x * x + y * y > reach * reach:
         return -1.0
     share: float = 1.0 - _DISTANCE_COST * np.sqrt(x * x + y * y) / reach

@@ -1,6 +1,6 @@
-"""The outline of a mesh under a pose: drawn as a mask with depth, and traced around.
+"""The outline of a mesh at a pose: rendered as a mask with depth, and traced.
 
-An outline drawn at the predicted pose is exact for that pose and needs no templates of viewpoints,
+An outline rendered at the predicted pose is exact for that pose and needs no viewpoint templates,
 which would be some degrees off and take seconds to prepare.
 """
 
@@ -13,14 +13,14 @@ from vergence.arrays import FloatArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH, pixel_of
 from vergence.vision.known_object.projection import in_camera
 
-MOST_CELLS = 240  # along a side of the mask: an object of 120 px has two cells a pixel
+MOST_CELLS = 240  # along a side of the mask: an object of 120 px has two cells per pixel
 LEAST_CELL_PX = 0.5
-WALK_PX = 24.0  # how far an outline is asked what lies beside it
-_LEAST_CONTOUR = 16  # cells around; a smaller one is a speck
-_TANGENT = 7  # cells to either side that tell the direction of the outline
-_AVERAGED = 3  # cells to either side over which places are averaged: they lie in a grid
+WALK_PX = 24.0  # distance from an outline up to which its surroundings are examined
+_LEAST_CONTOUR = 16  # cells around; a smaller contour is ignored
+_TANGENT = 7  # cells to either side that determine the direction of the outline
+_AVERAGED = 3  # cells to either side over which positions are averaged, since they lie on a grid
 _DEEPER = 3.0  # cells inward, where depth is read again
-_SAME_PART = 0.01  # of its depth, by which the outline's depth changes from cell to cell
+_SAME_PART = 0.01  # relative change of depth from cell to cell along an outline
 _NEAR = 1e-6
 
 
@@ -35,15 +35,13 @@ class Grid(NamedTuple):
 
 
 class Outline(NamedTuple):
-    """Places on the outline of an object under a pose."""
+    """Places on the outline of an object at a pose."""
 
     points: FloatArray  # (N, 3) object's frame, m
     points_px: FloatArray  # (N, 2)
     normals: FloatArray  # (N, 2) unit normals in the image, away from the object
-    inside_px: (
-        FloatArray  # (N,) how far the object reaches inward along the normal, WALK_PX at most
-    )
-    outside_px: FloatArray  # (N,) how far it is from another part of the object outward
+    inside_px: FloatArray  # (N,) extent of the object inward along the normal, WALK_PX at most
+    outside_px: FloatArray  # (N,) distance outward to another part of the object
 
 
 def outline_of(
@@ -54,15 +52,15 @@ def outline_of(
     closed: bool,
     count: int,
 ) -> Outline | None:
-    """Return places on the outline, evenly along it; None if the object is not before the camera.
+    """Return places evenly spaced on the outline; None if the object is not in front of the camera.
 
     Args:
         T: pose of the object in the camera, (4, 4).
         lens: packed camera, (11,).
         vertices: of the mesh, (V, 3), m.
-        triangles: vertices of each, (F, 3), outside in front.
-        closed: whether the mesh encloses a volume, so that faces seen from behind do not matter.
-        count: how many places, about.
+        triangles: vertices of each, (F, 3), counter-clockwise from outside.
+        closed: whether the mesh encloses a volume, so that back faces can be ignored.
+        count: approximate number of places.
     """
     import cv2
 
@@ -86,7 +84,7 @@ def outline_of(
 def _grid_around(box: FloatArray, lens: FloatArray) -> Grid | None:
     """Return cells for the part of a box (4,) in the image plane that the camera may see."""
     focal = float(max(lens[0], lens[1]))
-    # A lens with distortion shows more, or less, than its pinhole: some more is drawn.
+    # A distorted lens sees more or less than its pinhole model, so a larger area is rendered.
     left, top = -1.3 * lens[2] / lens[0], -1.3 * lens[3] / lens[1]
     right = 1.3 * (lens[WIDTH] - lens[2]) / lens[0]
     bottom = 1.3 * (lens[HEIGHT] - lens[3]) / lens[1]
@@ -102,9 +100,9 @@ def _grid_around(box: FloatArray, lens: FloatArray) -> Grid | None:
 def project_vertices(
     T: FloatArray, vertices: FloatArray, projected: FloatArray, box: FloatArray
 ) -> bool:
-    """Fill projected (V, 3) with normalized x, y and 1/z; tell whether all lie before the camera.
+    """Fill projected (V, 3) with normalized x, y and 1/z; return whether all are in front.
 
-    The box (4,) around them is filled, too: least x and y, greatest x and y.
+    The bounding box (4,) is filled as well: smallest x and y, largest x and y.
     """
     box[:2], box[2:] = np.inf, -np.inf
     for n in range(len(vertices)):
@@ -124,13 +122,13 @@ def draw_nearness(
 ) -> FloatArray:
     """Return 1/z of the nearest face in each cell, (rows, columns), 0 where there is none.
 
-    Unlike z, 1/z is linear in the image, and so are the shares w of a triangle's corners in it.
+    Unlike z, 1/z is linear in the image, and so are the barycentric coordinates w of a triangle.
 
     Args:
         projected: x, y, 1/z of each vertex, (V, 3).
         triangles: vertices of each, (F, 3).
         grid: the cells.
-        front_only: whether faces seen from behind are left out, as a closed mesh allows.
+        front_only: whether back faces are ignored, as a closed mesh allows.
     """
     nearness = np.zeros((grid.rows, grid.columns))
     scale = 1.0 / grid.cell
@@ -144,7 +142,7 @@ def draw_nearness(
             continue
         top = max(int(np.ceil(ay + min(0.0, by, cy))), 0)
         bottom = min(int(np.floor(ay + max(0.0, by, cy))), grid.rows - 1)
-        # Per column and row: the shares of b, c and a.
+        # Per column and row: the barycentric coordinates of b, c and a.
         across = (cy / area, -by / area, (by - cy) / area)
         down = (-cx / area, bx / area, (cx - bx) / area)
         near = projected[a, 2]
@@ -180,16 +178,16 @@ def places_along(
     ends: IntArray,
     count: int,
 ) -> Outline:
-    """Return places evenly along traced contours.
+    """Return places evenly spaced along traced contours.
 
     Args:
         T: pose of the object in the camera, (4, 4).
         lens: packed camera, (11,).
-        nearness: as drawn.
+        nearness: as rendered.
         grid: its cells.
         cells: (column, row) of the outermost cells of the object, (P, 2), contour after contour.
-        ends: where each contour ends among them, (C,).
-        count: how many places.
+        ends: end index of each contour, (C,).
+        count: number of places.
     """
     spacing = max(len(cells) / count, 1.0)
     most = int(len(cells) / spacing) + len(ends)
@@ -205,7 +203,7 @@ def places_along(
             column, row = cells[first + here, 0], cells[first + here, 1]
             if not _normal_at(nearness, cells, first, length, here, normal):
                 continue
-            # Cells whose centres are covered lie inside, half a cell across on average.
+            # Cells whose centres are covered lie inside, by half a cell on average.
             shift = 0.5 * max(abs(normal[0]), abs(normal[1]))
             x = grid.x + grid.cell * (column + shift * normal[0])
             y = grid.y + grid.cell * (row + shift * normal[1])
@@ -217,7 +215,7 @@ def places_along(
             size = np.sqrt(du * du + dv * dv)
             pixels[filled, 0], pixels[filled, 1] = u, v
             normals[filled, 0], normals[filled, 1] = dv / size, -du / size
-            px = size  # of one cell
+            px = size  # size of one cell
             inside[filled] = px * _walk(nearness, column, row, -normal, steps, True)
             outside[filled] = px * _walk(nearness, column, row, normal, steps, False)
             filled += 1
@@ -231,7 +229,7 @@ def places_along(
 def _normal_at(
     nearness: FloatArray, cells: IntArray, first: int, length: int, here: int, normal: FloatArray
 ) -> bool:
-    """Fill normal (2,), outward, in cells; tell whether the contour has a direction here."""
+    """Fill normal (2,), outward, in cells; return whether the contour has a direction here."""
     along_x, along_y = 0.0, 0.0
     for k in range(_TANGENT - _AVERAGED, _TANGENT + _AVERAGED + 1):
         after, before = first + (here + k) % length, first + (here - k) % length
@@ -282,9 +280,9 @@ def _depth_near(
 def _depth_at(
     nearness: FloatArray, column: int, row: int, normal: FloatArray, shift: float
 ) -> float:
-    """Return the depth of the outline beside a cell.
+    """Return the depth of the outline next to a cell.
 
-    A round surface recedes from its outline as √d does at a distance d inward; two depths tell.
+    A round surface recedes from its outline as √d at a distance d inward; two depths determine it.
     """
     near: float = 1.0 / nearness[row, column]
     c, r = (
@@ -309,7 +307,7 @@ def _to_object(T: FloatArray, x: float, y: float, z: float, point: FloatArray) -
 def _walk(
     nearness: FloatArray, column: int, row: int, direction: FloatArray, steps: int, covered: bool
 ) -> int:
-    """Return for how many cells from an outline the object lies, or not, in a direction."""
+    """Return for how many cells from an outline in a direction the object extends, or is absent."""
     for k in range(1, steps + 1):
         k_column, k_row = column + k * direction[0], row + k * direction[1]
         if _covered(nearness, k_column, k_row) != covered:

@@ -1,7 +1,7 @@
-"""About which axes an object can turn without any change of its outline.
+"""Axes about which an object can rotate without any change of its outline.
 
-No image of an outline tells how far such an object has turned. It is tried, not derived from the
-mesh: the outline is drawn at several turns about each axis that may be one.
+No image of its outline shows such a rotation. The axes are found by trial rather than from the
+mesh: the outline is rendered at several rotations about each candidate axis.
 """
 
 from typing import NamedTuple
@@ -13,20 +13,20 @@ from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import Grid, draw_nearness, project_vertices
 
-_CELLS = 200  # along the mask
-_DISTANCE = 5.0  # of the object, of its size
+_CELLS = 200  # along a side of the mask
+_DISTANCE = 5.0  # of the camera, in multiples of the object's size
 _TURNS_RAD = (0.41, 1.13, 1.83, 2.62, 3.9)
 _SLANTS_RAD = (0.5, 1.2)  # between an axis and the line of sight
 
 
 class FreeAxes(NamedTuple):
-    """Axes about which a turn does not show, in the object's frame."""
+    """Axes about which rotation is unobservable, in the object's frame."""
 
     axes: FloatArray  # (K, 3) unit vectors, K = 0 (none), 1 (a can) or 3 (a ball)
     centre: FloatArray  # (3,) m, on all of them
 
     def motions(self, T: FloatArray) -> FloatArray:
-        """Return the motions (δp, δθ) along camera axes that do not show, (6, K), m and rad.
+        """Return the unobservable motions (δp, δθ) along camera axes, (6, K), m and rad.
 
         Args:
             T: pose of the object in the camera, (4, 4).
@@ -39,13 +39,13 @@ class FreeAxes(NamedTuple):
         if not len(self.axes):
             return ""
         if len(self.axes) == 3:
-            return "no turn of it shows in its outline"
+            return "its outline shows none of its rotations"
         axis = ", ".join(f"{value:.2g}" for value in self.axes[0].round(3) + 0.0)
-        return f"a turn about its axis ({axis}) does not show in its outline"
+        return f"its outline does not show rotation about its axis ({axis})"
 
 
 def free_axes(model: ObjectModel) -> FreeAxes:
-    """Return the axes about which an object can turn without a change of its outline."""
+    """Return the axes about which an object can rotate without a change of its outline."""
     centre, principal = _principal_axes(model)
     closed = model.closed
     candidates = [*principal.T, *np.eye(3)]
@@ -54,7 +54,7 @@ def free_axes(model: ObjectModel) -> FreeAxes:
         new = all(abs(float(axis @ other)) < 0.99 for other in free)
         if new and _turns_unseen(model, closed, centre, axis):
             free.append(axis)
-    if len(free) > 1:  # about two axes: then about all
+    if len(free) > 1:  # about two axes implies about all
         free = list(np.eye(3))
     axes = np.array(free, dtype=np.float64).reshape(-1, 3)
     return FreeAxes(frozen(axes), frozen(centre))
@@ -83,10 +83,10 @@ def _turns_unseen(model: ObjectModel, closed: bool, centre: FloatArray, axis: Fl
 
 
 def _upright(axis: FloatArray, slant: float) -> FloatArray:
-    """Return a rotation that brings the axis to an angle from the camera's own, (3, 3)."""
+    """Return a rotation that brings the axis to an angle from the optical axis, (3, 3)."""
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     aside /= np.linalg.norm(aside)
-    own = np.array((aside, np.cross(axis, aside), axis))  # brings the axis to z
+    own = np.array((aside, np.cross(axis, aside), axis))  # maps the axis to z
     R: FloatArray = np.ascontiguousarray(so3_exp(np.array((slant, 0.0, 0.0))) @ own)
     return R
 
@@ -102,7 +102,7 @@ def _mask(model: ObjectModel, closed: bool, R: FloatArray, centre: FloatArray) -
 
 
 def _differ(one: BoolArray, other: BoolArray) -> bool:
-    """Return whether two masks differ by three cells across somewhere."""
+    """Return whether two masks differ over three cells in width somewhere."""
     import cv2
 
     different = (one != other).view(np.uint8)

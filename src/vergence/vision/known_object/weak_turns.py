@@ -1,7 +1,8 @@
-"""Turns under which the outline of an object hardly moves, whatever motion goes with them.
+"""Rotations under which the outline of an object hardly moves, combined with any translation.
 
-The outline of an ellipsoid is an ellipse, told by five numbers: of its six degrees of freedom one
-never shows. The outline of a mug does not show its turn while the handle is hidden.
+The outline of an ellipsoid is an ellipse, which has five parameters, so one of its six degrees of
+freedom is never observable. The outline of a mug does not show its rotation while the handle is
+hidden.
 """
 
 import numpy as np
@@ -15,10 +16,10 @@ from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import outline_of
 from vergence.vision.known_object.symmetry import FreeAxes
 
-# Of half the object's size, by which a turn of one radian has to move its outline to be seen. What
-# the places on an outline have wrong moves it by 0.01.
+# Relative to half the object's size: motion of the outline per radian above which a rotation is
+# observable. Errors of the outline's places move it by 0.01.
 USUAL, ELLIPSOID = 0.012, 0.03
-_LIKE_ELLIPSOID = 0.0145  # least motion, as a median over views
+_LIKE_ELLIPSOID = 0.0145  # smallest motion, as a median over views
 _CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
 _VIEWS = 15
 _PLACES = 200
@@ -27,14 +28,14 @@ _PLACES = 200
 def weak_turns(
     slopes: FloatArray, free: FloatArray, half_px: float, least_shown: float
 ) -> FloatArray:
-    """Return the motions (δp, δθ) that hardly move an outline, (6, K), the turns of unit length.
+    """Return the motions (δp, δθ) that hardly move an outline, (6, K), with unit rotations.
 
     Args:
-        slopes: how each place on the outline moves across it with (δp, δθ), (N, 6), px.
-        free: motions that are known not to show, (6, F); those returned turn otherwise.
+        slopes: motion of each place across the outline by (δp, δθ), (N, 6), px.
+        free: motions known to be unobservable, (6, F); those returned rotate differently.
         half_px: half the object's size in the image.
-        least_shown: motion of the outline, of `half_px`, from which on its weakest turn is seen;
-            for the others that is `USUAL`.
+        least_shown: motion of the outline relative to `half_px`, above which its weakest rotation
+            is observable; for the others it is `USUAL`.
     """
     squares, motions = _shown(slopes, free)
     least = np.full(len(squares), USUAL * half_px)
@@ -43,9 +44,10 @@ def weak_turns(
 
 
 def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
-    """Return from which motion on of its outline a turn of an object is seen, of half its size.
+    """Return the outline's motion, relative to half the size, at which a rotation is observable.
 
-    An object like an ellipsoid has a turn that is never seen, whatever a single image seems to say.
+    An object similar to an ellipsoid has a rotation that is never observable, whatever a single
+    image suggests.
     """
     random = np.random.default_rng(0)
     middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
@@ -65,7 +67,7 @@ def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
 def _shown(slopes: FloatArray, free: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return mean square motions of the outline, (K,) ascending, and the motions, (6, K).
 
-    Each turn goes with the motion of the origin that moves the outline least.
+    Each rotation is combined with the translation that moves the outline least.
     """
     if len(slopes) < 6 or free.shape[1] == 3:
         return np.zeros(0), np.zeros((6, 0))

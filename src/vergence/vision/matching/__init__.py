@@ -1,4 +1,4 @@
-"""Points of one image found again in another, and what a photograph shows of where to go."""
+"""Matching points between two images, for goals given as a photograph."""
 
 from vergence.vision.matching.compare import Compared, compare_images
 from vergence.vision.matching.image_faults import image_fault

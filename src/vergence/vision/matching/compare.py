@@ -1,4 +1,4 @@
-"""Two images of one thing: where the camera of the first is, seen from that of the second."""
+"""Compares two images of a scene: the pose of the first camera relative to the second."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -17,18 +17,18 @@ from vergence.vision.two_view import (
 )
 
 NOISE_PX = 0.3  # standard deviation of a matched point
-FEWEST = 12  # matches that have to agree
-_LEAST_OF_MEDIAN = 0.1  # depth, below which a match that agrees is wrong all the same
-LEAST_AREA = 0.01  # of both images, that they have to span
+FEWEST = 12  # number of matches that must agree
+_LEAST_OF_MEDIAN = 0.1  # relative depth below which a match is wrong even if it agrees
+LEAST_AREA = 0.01  # fraction of both images that they must span
 
 
 class Compared(NamedTuple):
-    """What two images have in common."""
+    """The common part of two images."""
 
     matches: Matches  # those that agree on the motion
-    view: TwoView | None  # the motion; None if it is a turn of the camera alone
+    view: TwoView | None  # the motion; None for a pure rotation of the camera
     rotation: FloatArray  # (3, 3) orientation of the current camera in the desired frame
-    tried: int  # matches before the wrong ones were dropped
+    tried: int  # matches before wrong ones were rejected
 
 
 def compare_images(
@@ -38,19 +38,19 @@ def compare_images(
     matcher: Matcher,
     described_star: Any = None,
 ) -> Compared | TwoViewFailure:
-    """Match two images and find the motion between them, or say why none is acceptable.
+    """Match two images and find the motion between them, or return why none is acceptable.
 
-    The motion has to explain more matches than chance would (`estimate_two_view`), at least
-    `FEWEST`, and they have to span a part of both images. Where the matcher finds too little, its
-    finer twin is asked. If that fails too, the desired image is looked at: it may be blurred, badly
-    exposed, or mirrored.
+    The motion must explain more matches than chance would (`estimate_two_view`), at least `FEWEST`,
+    and they must span a part of both images. If the matcher finds too few, its `finer` variant is
+    used. If that fails too, the desired image is examined: it may be blurred, badly exposed, or
+    mirrored.
 
     Args:
         image: the current image, grey, (height, width).
-        image_star: the desired image, likewise.
+        image_star: the desired image, grey, (height, width).
         camera: that took both.
         matcher: finds common points.
-        described_star: the desired image as the matcher describes it, if that is known.
+        described_star: the desired image as described by the matcher, if available.
     """
     desired = matcher.describe(image_star) if described_star is None else described_star
     found = _motion_of(matcher.match(matcher.describe(image), desired), camera)
@@ -67,7 +67,8 @@ def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
     points = matches.points_px, matches.points_star_px
     view = estimate_two_view(*points, camera, noise_px=NOISE_PX)
     if isinstance(view, TwoViewFailure) and view.problem is TwoViewProblem.TOO_FEW:
-        # With little parallax a plane explains everything; what it is not, later images tell.
+        # With little parallax a plane explains everything; later images will show deviations from
+        # it.
         view = estimate_two_view(*points, camera, noise_px=NOISE_PX, flat=True)
     if isinstance(view, TwoView):
         agree = view.inliers & _ahead(view.rho_star) & _ahead(view.rho)
@@ -84,13 +85,13 @@ def _motion_of(matches: Matches, camera: Camera) -> Compared | TwoViewFailure:
 
 
 def _ahead(depth: FloatArray) -> BoolArray:
-    """Return which points (N,) are not at the camera or behind it, as wrong matches may be."""
+    """Return which points (N,) are clearly in front of the camera, unlike some wrong matches."""
     ahead: BoolArray = depth > _LEAST_OF_MEDIAN * np.nanmedian(depth)  # never true of NaN
     return ahead
 
 
 def _turned(matches: Matches, camera: Camera, R: FloatArray) -> np.ndarray:
-    """Return which matches a turn of the camera explains, (N,)."""
+    """Return which matches a pure rotation of the camera explains, (N,)."""
     rays = np.column_stack((camera.normalize(matches.points_px), np.ones(len(matches.points_px))))
     turned = rays @ R.T
     ahead: np.ndarray = turned[:, 2] > 1e-3
@@ -102,7 +103,7 @@ def _turned(matches: Matches, camera: Camera, R: FloatArray) -> np.ndarray:
 
 
 def replace_matches(view: TwoView, chosen: np.ndarray) -> TwoView:
-    """Return a reconstruction, and its alternatives, of some of its matches alone."""
+    """Return a reconstruction and its alternatives, restricted to some of its matches."""
     return replace(
         view,
         m_star=view.m_star[chosen],
@@ -128,13 +129,13 @@ def _too_little(matches: Matches, camera: Camera) -> str:
 
 
 def _turned_over(matches: Matches) -> bool:
-    """Return whether the best affine map between the points turns them over."""
+    """Return whether the best affine map between the points contains a reflection."""
     now, desired = (points - points.mean(axis=0) for points in matches[:2])
     return bool(np.linalg.det(np.linalg.lstsq(now, desired, rcond=None)[0]) < 0.0)
 
 
 def _spanned(points_px: FloatArray) -> float:
-    """Return the area of the ellipse of twice the deviation of points (N, 2), px²."""
+    """Return the area of the two-sigma ellipse of points (N, 2), px²."""
     values = np.linalg.eigvalsh(np.cov(points_px.T))
     return float(4.0 * np.pi * np.sqrt(np.prod(np.maximum(values, 0.0))))
 
@@ -146,7 +147,7 @@ def _explained(
     camera: Camera,
     matcher: Matcher,
 ) -> TwoViewFailure:
-    """Return a failure with what is wrong with the images."""
+    """Return a failure with the faults of the images added to its reason."""
     for name, taken in (("goal", image_star), ("current", image)):
         if fault := image_fault(taken):
             return replace(failure, reason=f"the {name} image is {fault} ({failure.reason})")

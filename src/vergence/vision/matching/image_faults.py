@@ -1,4 +1,4 @@
-"""What is wrong with an image that nothing is recognised in."""
+"""Faults of an image in which nothing is recognised."""
 
 from itertools import pairwise
 
@@ -7,13 +7,13 @@ import numpy as np
 from vergence.arrays import ImageArray
 
 _WHITE, _BLACK = 250, 5  # grey levels beyond which nothing is distinguished
-_MOST = 0.4  # share of the image that may be white, or black
+_MOST = 0.4  # fraction of the image that may be white, or black
 _CONTRAST = 4.0  # grey levels, standard deviation
-_SHARP = 0.4  # of the contrast of the fourth octave that the second has in a sharp image
+_SHARP = 0.4  # contrast of the second octave relative to the fourth in a sharp image
 
 
 def image_fault(image: ImageArray) -> str:
-    """Return what makes an image hard to recognise anything in; empty if nothing does.
+    """Return the fault that makes an image hard to recognise; empty if there is none.
 
     Args:
         image: grey, (height, width).
@@ -31,7 +31,7 @@ def image_fault(image: ImageArray) -> str:
 def _is_blurred(image: ImageArray) -> bool:
     """Return whether the second octave of an image has much less contrast than the fourth.
 
-    The first is as much of noise as of sharpness.
+    The first octave contains as much noise as detail.
     """
     import cv2
 
@@ -43,7 +43,7 @@ def _is_blurred(image: ImageArray) -> bool:
 
 
 def _detail(level: np.ndarray, smaller: np.ndarray) -> float:
-    """Return the standard deviation of what a level of a pyramid adds to the next smaller one."""
+    """Return the standard deviation of detail in a pyramid level beyond the next smaller one."""
     import cv2
 
     rows, columns = level.shape

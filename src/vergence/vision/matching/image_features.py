@@ -1,4 +1,4 @@
-"""Features of an image as descriptors distinguish them, and how those of two images are matched."""
+"""Image features with descriptors, and their matching between two images."""
 
 from typing import NamedTuple
 
@@ -27,14 +27,14 @@ def no_features(reason: str) -> ImageFeatures:
 
 
 def searched_image(image: ImageArray, mask: BoolArray | None) -> tuple[ImageArray | None, str]:
-    """Return grey levels to look for features in, or None and why there are none.
+    """Return the grey levels in which to search for features, or None and why there are none.
 
     Args:
         image: grey, (height, width).
         mask: where features may be, (height, width); None for everywhere.
 
     Raises:
-        ShapeError: if the mask has not the size of the image.
+        ShapeError: if the mask does not have the size of the image.
     """
     grey, reason = grey_image(image)
     if grey is not None and mask is not None and np.shape(mask) != grey.shape:
@@ -45,13 +45,13 @@ def searched_image(image: ImageArray, mask: BoolArray | None) -> tuple[ImageArra
 def nearest_features(
     current: ImageFeatures, desired: ImageFeatures, distinct: float, count: int
 ) -> Matches:
-    """Match features that are each other's nearest, and clearly nearer than the second.
+    """Match features that are mutual nearest neighbours, clearly nearer than the second nearest.
 
     Args:
         current: of the current image.
         desired: of the desired image.
-        distinct: distance to the nearest over that to the second nearest, at most.
-        count: matches at most, the surest first.
+        distinct: largest ratio of the distances to the nearest and to the second nearest.
+        count: largest number of matches, the best first.
     """
     for name, features in (("current", current), ("desired", desired)):
         if features.reason:

@@ -1,4 +1,4 @@
-"""Several matchers, each asked where the ones before find too little."""
+"""Several matchers, each tried if the previous ones find too few matches."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from vergence.vision.matching.matcher import Matcher, Matches, finer_of
 
 @part("matcher", "in_turn")
 class InTurn:
-    """Asks one matcher after the other, such as a learned one behind `Sift`."""
+    """Tries several matchers in turn, such as a learned one after `Sift`."""
 
     matchers: tuple[Any, ...] = slot("matcher", many=True)  # the first to be asked first
 
@@ -20,17 +20,17 @@ class InTurn:
 
     @property
     def finer(self) -> Matcher | None:
-        """What is asked next: the first one's finer twin, or the second one."""
+        """The next one to try: the finer variant of the first one, or the second one."""
         first, *others = self.matchers
         finer = finer_of(first)
         rest = others if finer is None else [finer, *others]
         return InTurn(matchers=tuple(rest)) if rest else None
 
     def describe(self, image: ImageArray, mask: BoolArray | None = None) -> Any:
-        """Return what the first one needs to know of an image."""
+        """Return the first matcher's description of an image."""
         return self.matchers[0].describe(image, mask)
 
     def match(self, current: Any, desired: Any) -> Matches:
-        """Match two images by the first one's descriptions."""
+        """Match two images by the first matcher's descriptions."""
         found: Matches = self.matchers[0].match(current, desired)
         return found

@@ -1,4 +1,4 @@
-"""What a matcher is and what it answers."""
+"""The interface of matchers, and their result."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -6,7 +6,7 @@ from vergence.arrays import BoolArray, FloatArray, ImageArray
 
 
 class Matches(NamedTuple):
-    """Matched points, the surest first; some may be wrong, which `estimate_two_view` finds out."""
+    """Matched points, the best first; some may be wrong, which `estimate_two_view` detects."""
 
     points_px: FloatArray  # (N, 2) in the current image
     points_star_px: FloatArray  # (N, 2) in the desired image
@@ -18,13 +18,13 @@ class Matches(NamedTuple):
 
 
 class Matcher(Protocol):
-    """Finds the points of one image again in another: the place for a matcher of a user's own.
+    """Finds the points of one image in another; implement it for a matcher of your own.
 
-    An image is described once and may be matched often, as a goal is.
+    An image is described once and may be matched often, as a goal image is.
     """
 
     def describe(self, image: ImageArray, mask: BoolArray | None = None) -> Any:
-        """Return what `match` needs to know of an image.
+        """Return the description of an image for `match`.
 
         Args:
             image: grey, (height, width).
@@ -38,9 +38,9 @@ class Matcher(Protocol):
 
 
 def finer_of(matcher: Matcher) -> Matcher | None:
-    """Return what is asked where a matcher finds too little: its attribute `finer`, if it has one.
+    """Return the matcher to use if one finds too few matches: its attribute `finer`, if it has one.
 
-    Such as a slower one that finds more.
+    It is usually slower, and finds more.
     """
     finer: Matcher | None = getattr(matcher, "finer", None)
     return finer

@@ -1,4 +1,4 @@
-"""Lowe's features: recognised however the camera was turned, and over a change of scale."""
+"""Lowe's features, which are recognised despite rotation and changes of scale."""
 
 from typing import Annotated
 
@@ -16,26 +16,26 @@ from vergence.vision.matching.image_features import (
 )
 from vergence.vision.matching.matcher import Matches
 
-_ROWS_PX = 480  # an image with more is searched at a smaller size
+_ROWS_PX = 480  # a larger image is searched at a smaller size
 
 
 @part("matcher", "sift")
 class Sift:
-    """Matches points by what surrounds them: Lowe's descriptors [Lowe2004].
+    """Matches points by Lowe's descriptors of their surroundings [Lowe2004].
 
-    They stay as they are under a turn about the optical axis and a change of scale, and nearly so
-    up to some 45° of tilt. A match has to be the best in both directions and clearly better than
-    the second best, so repeated texture gives few.
+    They are invariant to rotation about the optical axis and to scale, and nearly so up to about
+    45° of tilt. A match must be the best in both directions and clearly better than the second
+    best, so repeated texture gives few matches.
     """
 
-    count: Annotated[int, Field(ge=8, le=2000)] = 100  # matches at most, the surest first
-    features: Annotated[int, Field(ge=8, le=20000)] = 1000  # of each image at most
-    size: float = knob(0.5, above=0.1, upto=1.0)  # of the image that is searched; 1 finds more
-    distinct: float = knob(0.8, above=0.1, upto=1.0)  # best distance over the second best, at most
+    count: Annotated[int, Field(ge=8, le=2000)] = 100  # largest number of matches, the best first
+    features: Annotated[int, Field(ge=8, le=20000)] = 1000  # per image at most
+    size: float = knob(0.5, above=0.1, upto=1.0)  # scale of the searched image; 1 finds more
+    distinct: float = knob(0.8, above=0.1, upto=1.0)  # largest best over second-best distance
 
     @property
     def finer(self) -> "Sift | None":
-        """The same on the image as it is, four times as slow."""
+        """The same at full resolution, four times as slow."""
         if self.size == 1.0:
             return None
         return Sift(count=self.count, features=2 * self.features, size=1.0, distinct=self.distinct)
@@ -48,7 +48,7 @@ class Sift:
             mask: where they may be, (height, width); None for everywhere.
 
         Raises:
-            ShapeError: if the mask has not the size of the image.
+            ShapeError: if the mask does not have the size of the image.
         """
         import cv2
 
@@ -86,17 +86,17 @@ def match_features(
     mask: BoolArray | None = None,
     mask_star: BoolArray | None = None,
 ) -> Matches:
-    """Match two images of the same thing by `Sift`, at their full size.
+    """Match two images of a scene by `Sift`, at full resolution.
 
     Args:
         image: the current image, grey, (height, width).
-        image_star: the desired image, likewise.
-        count: how many matches at most.
+        image_star: the desired image, grey, (height, width).
+        count: largest number of matches.
         mask: where the object may be in the current image, (height, width); anywhere if None.
-        mask_star: where it is in the desired image, likewise.
+        mask_star: where it is in the desired image, (height, width); anywhere if None.
 
     Raises:
-        ShapeError: if a mask has not the size of its image.
+        ShapeError: if a mask does not have the size of its image.
     """
     sift = Sift(count=count, features=2000, size=1.0)
     return sift.match(sift.describe(image, mask), sift.describe(image_star, mask_star))

@@ -1,4 +1,4 @@
-"""Learned features, by the weights of a package of others."""
+"""Learned features, with weights from a third-party package."""
 
 from vergence.vision.matching.learned.xfeat import XFeat
 

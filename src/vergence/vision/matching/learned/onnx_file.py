@@ -1,4 +1,4 @@
-"""Networks written as ONNX, which is a protocol buffer: as much of it as they need."""
+"""Writes networks in the ONNX format, a protocol buffer, as far as it is needed here."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -9,13 +9,13 @@ from vergence.vision.matching.learned.torch_file import NumberArray
 
 Attribute = int | float | str | Sequence[int]
 
-_OPERATORS = 13  # version of the set of operators
+_OPERATORS = 13  # version of the operator set
 _FLOAT, _INT64 = 1, 7  # types of elements
 _KINDS = {"f": 1, "i": 2, "s": 3, "ints": 7}  # of attributes
 
 
 class OnnxGraph:
-    """A network, node by node.
+    """A network, built node by node.
 
     Args:
         image: name of the input.
@@ -28,7 +28,7 @@ class OnnxGraph:
         self._constants: list[bytes] = []
 
     def constant(self, name: str, values: NumberArray) -> str:
-        """Add numbers that do not change, float32 or int64; return their name."""
+        """Add constants, float32 or int64; return their name."""
         kind = _INT64 if values.dtype.kind == "i" else _FLOAT
         little = np.ascontiguousarray(values, "<i8" if kind == _INT64 else "<f4")
         dimensions = b"".join(_number(1, size) for size in values.shape)
@@ -40,7 +40,7 @@ class OnnxGraph:
     def node(
         self, operator: str, inputs: Sequence[str], output: str, **attributes: Attribute
     ) -> str:
-        """Add an operator of ONNX; return the name of what it computes."""
+        """Add an ONNX operator; return the name of its output."""
         message = b"".join(_text(1, name) for name in inputs) + _text(2, output)
         message += _text(3, output) + _text(4, operator)
         message += b"".join(_bytes(5, _attribute(key, value)) for key, value in attributes.items())
@@ -51,7 +51,7 @@ class OnnxGraph:
         """Return the file.
 
         Args:
-            outputs: names of what is asked for, with shapes.
+            outputs: names of the outputs, with shapes.
         """
         graph = b"".join(_bytes(1, node) for node in self._nodes) + _text(2, "network")
         graph += b"".join(_bytes(5, constant) for constant in self._constants)
@@ -94,7 +94,7 @@ def _tag(field: int, wire: int) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    """Return a number, seven bits a byte, the lowest first."""
+    """Return a number with seven bits per byte, the lowest first."""
     found = bytearray()
     while value > 0x7F:
         found.append(value & 0x7F | 0x80)

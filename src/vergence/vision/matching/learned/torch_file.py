@@ -1,4 +1,4 @@
-"""Weights out of a file of PyTorch, without PyTorch and without running what the file says."""
+"""Reads weights from a PyTorch file, without PyTorch and without executing its contents."""
 
 import pickle
 import zipfile
@@ -19,12 +19,12 @@ _TYPES = {"FloatStorage": np.dtype("<f4"), "LongStorage": np.dtype("<i8")}
 
 
 def read_weights(path: Path) -> Mapping[str, NumberArray]:
-    """Return the arrays of a state dictionary that `torch.save` has written, by name.
+    """Return the arrays of a state dictionary saved by `torch.save`, by name.
 
-    Of all that a pickle may name, only what a dictionary of arrays needs is known here.
+    Of everything that a pickle may refer to, only what a dictionary of arrays needs is accepted.
 
     Raises:
-        InputError: if the file is not such a one.
+        InputError: if the file is not such a dictionary.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -50,24 +50,24 @@ class _Storage(NamedTuple):
 
 
 class _Reader(pickle.Unpickler):
-    """Reads the index of the archive; an array is read when it is named."""
+    """Reads the index of the archive; an array is read when it is referred to."""
 
     def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
         super().__init__(BytesIO(archive.read(f"{folder}data.pkl")))
         self._archive, self._folder = archive, folder
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return what the file may name; refuse all else."""
+        """Return an accepted class or function; reject everything else."""
         if (module, name) == ("collections", "OrderedDict"):
             return OrderedDict
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return self._array
         if module == "torch" and name in _TYPES:
             return _TYPES[name]
-        raise pickle.UnpicklingError(f"{module}.{name} is not a part of plain weights")
+        raise pickle.UnpicklingError(f"{module}.{name} is not allowed in a file of weights")
 
     def persistent_load(self, pid: Any) -> _Storage:
-        """Return the numbers that an array is made of."""
+        """Return the numbers of an array."""
         _, dtype, key, *_ = pid
         return _Storage(str(key), np.dtype(dtype))
 

