@@ -1,9 +1,9 @@
 """Bundle adjustment over two views, for three nested models of the object.
 
-One prediction serves all: a point with normalized coordinates x* in the desired view appears in
-the current one at π(R [x*; 1] + w t), w = 1/Z*.
+One prediction serves all models: a point with normalized coordinates x* in the desired view appears
+in the current one at π(R [x*; 1] + w t), w = 1/Z*.
 
-| model | w | pose unknowns | unknowns a point |
+| model | w | pose unknowns | unknowns per point |
 |---|---|---|---|
 | ROTATION | 0: no translation, or everything at infinity | ω (3) | x* (2) |
 | PLANE | n·[x*; 1]: t is in units of the plane's distance | ω, t, n on the sphere (8) | x* (2) |
@@ -33,7 +33,7 @@ ROTATION, PLANE, GENERAL = 0, 1, 2
 
 
 class TwoViewState(NamedTuple):
-    """What two-view bundle adjustment moves."""
+    """The variables of two-view bundle adjustment."""
 
     R: FloatArray  # (3, 3) rotation of X = R X* + t
     t: FloatArray  # (3,) translation in the units of the model
@@ -43,18 +43,18 @@ class TwoViewState(NamedTuple):
 
 
 class NormalBlocks(NamedTuple):
-    """The blocks of the normal equations: poses against points."""
+    """The blocks of the normal equations: poses and points."""
 
     U: FloatArray  # (P, P)
     W: FloatArray  # (N, P, D)
     V: FloatArray  # (N, D, D)
     g: FloatArray  # (P,) pose part of the gradient
-    h: FloatArray  # (N, D) points' part
+    h: FloatArray  # (N, D) points' part of the gradient
 
 
 @njit(cache=True)
 def bundle_sizes(model: int) -> tuple[int, int]:
-    """Return the number of pose unknowns and of unknowns a point."""
+    """Return the number of pose unknowns and of unknowns per point."""
     if model == ROTATION:
         return 3, 2
     if model == PLANE:
@@ -64,7 +64,7 @@ def bundle_sizes(model: int) -> tuple[int, int]:
 
 @njit(cache=True)
 def point_in_current(model: int, state: TwoViewState, j: int) -> FloatArray:
-    """Return R [x*; 1] + w t of point j, (3,): its place in the current frame, over Z*."""
+    """Return R [x*; 1] + w t of point j, (3,): its position in the current frame, over Z*."""
     ray = np.array([state.x_star[j, 0], state.x_star[j, 1], 1.0])
     if model == ROTATION:
         return apply(state.R, ray)
@@ -80,7 +80,7 @@ def bundle_residuals(
 
     Args:
         model: ROTATION, PLANE or GENERAL.
-        state: what is predicted from.
+        state: determines the predictions.
         m_star: measured in the desired view, normalized, (N, 2).
         m: measured in the current view, (N, 2).
         weight: focal length over the noise's standard deviation along x and y, (2,).
@@ -149,7 +149,7 @@ def normal_blocks(
 
 @njit(cache=True)
 def eliminate_points(blocks: NormalBlocks, damping: float) -> tuple[FloatArray, FloatArray]:
-    """Solve the damped normal equations by the Schur complement: pose step, points' steps."""
+    """Solve the damped normal equations by the Schur complement; return pose and point steps."""
     S, g = blocks.U.copy(), blocks.g.copy()
     for k in range(len(g)):
         S[k, k] += damping * blocks.U[k, k] + 1e-9
@@ -195,7 +195,7 @@ def adjust_bundle(
     """Minimise the weighted reprojection error in both views (Levenberg-Marquardt).
 
     Returns:
-        the state at the minimum and its residuals (N, 4), whose sum of squares is a χ².
+        The state at the minimum and its residuals (N, 4), whose sum of squares is a χ².
     """
     residuals = bundle_residuals(model, state, m_star, m, weight)
     cost, damping = np.sum(residuals**2), 1e-4

@@ -1,4 +1,4 @@
-"""What makes a set of matches unusable, found before any equation is solved."""
+"""Checks for unusable sets of matches, before any equation is solved."""
 
 import numpy as np
 from numba import njit
@@ -22,9 +22,9 @@ def distinct_count(points: FloatArray, tolerance: float) -> int:
 
 @njit(cache=True)
 def fewest_off_a_line(points: FloatArray, tolerance: float) -> int:
-    """Return the smallest number of points (N, 2) that any line leaves farther than the tolerance.
+    """Return the smallest number of points (N, 2) farther than the tolerance from any line.
 
-    Every pair of points gives a line; above about sixty points only some of the pairs are tried.
+    Every pair of points defines a line; above about sixty points only some of the pairs are tried.
     """
     count = len(points)
     stride = max(1, count * count // 3600)
@@ -61,8 +61,8 @@ def triangle_area(points: FloatArray, a: int, b: int, c: int) -> float:
 def widest_triples(m_star: FloatArray, m: FloatArray, count: int) -> IntArray:
     """Return the triples of points, (count, 3), that span the largest triangles.
 
-    What counts is the smaller of a triangle's areas in the two views. The triples are drawn from
-    at most sixteen points, spread over the list, and come best first.
+    The smaller of a triangle's areas in the two views counts. The triples are selected from at most
+    sixteen points, spread over the list, and sorted with the best first.
     """
     stride = max(1, len(m) // 16)
     triples = np.zeros((count, 3), np.int64)

@@ -1,4 +1,4 @@
-"""Which matches agree on one rigid motion, beyond what chance explains."""
+"""Finds the matches that agree on one rigid motion, beyond what chance explains."""
 
 import numpy as np
 from numba import njit
@@ -22,17 +22,17 @@ from vergence.vision.two_view.search import (
     transfer_errors,
 )
 
-RELIEF = 0.2  # of its distance: how deep an object is taken to be that may not be flat
-_TRIED = -0.5  # log₁₀ NFA below which a set of matches is fitted, before it is judged
-_CLEARLY = 2.0  # thresholds of a plane within which a match may still be on it
-_FARTHEST_ASIDE = 0.5  # of its distance: how far a camera moves that still recognises an object
-_OFF_PLANE = -2.0  # log₁₀ NFA of the matches off a plane that make an object not flat
+RELIEF = 0.2  # relative to its distance: assumed relief of an object that may not be flat
+_TRIED = -0.5  # log₁₀ NFA below which a set of matches is fitted before it is judged
+_CLEARLY = 2.0  # multiples of a plane's threshold within which a match may still be on it
+_FARTHEST_ASIDE = 0.5  # of its distance: largest camera motion at which an object is recognised
+_OFF_PLANE = -2.0  # log₁₀ NFA of the matches off a plane that prove an object not flat
 
 
 def agreements(views: Views) -> list[Agreement]:
-    """Return the sets of matches that agree on a plane's motion and on any motion, likelier first.
+    """Return the sets of matches that agree on a plane's motion and on any motion, best first.
 
-    Two matches off a plane determine the epipole, and any motion fits them: only what agrees
+    Two matches off a plane determine the epipole, so some motion always fits them: only agreement
     beyond those two is evidence that the object is not flat [Chum2005].
     """
     plane = find_plane(views.m_star, views.m, views.noise)
@@ -53,9 +53,9 @@ def off_plane(views: Views, near: BoolArray, kept: BoolArray, error: float) -> b
 
     Args:
         views: all matches.
-        near: which of them lie on the plane, (N,).
-        kept: which agree with the motion, (N,).
-        error: largest distance of theirs from the epipolar line.
+        near: mask of those on the plane, (N,).
+        kept: mask of those that agree with the motion, (N,).
+        error: their largest distance from the epipolar line.
     """
     off = kept & ~near
     if np.count_nonzero(off) < 3:
@@ -78,7 +78,7 @@ def errors_of(fit: Fit, views: Views) -> FloatArray:
 def log_alarms_of(fit: Fit, views: Views) -> float:
     """Return log₁₀ of the number of false alarms of a fit, within the region of its matches.
 
-    If all matches agree, none were chosen to determine the model.
+    If all matches agree, none were selected to determine the model.
     """
     disc, band = log_densities(fit.views.m_star, fit.views.m)
     general = fit.model == GENERAL
@@ -99,12 +99,12 @@ def log_chance_of_flatness(plane: Fit, views: Views, near: BoolArray) -> float:
     Args:
         plane: the plane.
         views: all matches.
-        near: which of them lie on it, (N,).
+        near: mask of those on the plane, (N,).
     """
     error = max(float(errors_of(plane, views)[near].max()), views.noise)
     # Inverse depths are in units of the plane's distance, as the translation is.
     inverse_depths = homogeneous(views.m_star[near]) @ plane.state.n
-    # A plane by chance often has a motion far too long.
+    # A plane found by chance often has a motion that is far too long.
     aside = float(np.linalg.norm(plane.state.t) * np.median(np.abs(inverse_depths)))
     parallax = RELIEF * min(aside, _FARTHEST_ASIDE)
     return float(log_chance_of_plane(len(views), int(np.count_nonzero(near)), error, parallax))
@@ -112,7 +112,7 @@ def log_chance_of_flatness(plane: Fit, views: Views, near: BoolArray) -> float:
 
 @njit(cache=True)
 def distinct_matches(points: FloatArray, points_star: FloatArray, apart: float) -> BoolArray:
-    """Return which matches (N,) lie farther than `apart` from all chosen before, in both views."""
+    """Return which matches (N,) are farther than `apart` from all before, in both views."""
     chosen = np.zeros(len(points), dtype=np.bool_)
     for j in range(len(points)):
         alone = True

@@ -1,4 +1,4 @@
-"""How sure a two-view reconstruction is."""
+"""The covariance of a two-view reconstruction."""
 
 import numpy as np
 from numba import njit
@@ -20,7 +20,7 @@ from vergence.vision.two_view.small import (
 
 @njit(cache=True)
 def reference_plane(points: FloatArray) -> FloatArray:
-    """Return N = n/d of the plane N·X = 1 that fits points (K, 3), K ≥ 3, best."""
+    """Return N = n/d of the plane N·X = 1 that best fits points (K, 3), K ≥ 3."""
     ones = np.ones((len(points), 1))
     return cholesky_solve(transposed_times(points, points), transposed_times(points, ones))[:, 0]
 

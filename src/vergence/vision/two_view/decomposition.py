@@ -1,4 +1,4 @@
-"""From a homography or an essential matrix to the camera's motion.
+"""The camera motion from a homography or an essential matrix.
 
 Every motion here is (R, t) with X = R X* + t: the pose of the desired camera in the current one.
 The paper's *R_c and *t_c are its inverse.
@@ -23,8 +23,8 @@ from vergence.vision.two_view.small import (
 def decompose_homography(H: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the two motions and planes behind H = R + t nᵀ, the plane in front of n·m* > 0.
 
-    The four algebraic solutions are two and their mirror images (−t, −n); the caller's H has its
-    middle singular value at 1. [Faugeras and Lustman 1988], in the form of the eigenvectors of HᵀH.
+    Of the four algebraic solutions two are mirror images (−t, −n); the caller's H has its middle
+    singular value at 1. [Faugeras and Lustman 1988], in the form of the eigenvectors of HᵀH.
 
     Returns:
         R (2, 3, 3), t over the distance of the plane (2, 3), unit normal with n_z ≥ 0 (2, 3).
@@ -41,7 +41,7 @@ def decompose_homography(H: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
         normal = cross(v2, u)
         U, W = np.empty((3, 3)), np.empty((3, 3))
         U[:, 0], U[:, 1], U[:, 2] = v2, u, normal
-        W[:, 0], W[:, 1] = unit(apply(H, v2)), unit(apply(H, u))  # which are orthogonal
+        W[:, 0], W[:, 1] = unit(apply(H, v2)), unit(apply(H, u))  # these are orthogonal
         W[:, 2] = cross(W[:, 0], W[:, 1])
         R = times(W, U.T)
         if normal[2] < 0.0:
@@ -72,10 +72,10 @@ def decompose_essential(E: FloatArray) -> tuple[FloatArray, FloatArray]:
 def inverse_depths(
     R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray
 ) -> tuple[FloatArray, int]:
-    """Return 1/Z* of each point, (N,), in units of 1/‖t‖, and how many lie before both cameras.
+    """Return 1/Z* of each point, (N,), in units of 1/‖t‖, and how many are in front of both.
 
-    From Z m = Z* R m* + t: crossing with m gives (R m*) × m + w t × m = 0 for w = 1/Z*, the same
-    least squares as [Mezouar2001] eq. (10) without its unknown μ.
+    From Z m = Z* R m* + t: the cross product with m gives (R m*) × m + w t × m = 0 for w = 1/Z*,
+    the same least squares as [Mezouar2001] eq. (10) without its unknown μ.
     """
     w = np.empty(len(m))
     front = 0

@@ -1,4 +1,4 @@
-"""From matched points in two images to motion and structure."""
+"""Motion and structure from matched points in two images."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from vergence.vision.two_view.fit import Views
 from vergence.vision.two_view.report import Report
 from vergence.vision.two_view.result import TwoView
 
-APART = 4.0  # standard deviations: of matches that are nearer to each other, one counts
+APART = 4.0  # standard deviations: of matches closer to each other, only one counts
 
 
 def estimate_two_view(
@@ -28,27 +28,27 @@ def estimate_two_view(
 ) -> TwoView | TwoViewFailure:
     """Reconstruct motion and shape of an unknown object, up to scale, from two images of it.
 
-    Nothing need be known of the object. Wrong matches are found and dropped; the motion has to
-    explain more matches than chance would; the simplest of turn, plane and general object that
-    the noise allows is kept; and where a second motion explains the matches as well, the result
-    is ambiguous and holds both. An object that is not flat takes eight matches. A plane through
-    few points may be chance, so a flat object takes about seven, or four if it is known to be flat.
+    Nothing need be known about the object. Wrong matches are detected and rejected; the motion must
+    explain more matches than chance would; the simplest of rotation, plane and general object that
+    the noise allows is selected; and if a second motion explains the matches as well, the result is
+    ambiguous and contains both. An object that is not flat requires eight matches. A plane through
+    few points may occur by chance, so a flat object requires about seven, or four if it is known to
+    be flat.
 
     Args:
-        points_px: the points in the current view, (N, 2), the surest first.
+        points_px: the points in the current view, (N, 2), the most reliable first.
         points_star_px: the same points in the desired view, (N, 2).
         camera: that took both images.
-        noise_px: standard deviation of a measured coordinate; the matches may show it to be up to
-            four times as large.
+        noise_px: standard deviation of a measured coordinate; the estimate from the matches may be
+            up to four times as large.
         reference: indices of three or more points that span the reference plane; by default the
             three that are spread most. A flat object is its own reference plane.
-        normal_hint: where the normal of a flat object is thought to point (desired frame, away
-            from the camera); it decides which of two motions comes first. Default: along the
-            optical axis.
+        normal_hint: assumed normal of a flat object (desired frame, away from the camera), which
+            determines the order of two possible motions; the optical axis by default.
         flat: whether the object is known to be flat.
 
     Returns:
-        the reconstruction, or why there is none.
+        The reconstruction, or why there is none.
 
     Raises:
         ShapeError: if the two lists differ in shape.

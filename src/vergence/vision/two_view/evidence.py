@@ -1,9 +1,9 @@
-"""Could chance alone make so many matches agree so well?
+"""Tests whether so many matches could agree so well by chance.
 
-An a-contrario test: if the matches were wrong, their points would lie anywhere within the region
-that the matches cover. The number of false alarms (NFA) is how many models, of all that are tried,
-would then be expected to fit k of n matches as well as the one at hand does [Moisan2004]. The
-largest error counted as agreeing is chosen to make the NFA least, so it adapts to the noise.
+An a-contrario test: if the matches were wrong, their points would lie anywhere in the region that
+the matches cover. The number of false alarms (NFA) is how many of all tried models would then be
+expected to fit k of n matches as well as the present one does [Moisan2004]. The threshold for
+agreement is the one that minimises the NFA, so it adapts to the noise.
 """
 
 from math import lgamma, log, pi
@@ -13,7 +13,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 
-CHANCE = -3.0  # log₁₀ of the NFA above which an agreement is taken for chance
+CHANCE = -3.0  # log₁₀ of the NFA above which an agreement is attributed to chance
 
 
 @njit(cache=True)
@@ -38,11 +38,11 @@ def least_false_alarms(
 
     Args:
         errors: of each match under the model, (N,), normalized coordinates.
-        sample: s, matches that determine a model.
-        outcomes: most models that one sample has.
-        power: 2 where a point has to lie in a disc of radius e, 1 where in a band to both sides.
-        log_density: natural logarithm of the chance of a random point at e = 1.
-        floor: least threshold: errors are not known better.
+        sample: s, number of matches that determine a model.
+        outcomes: largest number of models per sample.
+        power: 2 if a point must lie in a disc of radius e, 1 if in a band of half width e.
+        log_density: natural logarithm of the probability of a random point at e = 1.
+        floor: smallest threshold, since errors are not known better.
         ceiling: largest threshold.
     """
     count, least, threshold = len(errors), np.inf, 0.0
@@ -61,10 +61,10 @@ def least_false_alarms(
 
 @njit(cache=True)
 def log_densities(m_star: FloatArray, m: FloatArray) -> tuple[float, float]:
-    """Return the log-chances of a point in a disc, π e²/A, and in a band, 2 D e/A, at e = 1.
+    """Return the log-probabilities of a point in a disc, π e²/A, and in a band, 2 D e/A, at e = 1.
 
-    A and D are area and diagonal of the box around the matches, in the view where it is smaller:
-    matches crowded together prove less than matches spread over the image.
+    A and D are area and diagonal of the bounding box of the matches, in the view where it is
+    smaller: crowded matches prove less than matches spread over the image.
     """
     disc, band = -np.inf, -np.inf
     for points in (m_star, m):
@@ -80,14 +80,14 @@ def log_densities(m_star: FloatArray, m: FloatArray) -> tuple[float, float]:
 def log_chance_of_plane(count: int, flat: int, error: float, parallax: float) -> float:
     """Return log₁₀ of the NFA of a plane among the points of an object that is not flat.
 
-    Three points make a plane; each other point of a rigid object lies anywhere along its epipolar
+    Three points define a plane; each other point of a rigid object lies anywhere along its epipolar
     line, within the parallax of the relief: (n - 3) C(n, k) (2 e / parallax)^(k - 3).
 
     Args:
-        count: n, matches.
-        flat: k, of them on the plane.
-        error: e, largest of theirs.
-        parallax: what relief would move a point by.
+        count: n, number of matches.
+        flat: k, number of them on the plane.
+        error: e, their largest error.
+        parallax: displacement of a point by the relief.
     """
     if flat < 4 or not parallax > 0.0:
         return np.inf

@@ -1,4 +1,4 @@
-"""What explains the matches of two views: a motion, several, or none."""
+"""Explains the matches of two views by one motion, several, or none."""
 
 from dataclasses import dataclass, replace
 
@@ -26,10 +26,10 @@ from vergence.vision.two_view.fit import (
 )
 
 _GATE = 3.7  # standard deviations within which a match agrees (99.9 % of two coordinates)
-FLAT_CHANCE = -4.0  # log₁₀ of the NFA above which a plane is taken for chance
+FLAT_CHANCE = -4.0  # log₁₀ of the NFA above which a plane is attributed to chance
 _TOO_LARGE = 2.33  # standard deviations: 99 %, of the errors of few matches
 _FEWEST = 5  # matches that determine every model
-FEW = 16  # matches below which one alone may bend the motion
+FEW = 16  # matches below which a single one may distort the motion
 _ROUNDS = 2  # of fitting and finding the matches that agree
 
 
@@ -39,19 +39,19 @@ class Explanation:
 
     fits: list[Fit]  # the best first
     scale: float  # variance of the noise over the stated one, at least 1
-    views: Views  # all matches that may be used, agreeing or not
-    turned: int = 0  # other matches, which a turn of the camera alone explains
+    views: Views  # all usable matches, agreeing or not
+    turned: int = 0  # number of other matches, explained by a pure rotation of the camera
 
 
 def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
     """Find the motions that explain the matches.
 
-    If a turn of the camera explains most of them, they may be of a background: then the others are
-    tried alone, for an object that moves before it.
+    If a pure rotation of the camera explains most of them, they may belong to the background; then
+    the others are tried separately, for an object that moves in front of it.
 
     Args:
         views: all matches.
-        usable: which may be used, (N,).
+        usable: mask of those that may be used, (N,).
         flat: whether the object is known to be flat.
     """
     found = _explain_once(views, usable, flat)
@@ -75,7 +75,7 @@ def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoVie
 
 
 def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
-    """Return the first acceptable explanation, or why the likeliest is not."""
+    """Return the first acceptable explanation, or why the most likely one is not acceptable."""
     tried = views.take(usable)
     if len(tried) == 4 and flat:
         sets = [np.ones(4, dtype=np.bool_)]
@@ -125,7 +125,7 @@ def _settled(views: Views, kept: BoolArray) -> Comparison:
 
 
 def _without_chance(comparison: Comparison, views: Views, kept: BoolArray) -> BoolArray:
-    """Leave out the matches off a plane, if the plane is none by chance but they may be."""
+    """Drop the matches off a plane if the plane is significant but they may be due to chance."""
     general, plane = comparison.fits[0], comparison.plane
     near = kept & _agreeing(plane, comparison.scale, views)
     if np.count_nonzero(near) < 5 or log_chance_of_flatness(plane, views, near) > FLAT_CHANCE:
@@ -143,7 +143,7 @@ def _agreeing(fit: Fit, scale: float, views: Views) -> BoolArray:
 
 
 def _doubted(comparison: Comparison, views: Views, flat: bool) -> TwoViewFailure | None:
-    """Return why an explanation is rejected, if it is not."""
+    """Return why an explanation is rejected, None if it is not."""
     fit = comparison.fits[0]
     if flat and len(fit.views) == len(views):
         return None
@@ -159,7 +159,7 @@ def _doubted(comparison: Comparison, views: Views, flat: bool) -> TwoViewFailure
         )
     if fit.model == GENERAL and len(fit.views) < FEWEST_GENERAL:
         return _by_chance(views, len(fit.views))
-    few = fit.model == GENERAL and len(views) < FEW  # of more, the noise is estimated
+    few = fit.model == GENERAL and len(views) < FEW  # with more, the noise is estimated
     if few and fit.chi_square > chi_square_quantile(fit.freedom, _TOO_LARGE):
         return TwoViewFailure(
             TwoViewProblem.WRONG_MATCHES,

@@ -1,4 +1,4 @@
-"""Why two views told nothing."""
+"""The reason why two views give no reconstruction."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,7 +7,7 @@ from vergence.arrays import FloatArray
 
 
 class TwoViewProblem(StrEnum):
-    """The ways matched points can fail to determine motion and structure."""
+    """The ways in which matched points can fail to determine motion and structure."""
 
     TOO_FEW = "too few matches"
     COINCIDENT = "coincident points"
@@ -19,16 +19,16 @@ class TwoViewProblem(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TwoViewFailure:
-    """A failed reconstruction: false in a condition, with its reason."""
+    """A failed reconstruction, which is false as a condition, with its reason."""
 
     problem: TwoViewProblem
-    reason: str  # one sentence for a person
+    reason: str  # one sentence for the user
     rotation: FloatArray | None = None  # (3, 3) *R_c where at least that is known
 
     def __bool__(self) -> bool:
-        """A failure is false."""
+        """A failure is false as a condition."""
         return False
 
     def __str__(self) -> str:
-        """Problem and reason on one line."""
+        """Return problem and reason on one line."""
         return f"{self.problem.value}: {self.reason}"

@@ -1,4 +1,4 @@
-"""The models of what happened between two views, fitted and compared."""
+"""Models of the motion between two views, fitted and compared."""
 
 from typing import NamedTuple
 
@@ -16,30 +16,30 @@ from vergence.vision.two_view.motions import AIMED, TURNED, motion_minima, rotat
 
 ITERATIONS = 25  # most steps of bundle adjustment
 FEWEST_GENERAL = 8  # matches of an object that is not flat
-RIVAL = 13.8  # by how much χ² of a second motion must be larger: odds of one to a thousand
+RIVAL = 13.8  # χ² difference that excludes a second motion: odds of one to a thousand
 LIKELY = 1.64  # standard deviations: 95 %
-NO_PLANE = 4.5  # standard deviations beyond which a plane is no rival
-NOISE_FROM = 16  # matches from which on they tell how large the noise is
-_CAP = 13.8  # of χ² that a single match adds: one may be wrong
+NO_PLANE = 4.5  # standard deviations beyond which a plane is excluded
+NOISE_FROM = 16  # matches from which the noise can be estimated
+_CAP = 13.8  # on the χ² of a single match, which may be wrong
 _FAR = 21.1  # χ² of a rotation: one in ten thousand
-_MOTIONS = 4  # most that are adjusted
-_BEHIND = 0.1  # share of the points that may lie behind a camera: far ones, by the noise
+_MOTIONS = 4  # largest number that is adjusted
+_BEHIND = 0.1  # fraction of points that may lie behind a camera: distant ones, because of noise
 
 
 class Views:
-    """The matches in normalized coordinates, with the noise they are judged by."""
+    """The matches in normalized coordinates, with the noise assumed for them."""
 
     def __init__(
         self, m_star: FloatArray, m: FloatArray, weight: FloatArray, index: IntArray | None = None
     ) -> None:
         self.m_star, self.m, self.weight = m_star, m, weight
-        self.index = np.arange(len(m)) if index is None else index  # among all matches
+        self.index = np.arange(len(m)) if index is None else index  # index among all matches
 
     def __len__(self) -> int:
         return len(self.m)
 
     def take(self, chosen: BoolArray) -> "Views":
-        """Return the chosen matches alone."""
+        """Return a subset of the matches."""
         return Views(self.m_star[chosen], self.m[chosen], self.weight, self.index[chosen])
 
     @property
@@ -48,7 +48,7 @@ class Views:
         return float(np.mean(1.0 / self.weight))
 
     def adjust(self, model: int, state: TwoViewState) -> "Fit":
-        """Return a model at its best, from a first guess."""
+        """Return an optimised model, starting from a first guess."""
         state, residuals = bundle.adjust_bundle(
             model, state, self.m_star, self.m, self.weight, ITERATIONS
         )
@@ -56,7 +56,7 @@ class Views:
 
 
 class Fit:
-    """A model at its best."""
+    """An optimised model."""
 
     def __init__(
         self, views: Views, model: int, state: TwoViewState, residuals: FloatArray
@@ -68,24 +68,24 @@ class Fit:
 
     @property
     def front(self) -> BoolArray:
-        """Which points lie before both cameras, (N,)."""
+        """Which points are in front of both cameras, (N,)."""
         before: BoolArray = (self.state.w > 0.0) & (self.depths > 0.0)
         return before
 
     @property
     def depths(self) -> FloatArray:
-        """Of the points in the current camera over those in the desired one, (N,)."""
+        """Depths of the points in the current camera over those in the desired one, (N,)."""
         rays = np.column_stack((self.state.x_star, np.ones(len(self.views))))
         depths: FloatArray = rays @ self.state.R[2] + self.state.w * self.state.t[2]
         return depths
 
     def misses(self, scale: float) -> float:
-        """Return χ² with what a single match adds to it capped: one may be wrong."""
+        """Return χ² with a limited contribution of each match, since one may be wrong."""
         squares = np.sum(self.residuals**2, axis=1) / scale
         return float(np.minimum(squares, _CAP).sum())
 
     def differs_from(self, other: "Fit") -> bool:
-        """Return whether two motions of a general object are not one."""
+        """Return whether two motions of a general object are different."""
         turn = so3_log(np.ascontiguousarray(self.state.R.T @ other.state.R))
         cosine = np.clip(self.state.t @ other.state.t, -1.0, 1.0)
         return bool(np.linalg.norm(turn) > TURNED or np.arccos(cosine) > AIMED)
@@ -94,20 +94,20 @@ class Fit:
 class Comparison(NamedTuple):
     """The simplest model that explains the matches, and its rivals."""
 
-    fits: list[Fit]  # the chosen one, and all that the noise cannot tell from it
-    plane: Fit  # the best plane, chosen or not
+    fits: list[Fit]  # the selected one, and all that the noise cannot distinguish from it
+    plane: Fit  # the best plane, selected or not
     scale: float  # variance of the noise over the stated one, at least 1
 
 
 def compare_models(views: Views) -> Comparison:
-    """Choose among turn, plane and general object by likelihood ratio.
+    """Select among rotation, plane and general object by likelihood ratio.
 
-    The models are nested, so 2 log of the ratio is χ² with as many degrees of freedom as the
-    larger has unknowns more [Wilks1938]: a simpler model is kept unless that is beyond 99.9 %, and
-    not alone unless it is within 95 %. The noise is estimated from the largest model, since lens
-    and matcher may add to the stated noise; so a plane stays a rival unless the ratio of mean
-    squares excludes it, which counts how little so many matches tell of their noise. All local
-    minima of the general model are compared with each other as well.
+    The models are nested, so twice the log ratio is χ² with as many degrees of freedom as the
+    larger model has additional unknowns [Wilks1938]: a simpler model is kept unless the ratio
+    exceeds 99.9 %, but is the only one only within 95 %. The noise is estimated from the largest
+    model, since lens and matcher may add to the stated noise; a plane therefore remains a rival
+    unless the ratio of mean squares excludes it, which accounts for how little few matches reveal
+    about their noise. All local minima of the general model are compared with each other as well.
     """
     count = len(views)
     state = TwoViewState(
@@ -140,7 +140,7 @@ def compare_models(views: Views) -> Comparison:
         return Comparison([plane], plane, scale)
     if gain <= chi_square_quantile(unknowns[PLANE]):
         return Comparison([plane, *rivals], plane, scale)
-    # The noise that the largest model leaves is an estimate; and few matches are not to raise it.
+    # The noise left by the largest model is an estimate; few matches must not increase it.
     known = scale == 1.0 and count < NOISE_FROM
     deviate = normal_deviate_of_ratio(
         gain / unknowns[PLANE], unknowns[PLANE], np.inf if known else largest.freedom
@@ -149,10 +149,10 @@ def compare_models(views: Views) -> Comparison:
 
 
 def hinging_on_one(views: Views, best: Fit, scale: float) -> list[Fit]:
-    """Return the fits to all matches but one that lie far from the fit to all.
+    """Return the fits to all matches but one that are far from the fit to all.
 
-    A wrong match among few can bend the motion so that it agrees. If the motion without it is
-    another one, by the deviations of either, the matches do not decide.
+    A wrong match among few can distort the motion so that it agrees. If the motion without it
+    differs, by the deviations of either, the matches are inconclusive.
     """
     others: list[Fit] = []
     for j in range(len(views)):

@@ -25,10 +25,10 @@ _COLUMN = _columns()
 
 @njit(cache=True, error_model="numpy")
 def five_point_matrices(samples: IntArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the essential matrices (M, 3, 3) of samples (S, 5) of matches, up to ten a sample.
+    """Return the essential matrices (M, 3, 3) of samples (S, 5) of matches, up to ten per sample.
 
     Args:
-        samples: which matches each sample has.
+        samples: indices of the matches of each sample.
         m_star: points in the desired view, normalized, (N, 2).
         m: the same points in the current view, (N, 2): (m, 1)ᵀ E (m*, 1) = 0.
     """
@@ -119,7 +119,7 @@ def _eliminated(cubics: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def _rows_in_z(rest: FloatArray) -> FloatArray:
-    """Return three equations a(z) x + b(z) y + c(z) = 0, coefficients of rising powers (3, 3, 5).
+    """Return equations a(z) x + b(z) y + c(z) = 0, coefficients in ascending powers (3, 3, 5).
 
     Each is the difference of a row with a monomial times z, and z times the row with the monomial.
     """

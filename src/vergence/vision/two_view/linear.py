@@ -1,4 +1,4 @@
-"""Linear first guesses: the homography of a plane, and the essential matrix over three points."""
+"""Linear initial estimates: the homography of a plane, and the essential matrix by three points."""
 
 import numpy as np
 from numba import njit
@@ -43,8 +43,8 @@ def homogeneous(points: FloatArray) -> FloatArray:
 def smallest_direction(A: FloatArray) -> FloatArray:
     """Return the unit vector x with the smallest ‖A x‖.
 
-    By inverse iteration, from the unit vector that comes nearest: where the next smallest value is
-    far larger, as for points that tell the solution, a few steps reach rounding.
+    By inverse iteration, from the best unit vector: if the next smallest singular value is much
+    larger, as for points that determine the solution, a few steps reach rounding level.
     """
     inverse = cholesky_inverse(_lifted(transposed_times(A, A)))
     best = 0
@@ -63,7 +63,7 @@ def smallest_direction(A: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _lifted(S: FloatArray) -> FloatArray:
-    """Add so much to the diagonal of a symmetric S that it is positive definite beyond rounding."""
+    """Add to the diagonal of a symmetric S so that it is positive definite beyond rounding."""
     lift = _ROUNDING * np.trace(S) + 1e-300
     for i in range(len(S)):
         S[i, i] += lift
@@ -74,8 +74,8 @@ def _lifted(S: FloatArray) -> FloatArray:
 def linear_homography(m_star: FloatArray, m: FloatArray) -> FloatArray:
     """Solve m × (H m*) = 0 for H, (3, 3), from four or more points of a plane.
 
-    H has middle singular value 1, and the sign under which the points lie in front of both
-    cameras: Σ m·H m* > 0. [Mezouar2001] eq. (2) with β = 0, in normalized coordinates.
+    H has middle singular value 1, and the sign for which the points are in front of both cameras:
+    Σ m·H m* > 0. [Mezouar2001] eq. (2) with β = 0, in normalized coordinates.
 
     Args:
         m_star: points in the desired view, normalized, (N, 2).
@@ -103,7 +103,7 @@ def linear_essential(m_star: FloatArray, m: FloatArray, triple: IntArray) -> Flo
 
     In the basis of the three reference points the matrix has a zero diagonal and six unknowns
     ([Mezouar2001] section 3.1 after Malis and Chaumette; with three marks on each of three planes
-    there is no plane with four points and this route is the only linear one).
+    no plane has four points, and this is the only linear method).
 
     Args:
         m_star: points in the desired view, normalized, (N, 2).

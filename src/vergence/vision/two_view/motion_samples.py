@@ -1,9 +1,9 @@
-"""Motions of an object of any shape, drawn by how likely the matches make them.
+"""Motions of an object of any shape, sampled according to the likelihood of the matches.
 
-The error of a motion has narrow, bent valleys, as a turn and a motion aside look alike; and a
-wrong match near enough to its epipolar line bends the best motion towards itself. Neither shows in
-the covariance at the minimum. So motions are drawn from the likelihood of all matches, each of
-which may be wrong, and the covariance is that of the drawn motions about the best one.
+The error of a motion has narrow, curved valleys, since rotation and sideways translation look
+alike; and a wrong match close to its epipolar line attracts the best motion. Neither is visible in
+the covariance at the minimum. Motions are therefore sampled from the likelihood of all matches,
+each of which may be wrong, and the covariance is that of the samples about the best motion.
 """
 
 from typing import NamedTuple
@@ -36,20 +36,20 @@ from vergence.vision.two_view.small import (
 )
 from vergence.vision.two_view.widening import upsilon_between, widen
 
-TEMPERATURE = 3.0  # of the drawing, to reach what is unlikely, too; the moments are weighed back
+TEMPERATURE = 3.0  # of the sampling, to include unlikely motions; the moments are reweighted
 _WALKERS, _ROUNDS, _SETTLING = 48, 60, 20
 _STARTS = 24  # walkers that start from motions of five matches
-_NOISIER = np.log(4.0)  # most of the noise over the stated one
-_MANY = 16  # matches from which on they tell how large the noise is
-_FARTHEST = 1e-4  # least inverse depth, over that of the translation
-_FEWEST = 50  # samples with their reference plane before both cameras
-_LEAST = 16.0  # χ² below which a sample widens nothing: the moments hold those
-_ASIDE = 1.33  # of χ² over that of the samples: what their moments may miss
-_AHEAD = 0.1  # least cosine of the directions of translation of what is drawn and the best
+_NOISIER = np.log(4.0)  # largest ratio of the noise to the stated one
+_MANY = 16  # matches from which the noise can be estimated
+_FARTHEST = 1e-4  # smallest inverse depth, relative to that of the translation
+_FEWEST = 50  # samples with their reference plane in front of both cameras
+_LEAST = 16.0  # χ² below which a sample does not widen the covariance: the moments include it
+_ASIDE = 1.33  # factor on χ² relative to that of the samples: what their moments may miss
+_AHEAD = 0.1  # smallest cosine between the translation directions of a sample and the best motion
 
 
 class Likelihood(NamedTuple):
-    """How well motions explain matches, each of which may be wrong."""
+    """The likelihood of motions given matches, each of which may be wrong."""
 
     m_star: FloatArray  # (N, 2) in the desired view, normalized
     m: FloatArray  # (N, 2) in the current view
@@ -61,7 +61,7 @@ class Draws(NamedTuple):
     """The random numbers of a differential-evolution Markov chain, for each round and walker."""
 
     partners: IntArray  # (G, K, 2) two other walkers, whose difference is the step
-    length: FloatArray  # (G, K) of the step
+    length: FloatArray  # (G, K) factor on the step
     jitter: FloatArray  # (G, K, 6) standard normal
     threshold: FloatArray  # (G, K) −2 log of a uniform number
 
@@ -83,10 +83,10 @@ _DRAWS = _draws()
 
 
 def likelihood_of(m_star: FloatArray, m: FloatArray, noise: float, dropped: int) -> Likelihood:
-    """Return the likelihood of matches (N, 2) of which some did not agree with the best motion.
+    """Return the likelihood of matches (N, 2) of which some do not agree with the best motion.
 
     A wrong match lies anywhere in the region that the matches cover: its Sampson distance, which is
-    that from the line over √2, has the density √2 D/A.
+    its distance from the line over √2, has the density √2 D/A.
     """
     share = (dropped + 1.0) / (len(m) + 2.0)
     _, band = log_densities(m_star, m)
@@ -96,7 +96,7 @@ def likelihood_of(m_star: FloatArray, m: FloatArray, noise: float, dropped: int)
 
 @njit(cache=True)
 def unlikelihood(likelihood: Likelihood, E: FloatArray, log_noise: float) -> float:
-    """Return −2 log of the likelihood of an essential matrix, but for a constant.
+    """Return −2 log of the likelihood of an essential matrix, up to a constant.
 
     Args:
         likelihood: of the matches.
@@ -113,7 +113,7 @@ def unlikelihood(likelihood: Likelihood, E: FloatArray, log_noise: float) -> flo
 
 @njit(cache=True)
 def motion_at(R: FloatArray, t: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the motion at x = (ω, τ, …) about (R, t): exp(ω) R, and t + B τ made a unit vector."""
+    """Return the motion at x = (ω, τ, …) about (R, t): exp(ω) R, and t + B τ normalised."""
     turned = times(so3_exp(x[:3].copy()), R)
     return turned, unit(t + apply(tangent_basis(t), x[3:5].copy()))
 
@@ -127,7 +127,7 @@ def starting_walkers(
     matrices: FloatArray,
     count: int,
 ) -> FloatArray:
-    """Return where walkers start, (≤ count, 6): the likeliest motions of five matches, refined."""
+    """Return initial walkers, (≤ count, 6): the most likely motions of five matches, refined."""
     unlikely = np.empty(len(matrices))
     for k in range(len(matrices)):
         unlikely[k] = unlikelihood(likelihood, matrices[k], log_noise + np.log(2.0))
@@ -158,14 +158,14 @@ def draw_motions(
     starts: FloatArray,
     draws: Draws,
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw motions by a differential-evolution Markov chain [TerBraak2006].
+    """Sample motions by a differential-evolution Markov chain [TerBraak2006].
 
     Args:
         likelihood: of the matches.
         R: of the best motion, (3, 3).
         t: of the best motion, unit, (3,).
-        log_noise: of the noise over the stated one; it is drawn, too, from many matches.
-        starts: of some of the walkers, (S, 6); the others start near the best.
+        log_noise: of the noise over the stated one; sampled as well if there are many matches.
+        starts: initial walkers, (S, 6); the others start near the best motion.
         draws: random numbers.
 
     Returns:
@@ -215,9 +215,9 @@ def spread_of_motions(
     m: FloatArray,
     noise: FloatArray,
 ) -> tuple[FloatArray, int]:
-    """Return the covariance of Υ about a motion, (6, 6), and how many samples it rests on.
+    """Return the covariance of Υ about a motion, (6, 6), and the number of samples used.
 
-    It is the second moment of the samples, and is then widened to contain each of them.
+    It is the second moment of the samples, widened to contain each of them.
 
     Args:
         R: of the motion, (3, 3).
@@ -266,7 +266,7 @@ def covariance_of_likely(
     m_star: FloatArray,
     m: FloatArray,
 ) -> FloatArray | None:
-    """Return the covariance of Υ that the likely motions have about the best, (6, 6).
+    """Return the covariance of Υ over the likely motions about the best one, (6, 6).
 
     Args:
         likelihood: of all matches.
@@ -277,7 +277,7 @@ def covariance_of_likely(
         m: the same points in the current view, (K, 2).
 
     Returns:
-        the covariance, or None if the reference plane lies behind a camera for most of them.
+        The covariance, or None if the reference plane lies behind a camera for most of them.
     """
     log_noise = min(0.5 * float(np.log(scale)), float(_NOISIER))
     matrices = sampled_motions(likelihood.m_star, likelihood.m)
@@ -294,7 +294,7 @@ def covariance_of_likely(
 def translation_over_distance(
     R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray
 ) -> tuple[FloatArray, bool]:
-    """Return t_d = *t_c / d*, (3,), from the points of the reference plane; whether one is behind.
+    """Return t_d = *t_c / d*, (3,), by the reference plane's points, and whether one is behind.
 
     Args:
         R: of the motion, (3, 3).

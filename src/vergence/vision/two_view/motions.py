@@ -1,8 +1,8 @@
 """All motions at which the epipolar error of matched points has a local minimum.
 
-Little parallax, few points or a nearly flat object give the error several minima, some of which
-the noise cannot tell apart. So the descents start from motions spread over rotations and
-directions of translation, and from those of linear fits.
+With little parallax, few points or a nearly flat object, the error has several minima, some of
+which the noise cannot distinguish. The descents therefore start from motions spread over rotations
+and directions of translation, and from those of linear fits.
 """
 
 from typing import NamedTuple
@@ -22,9 +22,9 @@ from vergence.vision.two_view.linear import homogeneous, linear_essential, linea
 from vergence.vision.two_view.sampson import refine_essential
 from vergence.vision.two_view.small import dot, times, transposed_times, unit
 
-TURNED = 0.02  # rad, of the rotations of two motions that are not one
-AIMED = 0.1  # rad, of their directions of translation
-_POINTS = 24  # most points for the first descents
+TURNED = 0.02  # rad, difference of rotation that makes two motions distinct
+AIMED = 0.1  # rad, and of their directions of translation
+_POINTS = 24  # largest number of points for the first descents
 _DIRECTIONS = np.array(
     [
         *((1, 0, 0), (0, 1, 0), (0, 0, 1)),
@@ -51,7 +51,7 @@ def essential(R: FloatArray, t: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def rotation_between(m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the rotation R that best turns the desired rays into the current ones."""
+    """Return the rotation R that best maps the desired rays to the current ones."""
     a, b = homogeneous(m_star), homogeneous(m)
     for j in range(len(a)):
         a[j], b[j] = unit(a[j]), unit(b[j])
@@ -62,7 +62,7 @@ def rotation_between(m_star: FloatArray, m: FloatArray) -> FloatArray:
 def choose_motion(
     E: FloatArray, m_star: FloatArray, m: FloatArray
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Return the motion (R, t) of E that puts most points before both cameras, and their number."""
+    """Return the motion (R, t) of E with most points in front of both cameras, and their number."""
     rotations, translations = decompose_essential(E)
     best, most = 0, -1
     for k in range(4):
@@ -74,7 +74,7 @@ def choose_motion(
 
 @njit(cache=True)
 def _starts(m_star: FloatArray, m: FloatArray, triples: int) -> tuple[FloatArray, FloatArray]:
-    """Return motions to start from, R (S, 3, 3) and t (S, 3)."""
+    """Return initial motions, R (S, 3, 3) and t (S, 3)."""
     plane_R, plane_t, _ = decompose_homography(linear_homography(m_star, m))
     turn = rotation_between(m_star, m)
     count = 3 * len(_DIRECTIONS) + 2 + triples
@@ -108,13 +108,13 @@ def _is_new(R: FloatArray, t: FloatArray, motions: Motions, count: int) -> bool:
 
 @njit(cache=True)
 def motion_minima(m_star: FloatArray, m: FloatArray, most: int, penalty: float) -> Motions:
-    """Return the motions of an object of any shape that explain its matches locally best.
+    """Return the motions of an object of any shape that are local optima for its matches.
 
     Args:
         m_star: points in the desired view, normalized, (N, 2), N ≥ 8.
         m: the same points in the current view, (N, 2).
-        most: how many motions at most.
-        penalty: what a point behind a camera adds to the cost.
+        most: largest number of motions.
+        penalty: cost of a point behind a camera.
     """
     stride = max(1, len(m) // _POINTS)
     few_star, few = m_star[::stride].copy(), m[::stride].copy()

@@ -1,11 +1,11 @@
-"""Polynomials as coefficients of rising powers: value, product, real roots."""
+"""Polynomials as coefficients in ascending powers: value, product, real roots."""
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
 
-_STEPS = 100  # most steps to a root; Newton's take about six
+_STEPS = 100  # largest number of steps to a root; Newton's method takes about six
 
 
 @njit(cache=True, error_model="numpy")
@@ -20,7 +20,7 @@ def product_of(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def value_at(p: FloatArray, x: float) -> float:
-    """Return p(x), by Horner."""
+    """Return p(x), by Horner's method."""
     total = 0.0
     for i in range(len(p) - 1, -1, -1):
         total = total * x + p[i]
@@ -29,9 +29,9 @@ def value_at(p: FloatArray, x: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def real_roots(p: FloatArray) -> FloatArray:
-    """Return the real roots of a polynomial, its coefficients (n + 1,) of rising powers.
+    """Return the real roots of a polynomial with coefficients (n + 1,) in ascending powers.
 
-    Those beyond ±1 are found as inverse roots of the reversed polynomial. A double root may be
+    Roots beyond ±1 are found as inverse roots of the reversed polynomial. A double root may be
     missed.
     """
     far = roots_within_one(p[::-1].copy())
@@ -42,12 +42,12 @@ def real_roots(p: FloatArray) -> FloatArray:
 def roots_within_one(p: FloatArray) -> FloatArray:
     """Return the real roots from -1 to 1 of a polynomial, as `real_roots` does.
 
-    Between two neighbouring roots of its derivative a polynomial has one root or none: the roots of
-    every derivative are found from the next one's.
+    Between two neighbouring roots of its derivative a polynomial has one root or none, so the roots
+    of each derivative are found from those of the next.
     """
     n = len(p) - 1
     q, roots = p.copy(), np.empty(0)
-    for d in range(1, n + 1):  # the derivative of degree d, but for a factor
+    for d in range(1, n + 1):  # the derivative of degree d, up to a factor
         for i in range(d + 1):
             q[i] = p[i + n - d]
             for k in range(n - d):
@@ -68,7 +68,7 @@ def roots_within_one(p: FloatArray) -> FloatArray:
 def _root_between(p: FloatArray, low: float, high: float, rises: bool) -> float:
     """Return the root in an interval at whose ends the signs differ.
 
-    By Newton's steps; where they leave the interval or do not shrink by half, it is halved.
+    By Newton's method; if a step leaves the interval or does not halve it, it is bisected.
     """
     x, before = 0.5 * (low + high), high - low
     for _ in range(_STEPS):

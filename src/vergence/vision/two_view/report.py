@@ -1,4 +1,4 @@
-"""From a fitted model to the scaled Euclidean reconstruction, with what it leaves open."""
+"""The scaled Euclidean reconstruction from a fitted model, with its ambiguities."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,36 +23,36 @@ from vergence.vision.two_view.motion_samples import covariance_of_likely, likeli
 from vergence.vision.two_view.result import TwoView
 from vergence.vision.two_view.widening import DRAWS, widen_for_plane
 
-_EDGE_ON = 6.0  # deviations: from a line, of the points of a plane that is seen edge-on
+_EDGE_ON = 6.0  # deviations from a line of the points of a plane that is seen edge-on
 
 
 class Report(NamedTuple):
-    """What a reconstruction is to be told in."""
+    """The settings for reporting a reconstruction."""
 
     total: int  # matches
     reference: IntArray | None  # indices of points that span the reference plane
-    hint: FloatArray  # (3,) where the normal of a flat object is thought to point
+    hint: FloatArray  # (3,) assumed normal of a flat object
     noise_px: float  # stated
 
     def of(self, found: Explanation) -> TwoView | TwoViewFailure:
-        """Return the likeliest motion with its alternatives."""
+        """Return the most likely motion with its alternatives."""
         motions: list[TwoView] = []
         general = [fit for fit in found.fits if fit.model == GENERAL]
         for fit in found.fits:
             told = self._of_plane(fit, found) if fit.model == PLANE else self._of_any(fit, found)
             if isinstance(told, TwoViewFailure):
-                if fit is general[0]:  # what is left would hide the likeliest
+                if fit is general[0]:  # the remaining ones would hide the most likely one
                     return told
             else:
                 motions += told
         if not motions:
             return TwoViewFailure(
-                TwoViewProblem.WRONG_MATCHES, "what explains the matches lies behind a camera"
+                TwoViewProblem.WRONG_MATCHES, "the points would lie behind a camera"
             )
         return _with_doubt(motions, found.turned)
 
     def _of_plane(self, fit: Fit, found: Explanation) -> list[TwoView]:
-        """Return the motions behind a homography, that whose normal is along the hint first."""
+        """Return the motions behind a homography, first the one whose normal is along the hint."""
         H = fit.state.R + np.outer(fit.state.t, fit.state.n)
         H = H / np.linalg.svd(H)[1][1]
         motions = zip(*decompose_homography(H), strict=True)
@@ -160,14 +160,14 @@ class Report(NamedTuple):
         return inliers
 
     def _spread(self, values: FloatArray, fit: Fit) -> FloatArray:
-        """Return values of the inliers at their places among all matches, NaN elsewhere."""
+        """Return values of the inliers at their indices among all matches, NaN elsewhere."""
         result = np.full((self.total, *values.shape[1:]), np.nan)
         result[fit.views.index] = values
         return result
 
 
 def _widened(motions: list[TwoView], fit: Fit, scale: float) -> list[TwoView]:
-    """Let the covariances of the motions behind a homography contain those of all likely ones."""
+    """Make the covariances of the motions behind a homography contain those of all likely ones."""
     if not motions:
         return motions
     covariances = np.array([motion.covariance for motion in motions])
@@ -187,7 +187,7 @@ def _widened(motions: list[TwoView], fit: Fit, scale: float) -> list[TwoView]:
 
 
 def _with_doubt(motions: list[TwoView], turned: int) -> TwoView:
-    """Return the best with its alternatives, and in words what the matches do not decide."""
+    """Return the best motion with its alternatives, and what the matches do not determine."""
     best, others, doubts = motions[0], motions[1:], []
     if others:
         apart = ", ".join(f"{best.apart_deg(other):.0f}°" for other in others)

@@ -1,4 +1,4 @@
-"""What two views tell of an unknown object."""
+"""The result of two-view geometry for an unknown object."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ from vergence.geometry import se3, so3_log
 class TwoView:
     """The scaled Euclidean reconstruction of [Mezouar2001] section 3.1.
 
-    Lengths are in units of d*, the unknown distance of the desired camera from the reference
-    plane n*·X* = d*. Entries of matches that were dropped are NaN.
+    Lengths are in units of d*, the unknown distance of the desired camera from the reference plane
+    n*·X* = d*. Entries of rejected matches are NaN.
     """
 
     rotation: FloatArray  # (3, 3) *R_c: orientation of the current camera in the desired frame
-    translation: FloatArray  # (3,) t_d = *t_c / d*: place of the current camera, same frame
+    translation: FloatArray  # (3,) t_d = *t_c / d*: position of the current camera, same frame
     normal: FloatArray  # (3,) n*, unit, in the desired frame
     m_star: FloatArray  # (N, 2) normalized coordinates in the desired view, adjusted
     rho_star: FloatArray  # (N,) Z*/d*
@@ -27,12 +27,12 @@ class TwoView:
     inliers: BoolArray  # (N,) matches that agree with the motion
     planar: bool  # whether a plane explains the object within the noise
     rms_px: float  # of the reprojection in both views, inliers only
-    noise_px: float  # standard deviation of a coordinate that the covariance rests on
+    noise_px: float  # standard deviation of a coordinate, used for the covariance
     alternatives: "tuple[TwoView, ...]" = ()  # other motions that explain the matches as well
-    doubt: str = ""  # what the matches do not decide, and what would; empty if certain
+    doubt: str = ""  # what the matches do not determine, and what would; empty if certain
 
     def __bool__(self) -> bool:
-        """A reconstruction is a success."""
+        """A reconstruction is true as a condition."""
         return True
 
     @property
@@ -42,7 +42,7 @@ class TwoView:
 
     @property
     def alternative(self) -> "TwoView | None":
-        """The likeliest of the other motions, if there are any."""
+        """The most likely of the other motions, if there are any."""
         return self.alternatives[0] if self.alternatives else None
 
     def apart_deg(self, other: "TwoView") -> float:

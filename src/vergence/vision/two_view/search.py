@@ -1,4 +1,4 @@
-"""Models that many matches agree on, found by random samples and judged against chance."""
+"""Models that many matches agree on, found by random samples and tested against chance."""
 
 from itertools import combinations
 from math import comb
@@ -15,23 +15,23 @@ from vergence.vision.two_view.motions import choose_motion, essential
 from vergence.vision.two_view.sampson import refine_essential
 from vergence.vision.two_view.small import apply, inverse3, times, transposed_apply
 
-PLANE_SAMPLES = 400  # most samples of four matches
-MOTION_SAMPLES = 150  # most samples of five
-_FLOOR = 1.0  # least threshold, standard deviations of the stated noise
-_MANY = 16  # matches from which on they tell how large the noise is
+PLANE_SAMPLES = 400  # largest number of samples of four matches
+MOTION_SAMPLES = 150  # largest number of samples of five
+_FLOOR = 1.0  # smallest threshold, standard deviations of the stated noise
+_MANY = 16  # matches from which the noise can be estimated
 
 
 class Agreement(NamedTuple):
     """The matches that agree on one model."""
 
     log_alarms: float  # log₁₀ of the number of false alarms
-    error: float  # largest of an agreeing match, normalized coordinates
+    error: float  # largest error of an agreeing match, normalized coordinates
     kept: BoolArray  # (N,)
     errors: FloatArray  # (N,) of all matches, normalized coordinates
 
     @property
     def size(self) -> int:
-        """How many agree."""
+        """Number of agreeing matches."""
         return int(np.count_nonzero(self.kept))
 
 
@@ -39,7 +39,7 @@ def ceiling(count: int) -> float:
     """Return the largest threshold, in standard deviations of the stated noise.
 
     It is three deviations of noise up to four times as large as stated, or up to twice as large
-    if there are few matches.
+    with few matches.
     """
     return 12.0 if count >= _MANY else 6.0
 
@@ -84,9 +84,9 @@ def _agreement(log_alarms: float, error: float, errors: FloatArray) -> Agreement
 
 
 def _samples(count: int, size: int, most: int) -> IntArray:
-    """Return samples of matches, (S, size): all if there are few, else the same for one count.
+    """Return samples of matches, (S, size): all if there are few, else the same for equal counts.
 
-    Half of them are drawn from the better half of the matches, as the surest come first.
+    Half of them come from the better half of the matches, since the best come first.
     """
     if comb(count, size) <= most:
         return np.array(list(combinations(range(count), size)), dtype=np.int64)
@@ -138,7 +138,7 @@ def _best_plane(
     least, threshold, errors = np.inf, 0.0, np.full(len(m), np.inf)
     for sample in samples:
         chosen = sample
-        for _ in range(3):  # of the sample, then twice of all that agree
+        for _ in range(3):  # from the sample, then twice from all that agree
             H = linear_homography(m_star[chosen], m[chosen])
             tried = transfer_errors(H, m_star, m)
             alarms, gate = least_false_alarms(tried, 4, 1, 2, density, floor, ceiling)

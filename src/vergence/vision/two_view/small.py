@@ -1,6 +1,6 @@
-"""Products and inverses of matrices with a few rows, where a call to BLAS costs more than the sum.
+"""Products and inverses of matrices with a few rows, for which a BLAS call costs more than the sum.
 
-They take any memory layout, and compile in a fraction of the time.
+They accept any memory layout, and compile in a fraction of the time.
 """
 
 import numpy as np
@@ -74,7 +74,7 @@ def cross(x: FloatArray, y: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def inverse3(A: FloatArray) -> FloatArray:
-    """Return A⁻¹ of A (3, 3) by its cofactors; infinite or NaN where A is singular."""
+    """Return A⁻¹ of A (3, 3) by its cofactors; infinite or NaN if A is singular."""
     B = np.empty((3, 3))
     for k in range(3):
         B[k] = cross(A[:, (k + 1) % 3], A[:, (k + 2) % 3])
@@ -95,7 +95,7 @@ def unit(x: FloatArray) -> FloatArray:
 def symmetric_eigen(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the eigenvalues (n,), ascending, and eigenvectors (n, n), columns, of a symmetric A.
 
-    By Jacobi's rotations, which for three rows are done before LAPACK has begun.
+    By Jacobi rotations, which for three rows finish before LAPACK has started.
     """
     n = len(A)
     D, V = A.copy(), np.eye(n)
@@ -117,7 +117,7 @@ def symmetric_eigen(A: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @njit(cache=True)
 def _rotate(D: FloatArray, V: FloatArray, i: int, j: int) -> None:
-    """Turn rows and columns i and j of a symmetric D, in place, so that D[i, j] vanishes."""
+    """Rotate rows and columns i and j of a symmetric D, in place, so that D[i, j] vanishes."""
     half = (D[j, j] - D[i, i]) / (2.0 * D[i, j])
     t = np.copysign(1.0, half) / (abs(half) + np.sqrt(half * half + 1.0))
     c = 1.0 / np.sqrt(t * t + 1.0)
