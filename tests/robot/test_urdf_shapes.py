@@ -77,7 +77,7 @@ UNDRAWN = {
     "seen.dae": (b"<COLLADA/>", r"format that MuJoCo does not read \(\.dae\): convert it to STL"),
     "gone.stl": (None, "is missing"),
     "broken.stl": (b"\0" * 90, "cannot be drawn"),
-    "short.stl": (b"solid b\nfacet normal 0 0 0\nouter loop\nvertex 0 0", "breaks off"),
+    "short.stl": (b"solid b\nfacet normal 0 0 0\nouter loop\nvertex 0 0", "incomplete"),
     "empty.stl": (b"solid b\nendsolid b\n" + b" " * 80, "without triangles"),
     "nan.stl": (ascii_stl(CORNERS).replace(b"0.1", b"nan"), "without triangles"),
     "broken.obj": (b"nonsense", "cannot be drawn"),
