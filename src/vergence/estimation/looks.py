@@ -1,4 +1,4 @@
-"""Intermediate data of the tracking loop about an image."""
+"""What the tracking loop keeps of an image while it processes it."""
 
 from typing import NamedTuple
 
@@ -8,19 +8,19 @@ from vergence.signals import Frame, ImagePoints
 
 
 class Expected(NamedTuple):
-    """The prediction at an exposure."""
+    """What is expected at an exposure."""
 
     T_world_target: FloatArray  # (4, 4) predicted
-    covariance: FloatArray  # (12, 12) of the prediction
-    doubt: float  # fraction of recent points that disagreed
+    covariance: FloatArray  # (12, 12) of that prediction
+    doubt: float  # share of the last points that disagreed
     certain: bool  # whether the filter is consistent
 
 
 class Predicted(NamedTuple):
-    """The C images of a tick, in order of exposure, with their predictions."""
+    """The C images of a tick, in order of exposure, with what is expected of them."""
 
     frames: tuple[Frame, ...]
-    numbers: IntArray  # (C,) indices of their cameras in the rig
+    numbers: IntArray  # (C,) of their cameras in the rig
     T_world_camera: FloatArray  # (C, 4, 4)
     T_camera_world: FloatArray  # (C, 4, 4)
     T_world_target: FloatArray  # (C, 4, 4) predicted for each exposure
@@ -29,15 +29,15 @@ class Predicted(NamedTuple):
 
     @property
     def newest(self) -> Expected:
-        """The prediction for the last image."""
+        """What is expected of the last image."""
         return self.expected[-1]
 
 
 class Look(NamedTuple):
-    """The measurement of an image."""
+    """What was measured in an image."""
 
     number: int  # of the image
-    features: IntArray  # (K,) chosen features, at least one
-    half_px: FloatArray  # (K, 2) half sizes of their windows
+    features: IntArray  # (K,) chosen, one at least
+    half_px: FloatArray  # (K, 2) half the sizes of their windows
     found: ImagePoints  # K points
-    view: View  # of the usable points
+    view: View  # of those that are usable

@@ -1,4 +1,4 @@
-"""The interfaces that perception needs: camera poses, and points measured in windows."""
+"""What perception asks of others: the poses of its cameras, and points inside windows."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -14,10 +14,10 @@ from vergence.signals import Frame, ImagePoints, SearchWindows
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)
 CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
-# find(frame) -> all features of the target, wherever they are in the image, or None
+# find(frame) -> all features of the target wherever they are in the image, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
-UNSEEN = (  # the reason for each `ViewStatus`
+UNSEEN = (  # a reason for each `ViewStatus`
     "not chosen",
     "behind the camera",
     "outside the image",
@@ -38,15 +38,14 @@ class Measure(Protocol):
         half_px: FloatArray,
         T_camera_target: FloatArray,
     ) -> ImagePoints:
-        """Return the requested K points, in that order.
+        """Return the K points asked for, in that order.
 
         Args:
             frame: the image.
-            features: indices of the target's features, (K,).
-            points_px: expected positions: the windows' centres, (K, 2).
+            features: which features of the target, (K,).
+            points_px: where they are expected: the windows' centres, (K, 2).
             half_px: half the width and height of the windows, (K, 2).
-            T_camera_target: the expected pose, (4, 4), which determines the appearance of edges and
-                marks.
+            T_camera_target: the expected pose, (4, 4): how edges and marks will lie.
         """
         ...
 
@@ -58,18 +57,17 @@ def every_point(
     agreeing: Sequence[IntArray],
     widest_px: float,
 ) -> tuple[ImagePoints, ...]:
-    """Return the image points of all M features in each of C images, whether searched for or not.
+    """Return the image points of all M features of each of C images, whether looked for or not.
 
-    A feature that was not found gets its expected position, with a covariance as large as the
-    largest window, and the reason. Images share arrays, since most of many images are not
-    evaluated.
+    A feature that was not found gets its expected place, with a covariance as wide as the
+    widest window and the reason. The images share arrays: most of many are not even looked at.
 
     Args:
         frames: the images, C.
-        visibility: their predicted visibility.
-        looks: the measurements of some of them.
-        agreeing: for each measurement, the indices of the features that agree with the pose.
-        widest_px: half size of the largest window.
+        visibility: what was expected of them.
+        looks: what was measured in some of them.
+        agreeing: for each look, the numbers of the features that agree with the pose.
+        widest_px: half the widest window.
     """
     places = visibility.points_px.copy()
     covariance = np.zeros((*places.shape, 2))
@@ -107,6 +105,6 @@ def every_point(
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:
-    """Return the same points, all marked as not found for one reason."""
+    """Return the same points, none of them found, all for one reason."""
     none = np.zeros(len(points.found), dtype=np.bool_)
     return replace(points, found=none, reasons=(why,) * len(none))

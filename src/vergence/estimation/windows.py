@@ -1,4 +1,4 @@
-"""Search windows around predicted features."""
+"""Where to look: windows around predicted features."""
 
 from dataclasses import dataclass
 
@@ -54,16 +54,16 @@ def window_sizes(
 
 @dataclass(frozen=True, slots=True)
 class WindowRule:
-    """Size of a window: half = border + deviations · √(H P Hᵀ + noise²), within bounds.
+    """How large a window is: half = border + deviations · √(H P Hᵀ + noise²), within bounds.
 
-    P is the inflated covariance, so windows widen automatically while the filter is inconsistent. A
-    window that is too small would act as a gate and exclude what the filter needs to see.
+    P is the honest covariance, so windows widen by themselves while the filter is inconsistent. A
+    window that is too small silently gates what the filter would need to see.
     """
 
     deviations: float = 4.0
-    border_px: float = 6.0  # needed by the extractor around a feature
-    least_px: float = 8.0  # lower bound on half a window
-    most_px: float = 96.0  # upper bound on half a window
+    border_px: float = 6.0  # what the extractor needs around a feature
+    least_px: float = 8.0  # half a window, at least
+    most_px: float = 96.0  # half a window, at most
 
     def __post_init__(self) -> None:
         if not 0.0 < self.least_px <= self.most_px:
@@ -75,10 +75,10 @@ class WindowRule:
         """Return half the width and height of each window, (M, 2), px.
 
         Args:
-            spread: standard deviation of the predicted points, normalized, (M, 2).
+            spread: of the predicted points, normalized, (M, 2).
             focal_px: (fx, fy) of the camera, (2,).
             noise_px: expected standard deviation of a measured point.
-            scale: factor on the whole window, above 1 for a filter in doubt.
+            scale: of the whole window, above 1 for a filter in doubt.
         """
         sizes: FloatArray = window_sizes(
             spread,
