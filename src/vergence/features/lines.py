@@ -14,8 +14,8 @@ from vergence.parts import as_part
 class Lines(Feature):
     """Lines x cos θ + y sin θ = ρ through pairs of points: s = (ρ1, θ1, …) [Espiau1992].
 
-    θ is the direction of the normal that points to the right of the direction from the first point
-    to the second, so a line differs from itself turned by half a turn.
+    θ is the direction of the normal that points to the left of the direction from the first point
+    to the second, as seen in the image, so a line differs from itself turned by half a turn.
     """
 
     def value(self) -> FloatArray:

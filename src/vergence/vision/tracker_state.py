@@ -1,12 +1,11 @@
-"""The memory of the SSD tracker and the kernel that brings it from one image to the next.
+"""The state of the SSD tracker, and the kernel that updates it from one image to the next.
 
-Two templates serve two ends. The search, which must not miss, searches for the window of the last
-image in which the point was found, as [Nelson1995] eq. (19) compares successive images. The
-place, which must not drift, comes from an affine alignment to a key template that stays as long
-as the measured change of form since it was taken is small; the sub-pixel offset of the point goes
-with it.
+Two templates serve two purposes. The search, which must not miss, uses the window of the last image
+in which the point was found, as [Nelson1995] eq. (19) compares successive images. The position,
+which must not drift, comes from an affine alignment to a key template that is kept as long as the
+measured change of form since it was taken is small; the point's sub-pixel offset is kept with it.
 
-Kernels that only kernels call are inlined: numba would compile each, and all it calls, once more.
+Kernels that only kernels call are inlined: numba would compile each again, with all its callees.
 """
 
 from typing import NamedTuple
@@ -49,35 +48,36 @@ REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or 
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
 LOST_CORRELATION = 0.75
 LOST_SHIFT_PX = 4.0  # search and alignment must agree within this
-SAME_PX = 2.0  # nearer than this places are one: the alignment leads to the same
-PROMISING = 0.3  # least correlation before an alignment that is worth one
-MOST_PLACES = 12  # where a point may be: by the search, as expected, as neighbours move, by twins
-TWINS = 2  # nearest look-alikes of a point that are remembered
+SAME_PX = 2.0  # closer positions are the same: the alignment converges to the same
+PROMISING = 0.3  # smallest correlation before an alignment that makes it worthwhile
+MOST_PLACES = 12  # candidate positions of a point: search, expected, neighbours' motion, twins
+TWINS = 2  # nearest look-alikes of a point that are stored
 TWIN_RANGE_PX = 16.0  # within which they are searched for in the first image
-TWIN_STEP_PX = 3.0  # and how densely: an alignment that starts so near finds its place
-ALIKE = 0.05  # places whose correlation is within this of the search's look like the point, too
-NEIGHBOURS = 5  # points whose motion tells between places that look alike
+TWIN_STEP_PX = 3.0  # and step of that search: an alignment started this close converges
+ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
+NEIGHBOURS = 5  # points whose motion decides between look-alikes
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
-AT_BORDER_PX = 20.0  # a point lost when expected so near the border has probably left
-FIT_PX = 8.0  # this far from the border at least: half of the 16 × 16 window
-CONSENSUS = 3  # points found that say where the others may have gone
-LOOK_AGAIN_PX = 6.0  # if they moved this far at least
+AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
+FIT_PX = 8.0  # smallest distance from the border: half of the 16 × 16 window
+CONSENSUS = 3  # points found that predict where the others may have moved
+LOOK_AGAIN_PX = 6.0  # if they moved at least this far
 _WEIGHTS = ROOT_WEIGHTS.astype(np.float64) ** 2
-# Information of noise alone, px⁻², over its variance. A central difference has half the variance
-# of a pixel; half of the residual's is the template's; taken twice.
+# Information from noise alone, px⁻², over its variance. A central difference has half the variance
+# of a pixel; half of the residual's is the template's; doubled for safety.
 NOISE_GRADIENT = float(0.5 * _WEIGHTS.sum() ** 2 / (_WEIGHTS**2).sum())
-EDGE = 0.15  # of the information across: what is less along it may be of steps in the pixels' grid
+EDGE = 0.15  # of the information across: less along it may come from the pixel grid
 TURNED = 0.06  # rad, standard deviation of a patch's direction along an edge
-FLOOR_PX = 0.01  # standard deviation that no alignment beats: interpolation, quantised grey levels
+FLOOR_PX = 0.01  # lower bound on the standard deviation: interpolation, quantised grey levels
 
 FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(8)
 
 
 class TrackerState(NamedTuple):
-    """All that the tracker knows about M points with up to K key templates each.
+    """The state of the tracker for M points with up to K key templates each.
 
-    Few arrays, since each costs a call from Python 0.2 µs; the functions below say what is where.
+    In few arrays, since each costs 0.2 µs per call from Python; the functions below access the
+    parts.
     """
 
     places: FloatArray  # (M, 12) px where last found; affine 2 × 2 from first image to last; search
@@ -87,12 +87,12 @@ class TrackerState(NamedTuple):
     inverse: FloatArray  # (M, K, 2, 8, 8) of the key templates
     facts: FloatArray  # (M, K, 16) of the key templates: 4 of the alignment; affine 2 × 2 from the
     # first image to the template's; covariance 2 × 2 of the point's place in it, px²; spread 2 × 2
-    keys: IntArray  # (M, 2) how many key templates there are, and which one is in use
-    memory: Patch  # what the kernels write to
-    corner: NDArray[np.int32]  # likewise
+    keys: IntArray  # (M, 2) number of key templates, and index of the one in use
+    memory: Patch  # work memory of the kernels
+    corner: NDArray[np.int32]  # work memory of the kernels
 
 
-# Columns of what the kernel answers for each point.
+# Columns of the kernel's result for each point.
 PLACE, COVARIANCE = slice(0, 2), slice(2, 6)  # px, px²
 RESIDUAL, CORRELATION, DETAIL, VERDICT = 6, 7, 8, 9  # detail: the number behind the verdict
 COLUMNS = 10
@@ -188,7 +188,7 @@ def stretch(A: FloatArray) -> float:
 
 @njit(cache=True, inline="always")
 def add_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArray) -> None:
-    """Take a new key template of point k where it is; a full memory loses its newest."""
+    """Store a new key template of point k at its position; replaces the newest if full."""
     key = min(state.keys[k, 0], KEYS - 1)
     x, y = state.places[k, 0], state.places[k, 1]
     fill_template(image, anchor_of(x), anchor_of(y), x, y, key_template_of(state, k, key))
@@ -199,7 +199,7 @@ def add_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArr
 
 @njit(cache=True, inline="always")
 def renew_search(image: ImageArray, state: TrackerState, k: int) -> None:
-    """Take the window at point k as what to search for next."""
+    """Use the window at point k as the next search template."""
     x, y = state.places[k, 0], state.places[k, 1]
     anchor_x, anchor_y = anchor_of(x), anchor_of(y)
     memory = state.memory[:256].reshape(16, 16)
@@ -209,7 +209,7 @@ def renew_search(image: ImageArray, state: TrackerState, k: int) -> None:
 
 @njit(cache=True)
 def start_points(image: ImageArray, state: TrackerState) -> None:
-    """Take the first templates of all points whose window fits into the image."""
+    """Create the first templates of all points whose window fits into the image."""
     height, width = image.shape
     for k in range(len(state.places)):
         if fits(state.places[k, 0], state.places[k, 1], width, height):
@@ -220,13 +220,13 @@ def start_points(image: ImageArray, state: TrackerState) -> None:
 
 @njit(cache=True, inline="always")
 def twins_of(state: TrackerState, k: int) -> FloatArray:
-    """Offsets of the places in the first image that look like point k, (TWINS, 2), 0 if none."""
+    """Offsets of the positions in the first image that look like point k, (TWINS, 2), 0 if none."""
     return state.places[k, 8:].reshape(TWINS, 2)
 
 
 @njit(cache=True, inline="always")
 def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
-    """Find the nearest places in the first image that would be taken for point k."""
+    """Find the nearest positions in the first image that could be confused with point k."""
     twins, place = twins_of(state, k), np.empty(COLUMNS + 4)
     x, y = state.places[k, 0], state.places[k, 1]
     distances = np.full(TWINS, np.inf)
@@ -247,9 +247,9 @@ def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
 
 @njit(cache=True, inline="always")
 def choose_key(image: ImageArray, state: TrackerState, k: int, covariance: FloatArray) -> None:
-    """Keep the key template, go back to an older one whose form is near, or take a new one.
+    """Keep the key template, return to an older one of similar form, or take a new one.
 
-    Going back undoes whatever drift the newer ones have brought.
+    Returning to an older one undoes the drift of the newer ones.
     """
     active, nearest, best = state.keys[k, 1], np.inf, state.keys[k, 1]
     affine = affine_of(state, k)
@@ -281,7 +281,7 @@ def judge(found: Alignment, shift: float, change: float) -> tuple[int, float]:
 
 @njit(cache=True, inline="always")
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
-    """Find point k alone, expected at out[PLACE], in an image; returns the verdict."""
+    """Find point k alone, expected at out[PLACE], in an image; return the verdict."""
     places = np.empty((MOST_PLACES, COLUMNS + 4))
     settle_all(image, k, state, out, places)
     if out[VERDICT] == FOUND:
@@ -293,19 +293,20 @@ def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray)
 def settle_all(
     image: ImageArray, k: int, state: TrackerState, out: FloatArray, places: FloatArray
 ) -> int:
-    """Align point k, expected at out[PLACE], wherever it may be; returns at how many places it is.
+    """Align point k, expected at out[PLACE], at all its candidate positions; return their number.
 
-    Marks may look alike, so besides the place that the search finds its other candidates and the
-    place that was expected are aligned, if they promise anything; and if there were marks beside
-    the point in the first image that look like it, where these would be now.
+    Marks may look alike, so apart from the search's best position, its other candidates and the
+    expected position are aligned if they are promising, as are the present positions of marks near
+    the point that look like it in the first image.
 
     Args:
         image: grey, (height, width).
-        k: which point.
-        state: of the tracker; nothing is taken over.
-        out: is filled for the place of the search; if the point is not there, for that expected.
-        places: is filled with that place and then the others, (MOST_PLACES, COLUMNS + 4): columns
-            as in out, and the affine matrix from the first image to this one.
+        k: index of the point.
+        state: of the tracker; not changed.
+        out: set to the result at the search's position; if the point is not there, at the expected
+            one.
+        places: set to that position and then the others, (MOST_PLACES, COLUMNS + 4): columns as in
+            out, and the affine matrix from the first image to this one.
     """
     height, width = image.shape
     x, y = out[0], out[1]
@@ -334,7 +335,7 @@ def settle_all(
         if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
             settle(image, start_x, start_y, k, state, places[count])
             count += places[count, VERDICT] == FOUND
-    for twin in twins_of(state, k):  # the place found may be the twin's, and the twin's its twin's
+    for twin in twins_of(state, k):  # the position may be the twin's, and the twin's its twin's
         away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
         for sign in (1.0, -1.0):
             start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
@@ -348,7 +349,7 @@ def settle_all(
 def starting_places(
     image: ImageArray, k: int, state: TrackerState, x: float, y: float
 ) -> FloatArray:
-    """Return where to align point k, (N, 2): the search's best first, the expected (x, y) last."""
+    """Return initial positions of point k, (N, 2): the search's best first, (x, y) last."""
     offset_x, offset_y = state.places[k, 6], state.places[k, 7]
     anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
     work = make_workspace(state.memory[:WORKSPACE_SIZE])
@@ -364,7 +365,7 @@ def starting_places(
 
 @njit(cache=True, inline="always")
 def nearest(places: FloatArray, x: float, y: float) -> float:
-    """Distance from (x, y) to the nearest of some places (N, 2)."""
+    """Distance from (x, y) to the nearest of some positions (N, 2)."""
     least = np.inf
     for n in range(len(places)):
         least = min(least, np.hypot(places[n, 0] - x, places[n, 1] - y))
@@ -373,7 +374,7 @@ def nearest(places: FloatArray, x: float, y: float) -> float:
 
 @njit(cache=True)
 def correlation_at(image: ImageArray, x: float, y: float, k: int, state: TrackerState) -> float:
-    """Correlation of the key template of point k with a place as it is, without alignment."""
+    """Correlation of the key template of point k with a position, without alignment."""
     work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
     corner_x, corner_y = anchor_of(x) - AREA_PX // 2, anchor_of(y) - AREA_PX // 2
     load_window(image, anchor_of(x), anchor_of(y), work.area)
@@ -389,9 +390,9 @@ def correlation_at(image: ImageArray, x: float, y: float, k: int, state: Tracker
 def settle(
     image: ImageArray, x: float, y: float, k: int, state: TrackerState, out: FloatArray
 ) -> None:
-    """Align point k from a start and judge whether that is the point; fills out, (COLUMNS + 4,).
+    """Align point k from a start and judge whether it is the point; fills out, (COLUMNS + 4,).
 
-    Place, covariance and affine matrix are filled in only if it is. Nothing is taken over.
+    Position, covariance and affine matrix are filled only if it is. The state is not changed.
     """
     height, width = image.shape
     work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
@@ -421,7 +422,7 @@ def settle(
 
 @njit(cache=True)
 def take_over(image: ImageArray, k: int, state: TrackerState, place: FloatArray) -> None:
-    """Take a place that `settle` has filled over as the state of point k."""
+    """Make a result of `settle` the state of point k."""
     state.places[k, :2] = place[PLACE]
     affine_of(state, k)[:] = place[COLUMNS:].reshape(2, 2)
     renew_search(image, state, k)
@@ -433,10 +434,10 @@ def take_over(image: ImageArray, k: int, state: TrackerState, place: FloatArray)
 def place_covariance(
     state: TrackerState, k: int, key: int, before: FloatArray, A: FloatArray, found: Alignment
 ) -> FloatArray:
-    """Covariance of a found place: of this alignment, its prior, and the key template's own place.
+    """Covariance of a found position: of the alignment, its prior, and the key template.
 
-    A S Aᵀ + A F Aᵀ + A C_key Aᵀ, with S the template's spread for the noise that the residual
-    shows, and F what the prior on the form, the affine matrix expected before, holds back.
+    A S Aᵀ + A F Aᵀ + A C_key Aᵀ, with S the template's spread for the noise in the residual, and F
+    the effect of the prior on the form, the affine matrix expected before.
     """
     template = key_template_of(state, k, key)
     inner = key_covariance_of(state, k, key).copy()
@@ -450,15 +451,15 @@ def place_covariance(
 
 @njit(cache=True, inline="always")
 def spread_by_form(template: AlignmentTemplate, changed: FloatArray) -> FloatArray:
-    """Covariance of a place, (2, 2) px², since its patch may have changed form more than found.
+    """Covariance of a position, (2, 2) px², from an undetected change of form of its patch.
 
-    With the normal matrix N and the prior Λ, an alignment that expects the form of before misses
-    the place by N⁻¹ Λ a for a change a. Where the patch shows the change, this is nothing; a
-    mark in one of its corners hides a turn about the mark, which moves the point.
+    With the normal matrix N and the prior Λ, an alignment that assumes the previous form misses the
+    position by N⁻¹ Λ a for a change a. If the patch shows the change, this is zero; a mark in one
+    of its corners hides a rotation about the mark, which moves the point.
 
     Args:
         template: of the patch.
-        changed: how the affine matrix changed, as far as found, (2, 2).
+        changed: change of the affine matrix, as far as found, (2, 2).
     """
     apart = (changed[0, 0] - 1.0) ** 2 + (changed[1, 1] - 1.0) ** 2
     square = 0.5 * (apart + changed[0, 1] ** 2 + changed[1, 0] ** 2)
@@ -473,16 +474,17 @@ def spread_by_form(template: AlignmentTemplate, changed: FloatArray) -> FloatArr
 
 @njit(cache=True, inline="always")
 def honest_spread(spread: FloatArray, noise: float) -> FloatArray:
-    """Covariance of a place, (2, 2) px², from a template's spread and the noise in it.
+    """Covariance of a position, (2, 2) px², from a template's spread and the noise in it.
 
-    Along a straight edge the template has no gradient but that of its own noise, which holds
-    nothing: what noise alone would have of information is taken off, twice to be sure of it. And
-    an edge that runs at an angle to the pixels has steps, which stay with them: what is far less
-    than the information across counts for nothing.
+    Along a straight edge the template has no gradient but that of its own noise, which carries no
+    information: the information of noise alone is subtracted, doubled for safety. An edge at an
+        angle to
+    the pixel grid has steps, which move with the grid: information far smaller than that across the
+    edge is therefore ignored.
 
     Args:
         spread: for noise of one grey level, (2, 2) px².
-        noise: standard deviation of what is left of template and image, grey levels.
+        noise: standard deviation of the residual of template and image, grey levels.
     """
     information = inverse2(spread)
     half = 0.5 * (information[0, 0] - information[1, 1])
@@ -494,7 +496,7 @@ def honest_spread(spread: FloatArray, noise: float) -> FloatArray:
     across, along = middle + apart, max(middle - apart, 1e-12)
     strong = variance / max(across - by_noise, least)
     weak = variance / max(along - (EDGE * across) ** 2 / along - by_noise, least)
-    strong += TURNED * TURNED * weak  # the long axis is known no better than the patch's turn
+    strong += TURNED * TURNED * weak  # the long axis is known no better than the patch's rotation
     c, s = (half / apart, information[0, 1] / apart) if apart > 0.0 else (1.0, 0.0)
     out = np.empty((2, 2))
     mean, off = 0.5 * (strong + weak), 0.5 * (strong - weak)
@@ -505,7 +507,7 @@ def honest_spread(spread: FloatArray, noise: float) -> FloatArray:
 
 @njit(cache=True)
 def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) -> bool:
-    """Find all points, each expected at answers[k, PLACE]; whether all were found."""
+    """Find all points, each expected at answers[k, PLACE]; return whether all were found."""
     expected, count = answers[:, :2].copy(), len(answers)
     places = np.empty((count, MOST_PLACES, COLUMNS + 4))
     alike = np.zeros(count, dtype=np.int64)
@@ -544,9 +546,9 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
 
 @njit(cache=True, inline="always")
 def widen_for_others(places: FloatArray, chosen: int) -> None:
-    """Widen the covariance of the chosen place, so that the others lie within a deviation.
+    """Widen the covariance of the chosen position so that the others lie within one deviation.
 
-    To all sides alike: of many marks in rows the search follows some only.
+    It is isotropic, since the search follows only some of many marks in rows.
     """
     farthest = 0.0
     for n in range(len(places)):
@@ -558,7 +560,7 @@ def widen_for_others(places: FloatArray, chosen: int) -> None:
 
 @njit(cache=True, inline="always")
 def that_look_alike(places: FloatArray, count: int) -> int:
-    """Bring those of the first places that match about as well as the best to the front; how many.
+    """Move the positions that match about as well as the best to the front; return how many.
 
     If the first one is the best by a margin, it is the only one.
     """
@@ -575,7 +577,7 @@ def that_look_alike(places: FloatArray, count: int) -> int:
 def where_neighbours_go(
     k: int, expected: FloatArray, answers: FloatArray, sure: BoolArray
 ) -> tuple[float, float]:
-    """Where point k is if it moved as the nearest points that are sure; else where expected."""
+    """Return point k's position if it moved like the nearest certain points, else as expected."""
     others = np.flatnonzero(sure)
     if len(others) < CONSENSUS:
         return expected[k, 0], expected[k, 1]
@@ -589,7 +591,7 @@ def where_neighbours_go(
 def look_again(
     image: ImageArray, state: TrackerState, expected: FloatArray, answers: FloatArray
 ) -> None:
-    """Search the points not found once more, where the others' median motion takes them."""
+    """Search again for the points not found, at positions from the others' median motion."""
     found = answers[:, VERDICT] == FOUND
     moved = answers[:, :2] - expected
     dx, dy = np.median(moved[found, 0]), np.median(moved[found, 1])

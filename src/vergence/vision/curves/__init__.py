@@ -1,4 +1,4 @@
-"""Curves in images: edges searched along normals, and ellipses, lines and regions made of them."""
+"""Curves in images: edges along normals, and ellipses, lines and regions fitted to them."""
 
 from vergence.vision.curves.curve_values import CurveValues
 from vergence.vision.curves.ellipse_tracker import EllipseTracker

@@ -9,11 +9,11 @@ from vergence.features import moments_of_polygon
 from vergence.geometry import EllipseShape
 from vergence.vision.curves.rings import signed_area
 
-HALF_TURN_UNKNOWN_RAD = float(np.pi / np.sqrt(12.0))  # deviation of any angle within half a turn
+HALF_TURN_UNKNOWN_RAD = float(np.pi / np.sqrt(12.0))  # deviation of an unknown axis angle
 
 
 class CurveValues(NamedTuple):
-    """Numbers that describe a curve in one image, and how well they are known."""
+    """Parameters that describe a curve in one image, with their covariance."""
 
     values: FloatArray  # (P,)
     covariance: FloatArray  # (P, P)
@@ -50,9 +50,9 @@ def ellipse_values(shape: EllipseShape, covariance: FloatArray) -> CurveValues:
 def line_values(foot: FloatArray, along: FloatArray, covariance: FloatArray) -> CurveValues:
     """Return ρ (px) and θ (rad) of the line x cos θ + y sin θ = ρ in pixel coordinates, (2,).
 
-    θ is the direction of the normal n to the left of the line's sense, as one sees it in the
-    image; so it is for the feature `lines`. With the offset d at the foot and the slope m along
-    it, n becomes n - m t, where t is the line's direction: dθ = -dm and dρ = dd - (t · foot) dm.
+    θ is the direction of the normal n to the left of the line's direction, as seen in the image,
+    like that of the feature `lines`. With the offset d at the foot and the slope m along it, n
+    becomes n - m t, where t is the line's direction: dθ = -dm and dρ = dd - (t · foot) dm.
 
     Args:
         foot: a point of the line, (2,), px.
@@ -68,9 +68,9 @@ def line_values(foot: FloatArray, along: FloatArray, covariance: FloatArray) -> 
 def region_values(points: FloatArray, covariance: FloatArray) -> CurveValues:
     """Return area (px²), centre u, v (px) and the direction of the longest extent (rad), (4,).
 
-    A corner p of the outline that moves by δ changes the integral of f over the inside by f(p) n·δ,
-    where n is half the vector between its neighbours, turned outwards. The direction lies within
-    (-π/2, π/2], from x to y; without a longest extent it is unknown.
+    A corner p of the outline that moves by δ changes the integral of f over the interior by f(p)
+    n·δ, where n is half the vector between its neighbours, turned outwards. The direction lies
+    within (-π/2, π/2], from x to y; without a longest extent it is unknown.
 
     Args:
         points: corners of the region as one polygon, see `joined_rings`, (M, 2), px.

@@ -1,4 +1,4 @@
-"""An ellipse followed from image to image by the edges across it."""
+"""Tracks an ellipse from image to image by the edges across it."""
 
 from typing import NamedTuple
 
@@ -14,13 +14,13 @@ from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, closed, nothing_found
 
 POINTS = 16  # that represent the ellipse
-_APART_PX = 4.0  # along the ellipse, between places where edges are searched
-_FEWEST, _MOST = 24, 96  # such places
+_APART_PX = 4.0  # along the ellipse, between positions at which edges are searched for
+_FEWEST, _MOST = 24, 96  # number of such positions
 _LEAST_SEMI_AXIS_PX = 4.0
 _MOST_DEVIATION_PX = 1.5  # of the edges from the ellipse
-_CHANGE = 1.6  # of a semi-axis from one image to the next, at most
-_LEAST_AGREEING = 0.5  # share of its places in view across which the edge is found
-_ROUNDS = 3  # of search and fit, each with a third of the last one's reach
+_CHANGE = 1.6  # largest ratio of a semi-axis between two images
+_LEAST_AGREEING = 0.5  # fraction of its visible positions at which the edge is found
+_ROUNDS = 3  # of search and fit, each with a third of the previous reach
 _LAST_REACH_PX = 4
 _JOINED = closed(POINTS)
 
@@ -30,25 +30,25 @@ class EllipseFit(NamedTuple):
 
     shape: EllipseShape
     covariance: FloatArray  # (5, 5) of centre and S11, S12, S22, see `EllipseShape.root`; px²
-    height: float  # of the step across it, grey values; above zero if it is darker inside
+    height: float  # of the step across it, grey values; positive if it is darker inside
     deviation_px: float  # of the edges from it
-    share: float  # of its places, in view or not, where the edge was found
+    share: float  # fraction of its positions, visible or not, at which the edge was found
 
 
 class EllipseTracker:
-    """Follows the image of a circle, a sphere, a cup's rim.
+    """Tracks the image of a circle, a sphere or a cup's rim.
 
-    Edges are searched along the normals of the ellipse of the last image; the ellipse is fitted to
-    them, which is linear in its centre and in the symmetric matrix S of its points c + S u. What is
-    measured flows on as `POINTS` points c + S u at equal angles of u: they represent the ellipse,
-    and are no marks on the object.
+    Edges are searched for along the normals of the ellipse of the last image. The ellipse is fitted
+    to them, which is linear in its centre and in the symmetric matrix S of its points c + S u. The
+    result is represented by `POINTS` points c + S u at equally spaced angles of u, which are not
+    marks on the object.
 
     Args:
         image: the first image, grey.
-        points_px: one place inside, or five or more on the ellipse, (M, 2).
-        reach_px: how far the edge may move between two images.
-        contrast: least step across it, grey values.
-        least_share: of it that has to be in view.
+        points_px: one point inside, or five or more on the ellipse, (M, 2).
+        reach_px: largest motion of the edge between two images.
+        contrast: smallest step across it, grey values.
+        least_share: fraction of it that must be in view.
 
     Raises:
         InputError: if there is no ellipse.
@@ -71,12 +71,12 @@ class EllipseTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that represent the ellipse where it was last found, (POINTS, 2)."""
+        """The points that represent the last ellipse found, (POINTS, 2)."""
         return self._last.shape.points(POINTS)
 
     @property
     def shape(self) -> EllipseShape:
-        """The ellipse where it was last found, px."""
+        """The last ellipse found, px."""
         return self._last.shape
 
     @property
@@ -89,8 +89,8 @@ class EllipseTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: points of the ellipse as it is expected, (POINTS, 2); None to continue as
-                between the last two images.
+            predicted_px: points of the expected ellipse, (POINTS, 2); None to continue as between
+                the last two images.
         """
         expected = self._expected(predicted_px)
         grey, reason = grey_image(image)
@@ -122,7 +122,7 @@ class EllipseTracker:
         return self._refined(grey, shape, 0.0, self._reach_px)
 
     def _at(self, grey: ImageArray, place_px: FloatArray, height: float) -> EllipseFit | str:
-        """Return the ellipse around a place, from the outline of the patch there."""
+        """Return the ellipse around a point, from the outline of the patch there."""
         patch = patch_at(grey, place_px)
         if isinstance(patch, str):
             return patch
@@ -140,7 +140,7 @@ class EllipseTracker:
         return found if isinstance(found, str) else self._same(found)
 
     def _again(self, grey: ImageArray) -> EllipseFit | None:
-        """Return the ellipse around the last centre if it is like the last one."""
+        """Return the ellipse around the last centre if it is similar to the last one."""
         found = self._at(grey, self._last.shape.centre, self._last.height)
         if isinstance(found, str):
             return None
@@ -156,7 +156,7 @@ class EllipseTracker:
     def _refined(
         self, grey: ImageArray, shape: EllipseShape, height: float, reach_px: float
     ) -> EllipseFit | str:
-        """Return the ellipse that fits the edges around a first guess, or why there is none."""
+        """Return the ellipse that fits the edges near a first guess, or why there is none."""
         reach = max(round(reach_px), _LAST_REACH_PX)
         for number in range(_ROUNDS):
             if reason := self._unfit(shape):

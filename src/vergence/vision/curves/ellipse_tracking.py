@@ -37,7 +37,7 @@ class EllipseTracking:
         """Return the points that represent ellipses through five or more each, (M, 2).
 
         Raises:
-            InputError: if no ellipse goes through them.
+            InputError: if no ellipse passes through them.
         """
         each = divided("ellipse", points_px, self.count)
         return np.concatenate([_ellipse_on(points) for points in each])

@@ -1,4 +1,4 @@
-"""Straight lines followed from image to image by the edges across them."""
+"""Tracks straight lines from image to image by the edges across them."""
 
 from typing import NamedTuple
 
@@ -12,29 +12,29 @@ from vergence.vision.curves.moving_edges import BORDER_PX, FLOOR_PX, fit_steps, 
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks
 
-_APART_PX = 4.0  # along a line, between places where edges are searched
+_APART_PX = 4.0  # along a line, between positions at which edges are searched for
 _SHORTEST_PX = 32.0  # of the part of a line in the image
-_LEAST_AGREEING = 0.5  # share of its places across which the edge is found
+_LEAST_AGREEING = 0.5  # fraction of its positions at which the edge is found
 _MOST_DEVIATION_PX = 1.5  # of the edges from the line
-_ROUNDS = 3  # of search and fit, each with a third of the last one's reach
+_ROUNDS = 3  # of search and fit, each with a third of the previous reach
 _LAST_REACH_PX = 4
 _LOST_PX = 100.0  # standard deviation of a line that is not found
 
 
 class Line(NamedTuple):
-    """A line with a sense, by its point nearest to the middle of the image."""
+    """A directed line, represented by its point nearest to the image centre."""
 
     foot: FloatArray  # (2,) px
     along: FloatArray  # (2,) unit vector
 
     @property
     def normal(self) -> FloatArray:
-        """To the left of its sense where y points down, as in images, (2,)."""
+        """The normal to the left of its direction, as seen in the image (y down), (2,)."""
         return np.array([self.along[1], -self.along[0]])
 
     @classmethod
     def through(cls, first: FloatArray, second: FloatArray, middle: FloatArray) -> "Line":
-        """Return the line from one point to another, for the middle of an image (2,)."""
+        """Return the line from one point to another, for the given image centre (2,)."""
         along = (second - first) / np.linalg.norm(second - first)
         return cls(first + (along @ (middle - first)) * along, along)
 
@@ -53,21 +53,21 @@ class LineFit(NamedTuple):
 
 
 class LineTracker:
-    """Follows straight edges, each by the part near the middle of the image.
+    """Tracks straight edges, each by the part near the image centre.
 
-    Edges are searched along the normals of the lines of the last image, and lines fitted to them.
-    What is measured flows on as two points a line, `half_length` to both sides of its foot, the
-    point nearest to the middle of the image: they represent the line, wherever it ends.
+    Edges are searched for along the normals of the lines of the last image, and lines are fitted to
+    them. The result is represented by two points per line, `half_length` to both sides of its foot,
+    the point nearest to the image centre, wherever the line ends.
 
     Args:
         image: the first image, grey.
-        points_px: two points on each line, (2 L, 2); they give its sense.
-        reach_px: how far a line may move between two images.
-        length_px: of the part of a line that is looked at, around its foot.
-        contrast: least step across it, grey values.
+        points_px: two points on each line, (2 L, 2), which define its direction.
+        reach_px: largest motion of a line between two images.
+        length_px: length of the part of a line that is used, around its foot.
+        contrast: smallest step across it, grey values.
 
     Raises:
-        InputError: if the points make no lines, or a line is not there.
+        InputError: if the points define no lines, or a line is not found.
     """
 
     def __init__(
@@ -93,12 +93,12 @@ class LineTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that represent the lines where they were last found, (2 L, 2)."""
+        """The points that represent the last lines found, (2 L, 2)."""
         return np.concatenate([fit.line.points(self._size) for fit in self._last])
 
     @property
     def values(self) -> tuple[CurveValues, ...]:
-        """ρ and θ of each line where it was last found, see `line_values`."""
+        """ρ and θ of each line as last found, see `line_values`."""
         return tuple(line_values(*fit.line, fit.covariance) for fit in self._last)
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
@@ -106,8 +106,8 @@ class LineTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: two points on each line as it is expected, (2 L, 2); None to continue as
-                between the last two images.
+            predicted_px: two points on each expected line, (2 L, 2); None to continue as between
+                the last two images.
         """
         grey, reason = grey_image(image)
         expected = (
@@ -139,19 +139,19 @@ class LineTracker:
         )
 
     def _ahead(self, now: Line, before: Line) -> Line:
-        """Return a line moved on as it moved between the last two images."""
+        """Return a line extrapolated by its motion between the last two images."""
         points = 2.0 * now.points(self._size) - before.points(self._size)
         return lines_through(points, self._size)[0]
 
     def _again(self, grey: ImageArray | None, j: int) -> LineFit | None:
-        """Return a line where it was last found, if it is there after all."""
+        """Return a line at its last position, if it is there after all."""
         if grey is None:
             return None
         found = self._refined(grey, self._last[j].line, self._last[j].height)
         return None if isinstance(found, str) else found
 
     def _refined(self, grey: ImageArray, line: Line, height: float) -> LineFit | str:
-        """Return the line that fits the edges around a first guess, or why there is none."""
+        """Return the line that fits the edges near a first guess, or why there is none."""
         middle = _middle(grey.shape[::-1])
         reach = max(round(self._reach_px), _LAST_REACH_PX)
         for _ in range(_ROUNDS):
@@ -176,7 +176,7 @@ class LineTracker:
         return LineFit(line, fit.covariance, height)
 
     def _places(self, line: Line, size: tuple[int, int]) -> FloatArray:
-        """Return where along a line, from its foot, edges are searched, (N,), px."""
+        """Return the search positions along a line, from its foot, (N,), px."""
         t = np.arange(-self._length_px / 2.0, self._length_px / 2.0 + _APART_PX, _APART_PX)
         places = line.foot + t[:, None] * line.along
         high = np.array(size) - 1.0 - BORDER_PX
@@ -185,15 +185,15 @@ class LineTracker:
 
 
 def half_length(size: tuple[int, int]) -> float:
-    """Return how far the points that represent a line are from its foot, px."""
+    """Return the distance of the points that represent a line from its foot, px."""
     return 0.25 * min(size)
 
 
 def lines_through(points_px: FloatArray, size: tuple[int, int]) -> list[Line]:
-    """Return the lines through pairs of points (2 L, 2) in an image of a width and height.
+    """Return the lines through pairs of points (2 L, 2) in an image of the given width and height.
 
     Raises:
-        InputError: if a point is left over, or the points of a pair coincide.
+        InputError: if the number of points is odd, or the points of a pair coincide.
     """
     if len(points_px) % 2 or not len(points_px):
         given = f"lines through {len(points_px)} points"

@@ -1,4 +1,4 @@
-"""Straight lines as what a cell follows."""
+"""Straight lines as a part in a cell file."""
 
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from vergence.vision.curves.line_tracker import LineTracker, lines_through
 
 @part("tracker", "lines")
 class LineTracking:
-    """Follows straight edges, each given by two points on it; see `LineTracker`."""
+    """Tracks straight edges, each given by two points on it; see `LineTracker`."""
 
     count: ClassVar[int] = 1  # of the sets of points: lines go by pairs
 
@@ -24,7 +24,7 @@ class LineTracking:
         """Return the tracker of the lines through pairs of points.
 
         Raises:
-            InputError: if a line is not there.
+            InputError: if a line is not found.
         """
         return LineTracker(image, points_px, self.reach_px, self.length_px, self.contrast)
 
@@ -32,6 +32,6 @@ class LineTracking:
         """Return the points that represent the lines through pairs, (2 L, 2).
 
         Raises:
-            InputError: if they make no lines.
+            InputError: if the points define no lines.
         """
         return np.concatenate([line.points(size) for line in lines_through(points_px, size)])

@@ -1,8 +1,8 @@
-"""Moving edges: steps of grey along the normals of an expected curve, and the curve they fit.
+"""Moving edges: grey-level steps along the normals of an expected curve, and a curve fit.
 
-A curve whose places move linearly with its parameters, offset_k = a_k · δ along the normal k, is
-fitted to the steps across it. Of several steps across one place the one that agrees with the
-others counts.
+A curve whose points move linearly with its parameters, offset_k = a_k · δ along the normal k, is
+fitted to the steps across it. Of several steps across one point, the one that agrees with the
+others is used.
 """
 
 from typing import NamedTuple
@@ -13,34 +13,34 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision.known_object.profiles import MARGIN, SHARP_WIDTH, find_steps, grey_at
 
-CANDIDATES = 4  # steps that are kept across one place
-BORDER_PX = 2.0  # nearer to the border of the image no place of a curve is looked at
-_BLUR = 5  # samples by which a profile is longer than the search, to follow blurred edges
+CANDIDATES = 4  # steps kept per position
+BORDER_PX = 2.0  # no position of a curve closer to the border of the image is used
+_BLUR = 5  # samples added to a profile beyond the search, to follow blurred edges
 _NARROWING = 0.5  # of the gate, from one round of the fit to the next
 _LEAST_GATE_PX = 1.0
-_GATE_DEVIATIONS = 4.0  # of the residuals; beyond it a step has no say: Tukey's biweight
-_LIKE = 0.4  # least ratio of a step's height to the usual one, either way
+_GATE_DEVIATIONS = 4.0  # of the residuals; a step beyond it has no weight: Tukey's biweight
+_LIKE = 0.4  # smallest ratio of a step's height to the usual one, in either direction
 _WIDTH_SQUARED = 8.0 * np.log(2.0)  # squared width at half height of a bell of variance 1
-_PIXEL_VARIANCE = 1.0 / 12.0  # px², of the square that a pixel sees
+_PIXEL_VARIANCE = 1.0 / 12.0  # px², of the square area of a pixel
 _ALONG_VARIANCE = 0.5  # px², of the mean along the edge, with weights 1, 2, 1
-FLOOR_PX = 0.05  # standard deviation that one step is taken to have at least
+FLOOR_PX = 0.05  # lower bound on the standard deviation of a step
 
 
 class Steps(NamedTuple):
-    """Steps across N places of a curve, up to K each."""
+    """Steps across N positions of a curve, up to K each."""
 
     offsets: FloatArray  # (N, K) along the normal, px
     heights: FloatArray  # (N, K) signed, grey values; 0 where there is none
     widths: FloatArray  # (N, K) of the slopes at half their height, px
-    inside: BoolArray  # (N,) whether the place lies in the image
+    inside: BoolArray  # (N,) whether the position lies in the image
 
 
 class CurveFit(NamedTuple):
-    """The change of a curve's parameters that its steps ask for."""
+    """The change of a curve's parameters that its steps determine."""
 
     change: FloatArray  # (P,)
     covariance: FloatArray  # (P, P)
-    used: BoolArray  # (N,) places whose step agrees
+    used: BoolArray  # (N,) positions whose step agrees
     height: float  # median of the steps used, grey values
     deviation_px: float  # of the steps used from the curve
 
@@ -49,14 +49,14 @@ class CurveFit(NamedTuple):
 def search_edges(
     image: ImageArray, places: FloatArray, normals: FloatArray, reach: int, contrast: float
 ) -> Steps:
-    """Find the steps across the places of a curve.
+    """Find the steps across the positions of a curve.
 
     Args:
         image: grey, (height, width).
         places: on the curve, (N, 2), px.
         normals: unit vectors, (N, 2).
-        reach: how far to look to either side, px.
-        contrast: least height of a step, grey values.
+        reach: search distance to either side, px.
+        contrast: smallest height of a step, grey values.
     """
     count = len(places)
     offsets, heights = np.zeros((count, CANDIDATES)), np.zeros((count, CANDIDATES))
@@ -89,15 +89,15 @@ def _read(image: ImageArray, u: float, v: float, nu: float, nv: float, profile: 
 
 
 def straightened(steps: Steps, curvature: FloatArray) -> Steps:
-    """Return steps as they would be across a straight edge.
+    """Return the steps corrected to those across a straight edge.
 
-    Blur of variance σ² moves the steepest place of an edge by half σ² times its curvature towards
-    the centre of that. The variance is that of the image, which the width of the slope tells, and
-    of the mean along the edge.
+    Blur of variance σ² moves the steepest point of an edge by half σ² times its curvature towards
+    the centre of curvature. The variance is that of the image, from the width of the slope, and of
+    the mean along the edge.
 
     Args:
         steps: along normals that point away from the centre of curvature.
-        curvature: of the curve at each place, (N,), 1/px.
+        curvature: of the curve at each position, (N,), 1/px.
     """
     blur = np.maximum(steps.widths**2 - SHARP_WIDTH**2, 0.0) / _WIDTH_SQUARED
     shift = 0.5 * curvature[:, None] * (blur + _PIXEL_VARIANCE + _ALONG_VARIANCE)
@@ -109,10 +109,10 @@ def fit_steps(A: FloatArray, steps: Steps, height: float, gate_px: float) -> Cur
     """Fit a curve to steps across it, robustly.
 
     Args:
-        A: by how much each place moves along its normal with each parameter, (N, P).
-        steps: across the places.
-        height: usual height of its steps, signed; 0 if nothing is known of it.
-        gate_px: how far a step may be from where it is expected, at first.
+        A: motion of each position along its normal by each parameter, (N, P).
+        steps: across the positions.
+        height: usual height of its steps, signed; 0 if unknown.
+        gate_px: initial distance of a step from its expected position within which it is used.
     """
     count, size = A.shape
     change, covariance = np.zeros(size), np.full((size, size), np.inf)
@@ -155,7 +155,7 @@ def fit_steps(A: FloatArray, steps: Steps, height: float, gate_px: float) -> Cur
 
 @njit(cache=True)
 def _likeness(step: float, height: float) -> float:
-    """Return how much a step is like the usual one of the curve, 0 … 1."""
+    """Return the similarity of a step to the usual one of the curve, 0 … 1."""
     if step == 0.0:
         return 0.0
     if height == 0.0:

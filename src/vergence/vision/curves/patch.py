@@ -1,4 +1,4 @@
-"""The patch of one grey level around a place, and its outline to a fraction of a pixel."""
+"""The patch of uniform grey level around a point, and its outline to a fraction of a pixel."""
 
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -8,18 +8,18 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 
 _FIRST_HALF_PX = 24.0
-_LEAST_CONTRAST = 20.0  # grey values between the patch and what is around it
-NEAR_PX = 3.0  # of a place beside the patch
+_LEAST_CONTRAST = 20.0  # grey values between the patch and its surroundings
+NEAR_PX = 3.0  # of a point beside the patch
 
 
 class Patch(NamedTuple):
-    """A patch lighter or darker than what is around it."""
+    """A patch lighter or darker than its surroundings."""
 
     outline_px: FloatArray  # (K, 2) closed, its last point beside its first
     holes_px: tuple[FloatArray, ...]  # the outlines of its holes
     light: bool  # whether it is lighter
     contrast: float  # grey values
-    cut: bool  # whether the border of the image cuts it
+    cut: bool  # whether it is cut by the border of the image
 
 
 def patch_at(
@@ -29,18 +29,18 @@ def patch_at(
     light: bool | None = None,
     near_px: float = NEAR_PX,
 ) -> Patch | str:
-    """Return the patch that a place lies in, or the nearest one, or why there is none.
+    """Return the patch that contains a point, or the nearest one, or why there is none.
 
-    The grey levels of a window are split in two by Otsu's threshold, halfway between the means of
-    both sides; the window grows until its border does not cut the patch.
+    The grey levels of a window are separated by Otsu's threshold, halfway between the means of both
+    sides; the window grows until its border does not cut the patch.
 
     Args:
         image: grey, (height, width).
-        place_px: (2,).
+        place_px: the point, (2,).
         half_px: half the size of the first window.
-        light: whether the patch is lighter than what is around it; if None, as the place is. If it
-            is known, the place may lie in a hole of the patch.
-        near_px: how far beside the patch the place may lie.
+        light: whether the patch is lighter than its surroundings; if None, as the point is. If
+            given, the point may lie in a hole of the patch.
+        near_px: largest distance of the point from the patch.
     """
     height, width = image.shape
     u, v = place_px
@@ -103,7 +103,7 @@ def _in_window(
 
 
 def _distance(curves: list[FloatArray], place: FloatArray) -> float:
-    """Return how far a place is from a patch, px; 0 if it lies in it."""
+    """Return the distance of a point from a patch, px; 0 if it lies in it."""
     import cv2
 
     first, *holes = [curve.astype(np.float32)[:, None] for curve in curves]

@@ -1,4 +1,4 @@
-"""A region of one grey level followed from image to image by its outline, holes and all."""
+"""Tracks a region of uniform grey level from image to image by its outline, including holes."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ from vergence.vision.curves.rings import inside_of, joined_rings, resampled, rin
 from vergence.vision.image import grey_image
 from vergence.vision.tracks import Tracks, closed, nothing_found
 
-OUTLINE_POINTS, HOLE_POINTS = 48, 16  # that represent the outline, and for each hole
+OUTLINE_POINTS, HOLE_POINTS = 48, 16  # points that represent the outline, and each hole
 _LEAST_AREA_PX = 60.0
-_LEAST_HOLE = 0.01  # share of the region's area from which a hole counts
-_CHANGE = 1.6  # of the area from one image to the next, at most
-_PLACE_PX = 0.2  # standard deviation that one place on an outline is taken to have at least
-_AGAIN_PX = 30.0  # how far from its last place a region that was lost is searched for
-_WINDOW = 1.3  # of the region's half size, for the first window around it
+_LEAST_HOLE = 0.01  # fraction of the region's area above which a hole counts
+_CHANGE = 1.6  # largest ratio of the area between two images
+_PLACE_PX = 0.2  # lower bound on the standard deviation of a point on an outline
+_AGAIN_PX = 30.0  # search distance of a lost region from its last position
+_WINDOW = 1.3  # first window around it, relative to the region's half size
 
 
 class Region(NamedTuple):
@@ -28,19 +28,19 @@ class Region(NamedTuple):
     covariance_px: FloatArray  # (M, 2, 2)
     area_px: float  # without its holes
     holes: int
-    light: bool  # whether it is lighter than what is around it
+    light: bool  # whether it is lighter than its surroundings
 
 
 class RegionTracker:
-    """Follows a leaf, a hole, a blot: what is lighter or darker than all around it.
+    """Tracks a region lighter or darker than all its surroundings, such as a leaf or a hole.
 
-    Its outline is where the grey level is halfway between the means inside and outside. What is
-    measured flows on as points evenly spaced along the outline, which make the polygon whose
-    moments are those of the region; a hole is cut out of it, see `joined_rings`.
+    Its outline is where the grey level is halfway between the means inside and outside. The result
+    is represented by points evenly spaced along the outline, which form the polygon whose moments
+    are those of the region; holes are cut out, see `joined_rings`.
 
     Args:
         image: the first image, grey.
-        points_px: one place inside, or its outline roughly, (M, 2).
+        points_px: one point inside, or a rough outline, (M, 2).
         holes: whether holes are cut out.
 
     Raises:
@@ -59,7 +59,7 @@ class RegionTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The points that represent the region where it was last found, (M, 2)."""
+        """The points that represent the last region found, (M, 2)."""
         return self._last.points_px.copy()
 
     @property
@@ -72,7 +72,7 @@ class RegionTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: points that represent it where it is expected, (M, 2); None to continue as
+            predicted_px: points that represent the expected region, (M, 2); None to continue as
                 between the last two images.
         """
         last = self._last.points_px
@@ -94,7 +94,7 @@ class RegionTracker:
         )
 
     def _follow(self, grey: ImageArray, expected: FloatArray) -> Region | str:
-        """Return the region where it is expected, or else next to where it was last found."""
+        """Return the region at its expected position, or else near its last position."""
         found = self._same(grey, expected, 0.0)
         if isinstance(found, str):
             again = self._same(grey, self._last.points_px, _AGAIN_PX)
@@ -102,12 +102,12 @@ class RegionTracker:
         return found
 
     def _same(self, grey: ImageArray, expected: FloatArray, away_px: float) -> Region | str:
-        """Return the region that lies next to a place, or why it is not that of the last image.
+        """Return the region near a position, or why it differs from that of the last image.
 
         Args:
             grey: the image.
             expected: points that represent it there, (M, 2).
-            away_px: how far from the middle of them it may begin.
+            away_px: largest distance of the region from their centre.
         """
         half = _WINDOW * float(np.ptp(expected, axis=0).max()) / 2.0 + away_px
         place = inside_of(rings_of(expected))
@@ -146,17 +146,17 @@ class RegionTracker:
 
 
 def _counted(patch: Patch, area: float) -> list[FloatArray]:
-    """Return the holes that are no specks, the largest first."""
+    """Return the holes that are large enough, the largest first."""
     areas = [abs(signed_area(hole)) for hole in patch.holes_px]
     order = np.argsort(areas)[::-1]
     return [patch.holes_px[j] for j in order if areas[j] > _LEAST_HOLE * area]
 
 
 def _covariance(grey: ImageArray, points: FloatArray) -> FloatArray:
-    """Return the covariance of places on an outline, (M, 2, 2): noise over slope, both ways."""
+    """Return the covariance of points on an outline, (M, 2, 2): noise over slope, isotropic."""
     low, high = points.min(axis=0).astype(int), points.max(axis=0).astype(int) + 2
     window = grey[max(low[1], 0) : high[1], max(low[0], 0) : high[0]].astype(np.float64)
-    # What a smooth image has none of [Immerkaer1996].
+    # A mask to which a smooth image has no response [Immerkaer1996].
     mask = np.array([1.0, -2.0, 1.0])
     rough = np.apply_along_axis(np.convolve, 0, window, mask, "valid")
     rough = np.apply_along_axis(np.convolve, 1, rough, mask, "valid")

@@ -1,4 +1,4 @@
-"""Closed curves as rings of points, and a region with holes as one closed curve."""
+"""Closed curves as rings of points, and a region with holes as a single closed curve."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ _SAME = 1e-6  # px, between a point and itself
 
 
 def signed_area(ring: FloatArray) -> float:
-    """Return the area inside a ring (K, 2), above zero if it goes from x to y."""
+    """Return the area inside a ring (K, 2), positive if it turns from x to y."""
     x, y = ring.T
     return 0.5 * float(np.sum(np.roll(x, 1) * y - x * np.roll(y, 1)))
 
@@ -19,9 +19,9 @@ def signed_area(ring: FloatArray) -> float:
 def resampled(ring: FloatArray, count: int) -> FloatArray:
     """Return points evenly spaced along a ring (K, 2), (count, 2).
 
-    The first is the farthest on the ray from the centre of its area along x, and they go from x to
-    y: they depend on the curve alone. It is smoothed over some pixels first, for the steps of
-    pixels along it would count as length; its area and its centre stay.
+    The first is the farthest on the ray from the centroid along x, and they turn from x to y, so
+    they depend on the curve alone. The ring is smoothed over some pixels first, because pixel steps
+    along it would count as length; its area and its centroid are preserved.
     """
     if signed_area(ring) < 0.0:
         ring = ring[::-1]
@@ -39,7 +39,7 @@ def resampled(ring: FloatArray, count: int) -> FloatArray:
 
 
 def centre_of(ring: FloatArray) -> FloatArray:
-    """Return the centre of the area inside a ring (K, 2), (2,)."""
+    """Return the centroid of the area inside a ring (K, 2), (2,)."""
     about = ring.mean(axis=0)
     x, y = (ring - about).T
     before_x, before_y = np.roll(x, 1), np.roll(y, 1)
@@ -53,9 +53,9 @@ def centre_of(ring: FloatArray) -> FloatArray:
 def joined_rings(rings: Sequence[FloatArray]) -> FloatArray:
     """Return an outline and its holes as one closed polygon, (M, 2).
 
-    The outline, its first point again; then each hole the other way round, its first point again,
-    and back to the outline's first point. The way there and back encloses nothing, so that
-    integrals over the inside are those of the region without its holes.
+    The outline, with its first point repeated; then each hole in the opposite direction, with its
+    first point repeated, and back to the outline's first point. The connections enclose no area, so
+    integrals over the interior are those of the region without its holes.
     """
     outline, *holes = rings
     if not holes:
@@ -67,19 +67,19 @@ def joined_rings(rings: Sequence[FloatArray]) -> FloatArray:
 
 
 def rings_of(points: FloatArray) -> list[FloatArray]:
-    """Return the outline and the holes that `joined_rings` made one polygon of."""
+    """Return the outline and the holes that `joined_rings` joined into one polygon."""
     rings, start = [], 0
     while start < len(points):
         rest = points[start + 1 :]
         again = np.flatnonzero(np.abs(rest - points[start]).max(axis=1) < _SAME)
         end = start + 1 + again[0] if len(again) else len(points)
         rings.append(points[start:end])
-        start = end + (2 if start else 1)  # after a hole comes the outline's first point
+        start = end + (2 if start else 1)  # the outline's first point follows each hole
     return rings
 
 
 def inside_of(rings: Sequence[FloatArray]) -> FloatArray:
-    """Return a place well inside a region, (2,): its centre unless that is near an edge."""
+    """Return a point well inside a region, (2,): its centroid unless that is near an edge."""
     import cv2
 
     curves = [ring.astype(np.float32)[:, None] for ring in rings]
@@ -105,18 +105,18 @@ def _closed(ring: FloatArray) -> FloatArray:
 
 
 def _along(closed: FloatArray) -> FloatArray:
-    """Return how long a line is up to each of its points (K, 2), (K,)."""
+    """Return the arc length up to each point of a line (K, 2), (K,)."""
     steps = np.linalg.norm(np.diff(closed, axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def _at(closed: FloatArray, along: FloatArray, places: FloatArray) -> FloatArray:
-    """Return a line's points at lengths along it, (N, 2)."""
+    """Return a line's points at given arc lengths, (N, 2)."""
     return np.column_stack([np.interp(places, along, values) for values in closed.T])
 
 
 def _on_ray(closed: FloatArray, along: FloatArray, centre: FloatArray) -> float:
-    """Return where on a ring the ray along x from its centre leaves it last."""
+    """Return the position on a ring at which the ray along x from its centroid leaves it last."""
     x, y = (closed - centre).T
     crosses = np.flatnonzero((y[:-1] < 0.0) != (y[1:] < 0.0))
     share = y[crosses] / (y[crosses] - y[crosses + 1])

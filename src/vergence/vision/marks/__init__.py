@@ -1,4 +1,4 @@
-"""Marks that users put on things: round ones, and AprilTag or ArUco markers."""
+"""Marks attached to objects: round marks, and AprilTag or ArUco markers."""
 
 from vergence.vision.marks.coded import DICTIONARIES, CodedMarks, MarkerDetector
 from vergence.vision.marks.mark_tracker import MarkTracker

@@ -1,4 +1,4 @@
-"""Round marks followed from image to image."""
+"""Tracks round marks from image to image."""
 
 import numpy as np
 
@@ -8,16 +8,16 @@ from vergence.vision.image import grey_image
 from vergence.vision.marks.round import measure_round_marks
 from vergence.vision.tracks import Tracks
 
-FIRST_RADIUS_PX = 8.0  # believed of a mark before it was measured
-SLACK_PX = 10.0  # by which a window exceeds its mark on every side
+FIRST_RADIUS_PX = 8.0  # assumed for a mark before it was measured
+SLACK_PX = 10.0  # margin of a window around its mark on every side
 
 
 class MarkTracker:
-    """A point tracker for marks: each is searched for where its last motion leads.
+    """A point tracker for marks; each is predicted by its last motion.
 
     Args:
         image: the first image, (height, width) grey.
-        points_px: roughly where the marks are in it, (M, 2); a click will do.
+        points_px: approximate positions of the marks, (M, 2), such as mouse clicks.
     """
 
     def __init__(self, image: ImageArray, points_px: FloatArray) -> None:
@@ -29,12 +29,12 @@ class MarkTracker:
 
     @property
     def points_px(self) -> FloatArray:
-        """The marks where they were last found, (M, 2)."""
+        """Last positions of the marks, (M, 2)."""
         return self._points.copy()
 
     @property
     def radius_px(self) -> FloatArray:
-        """Radius of a circle of each mark's area, (M,)."""
+        """Radius of a circle with each mark's area, (M,)."""
         return self._radius.copy()
 
     def track(self, image: ImageArray, predicted_px: FloatArray | None = None) -> Tracks:
@@ -42,7 +42,8 @@ class MarkTracker:
 
         Args:
             image: grey, (height, width).
-            predicted_px: where to look, (M, 2); None to continue as between the last two images.
+            predicted_px: expected positions, (M, 2); None to continue as between the last two
+                images.
         """
         expected = 2 * self._points - self._before if predicted_px is None else predicted_px
         nothing = np.full(len(expected), np.nan)

@@ -1,4 +1,4 @@
-"""Round marks as what a cell follows."""
+"""Round marks as a part in a cell file."""
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.parts import part
@@ -7,8 +7,8 @@ from vergence.vision.marks.mark_tracker import MarkTracker
 
 @part("tracker", "round_marks")
 class MarkTracking:
-    """Follows round marks, each predicted from its last motion; see `MarkTracker`."""
+    """Tracks round marks, each predicted by its last motion; see `MarkTracker`."""
 
     def start(self, image: ImageArray, points_px: FloatArray) -> MarkTracker:
-        """Return the tracker of the marks next to places (M, 2) in the first image."""
+        """Return the tracker of the marks nearest to points (M, 2) in the first image."""
         return MarkTracker(image, points_px)

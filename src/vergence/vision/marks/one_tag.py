@@ -1,4 +1,4 @@
-"""One marker by its number, anywhere in an image; or in words what is seen instead."""
+"""Finds one marker by its number in an image, or describes what is seen instead."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,8 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.tag_families import TAG_FAMILIES
 from vergence.vision.marks.coded import CodedMarks, MarkerDetector
 
-_SMALLER = ("_50", "_100", "_250")  # dictionaries that the one of 1000 markers contains
-_MOST_NAMED = 8  # numbers of markers in a message
+_SMALLER = ("_50", "_100", "_250")  # dictionaries contained in the one of 1000 markers
+_MOST_NAMED = 8  # largest number of markers named in a message
 
 
 class OneTag(NamedTuple):
@@ -20,7 +20,7 @@ class OneTag(NamedTuple):
 
 
 def one_tag(detector: MarkerDetector, image: ImageArray, number: int) -> OneTag | str:
-    """Return a marker, or why it is not found: of two with its number neither is.
+    """Return a marker, or why it is not found; if two have its number, neither is returned.
 
     Args:
         detector: of its dictionary.
@@ -31,7 +31,7 @@ def one_tag(detector: MarkerDetector, image: ImageArray, number: int) -> OneTag 
 
 
 def tag_among(seen: CodedMarks, number: int) -> OneTag | str:
-    """Return a marker of those that are seen, or why it is not found."""
+    """Return one of the detected markers, or why it is not found."""
     rows = np.flatnonzero(seen.ids == number)
     if not len(rows):
         return f"marker {number} is not seen"
@@ -41,9 +41,9 @@ def tag_among(seen: CodedMarks, number: int) -> OneTag | str:
 
 
 def seen_instead(detector: MarkerDetector, image: ImageArray) -> str:
-    """Return in words which markers an image shows, of this dictionary or of another.
+    """Return which markers an image shows, of this dictionary or another, as text.
 
-    All dictionaries are tried, which takes a second: it is for a message.
+    All dictionaries are tried, which takes a second; use it for messages only.
     """
     ids = detector.detect(image).ids.tolist()
     if ids:

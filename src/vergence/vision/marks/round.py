@@ -1,8 +1,8 @@
 """Round marks, dark on light or light on dark: the centroid to a fraction of a pixel.
 
-The centroid of a circle's image is not the image of its centre, unless the circle faces the
-camera: `circle_centre_bias` tells the difference, which grows with the square of the circle's size
-in the image (some hundredths of a pixel for one of 10 px, a pixel for one of 100 px).
+The centroid of a circle's image is not the image of its centre, unless the circle faces the camera.
+`circle_centre_bias` computes the difference, which grows with the square of the circle's size in
+the image (some hundredths of a pixel for one of 10 px, a pixel for one of 100 px).
 """
 
 from typing import NamedTuple
@@ -23,18 +23,18 @@ REASONS = (
     "not round",
 )
 LEAST_AREA = 6.0  # px²
-ROUND_WITHIN = 0.15  # by which the area may differ from that of the ellipse of equal moments
+ROUND_WITHIN = 0.15  # relative difference of the area from that of the ellipse of equal moments
 LEAST_VARIANCE = 0.03**2  # px²
 
 
 class RoundMarks(NamedTuple):
-    """What was found in the windows of one image."""
+    """The measurements in the windows of one image."""
 
-    points_px: FloatArray  # (M, 2) centroids; the predicted place where nothing was found
+    points_px: FloatArray  # (M, 2) centroids; the predicted position if nothing was found
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
-    reasons: tuple[str, ...]  # (M,) empty where found, else why not
-    area_px: FloatArray  # (M,) px²; 0 where nothing was found
+    reasons: tuple[str, ...]  # (M,) empty if found, else why not
+    area_px: FloatArray  # (M,) px²; 0 if nothing was found
 
 
 def measure_round_marks(
@@ -42,15 +42,15 @@ def measure_round_marks(
 ) -> RoundMarks:
     """Find round marks in windows.
 
-    In each window the grey level is split between its brightest and its darkest; the patch nearest
-    to the prediction that touches no border is the mark. Weighing every pixel with how much of it
-    the mark covers makes the centroid independent of the threshold.
+    In each window the grey-level threshold is halfway between its brightest and darkest; the patch
+    nearest to the prediction that touches no border is the mark. Weighting every pixel by the
+    fraction that the mark covers makes the centroid independent of the threshold.
 
     Args:
         image: grey, (height, width).
-        predicted_px: where the marks are expected, (M, 2).
+        predicted_px: expected positions of the marks, (M, 2).
         half_px: half the width and height of the windows, (M, 2).
-        contrast: least difference between mark and ground, grey values.
+        contrast: smallest difference between mark and background, grey values.
     """
     places, covariances, codes, areas = _measure(
         np.ascontiguousarray(image),
@@ -147,7 +147,7 @@ def _fill(
     labels: IntArray,
     stack: IntArray,
 ) -> tuple[int, bool]:
-    """Label the patch of a pixel; return its pixels, and whether it touches the border."""
+    """Label the patch of a pixel; return its pixel count, and whether it touches the border."""
     bright = window[row, column] > level
     stack[0, 0], stack[0, 1] = row, column
     labels[row, column] = number
@@ -179,10 +179,10 @@ def _moments(
     place: FloatArray,
     spread: FloatArray,
 ) -> float:
-    """Fill centroid and second moments of a patch and the rim around it; return its area.
+    """Fill centroid and second moments of a patch with its rim; return its area.
 
-    A pixel counts by the share of it that the mark covers, told by its grey level. A patch that is
-    no brighter or darker than what lies around it has no area.
+    A pixel is weighted by the fraction that the mark covers, according to its grey level. A patch
+    that does not differ from its surroundings in brightness has no area.
     """
     rows, columns = window.shape
     bright = window[pixels[0, 0], pixels[0, 1]] > level
@@ -251,10 +251,10 @@ def _level(
 def circle_centre_bias(
     camera: Camera, centre: FloatArray, normal: FloatArray, radius: float
 ) -> FloatArray:
-    """Return by how much the centroid of a circle's image is off its centre's image, (2,), px.
+    """Return the offset of the centroid of a circle's image from its centre's image, (2,), px.
 
-    Subtract it from a measured centroid to have the centre. Pinhole geometry; the distortion is
-    taken to be even over the circle.
+    Subtract it from a measured centroid to obtain the centre. Pinhole geometry; distortion is
+    assumed constant over the circle.
 
     Args:
         camera: the camera's model.

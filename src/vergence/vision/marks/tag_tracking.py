@@ -1,4 +1,4 @@
-"""Corners of AprilTag or ArUco markers as what a cell follows."""
+"""Corners of AprilTag or ArUco markers as a part in a cell file."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from vergence.vision.tracks import PointTracker, Tracks, nothing_found
 
 @part("tracker", "tags")
 class TagTracking:
-    """Follows corners of markers, which are identified by their numbers."""
+    """Tracks corners of markers, which are identified by their numbers."""
 
     dictionary: str = knob("apriltag_36h11")  # dictionary of the markers, such as aruco_4x4_50
     noise_px: float = knob(0.05, "px", above=0, upto=100)  # smallest standard deviation of a corner
@@ -21,13 +21,13 @@ class TagTracking:
     away_px: float = knob(10.0, "px", above=0, upto=1e4)
 
     def __post_init__(self) -> None:
-        MarkerDetector(self.dictionary)  # which names those that are known
+        MarkerDetector(self.dictionary)  # raises an error that lists the known dictionaries
 
     def start(self, image: ImageArray, points_px: FloatArray) -> PointTracker:
-        """Return the tracker of the corners next to places (M, 2) in the first image.
+        """Return the tracker of the corners nearest to points (M, 2) in the first image.
 
         Raises:
-            InputError: if no marker has a corner next to a place.
+            InputError: if no marker has a corner near a point.
         """
         detector = MarkerDetector(self.dictionary, self.noise_px)
         grey, _ = grey_image(image)
@@ -74,7 +74,7 @@ def _no_marks(detector: MarkerDetector) -> CodedMarks:
 
 
 def _next_to(found: CodedMarks, place: FloatArray, away_px: float) -> tuple[int, int] | None:
-    """Return number and corner of the marker whose corner is nearest to a place (2,)."""
+    """Return number and corner of the marker whose corner is nearest to a point (2,)."""
     if not len(found.ids):
         return None
     distance = np.linalg.norm(found.corners_px - place, axis=2)
