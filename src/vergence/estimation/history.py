@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Generic, NamedTuple
 
 from vergence.estimation.target_filter import (
@@ -14,6 +15,8 @@ from vergence.estimation.target_filter import (
     unused,
 )
 from vergence.estimation.view import Seen, View, together
+
+_camera_of = attrgetter("camera")
 
 
 class _Entry(NamedTuple, Generic[B]):
@@ -94,7 +97,7 @@ class FilterHistory(Generic[B]):
             new.setdefault(view.time, []).append(view)
         for time, added in new.items():
             before = groups[time][0] if time in groups else ()
-            there = tuple(sorted((*before, *added), key=lambda view: view.camera))
+            there = tuple(sorted((*before, *added), key=_camera_of))
             groups[time] = there, together(there)
         entries, belief = list(self.entries[:place]), self._before(place)
         made = {}

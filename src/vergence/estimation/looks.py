@@ -25,11 +25,12 @@ class Predicted(NamedTuple):
     T_camera_world: FloatArray  # (C, 4, 4)
     T_world_target: FloatArray  # (C, 4, 4) predicted for each exposure
     T_camera_target: FloatArray  # (C, 4, 4)
-    expected: tuple[Expected, ...]
+    expected: tuple[Expected, ...]  # at each of E times of exposure, in their order
+    exposures: IntArray  # (C,) number of each image's
 
     @property
     def newest(self) -> Expected:
-        """What is expected of the last image."""
+        """What is expected of the last images."""
         return self.expected[-1]
 
 
@@ -37,7 +38,5 @@ class Look(NamedTuple):
     """What was measured in an image."""
 
     number: int  # of the image
-    features: IntArray  # (K,) chosen, one at least
-    half_px: FloatArray  # (K, 2) half the sizes of their windows
-    found: ImagePoints  # K points
+    found: ImagePoints  # the points in its windows, one at least
     view: View  # of those that are usable

@@ -5,10 +5,12 @@ from dataclasses import replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
+from numba import njit
 
-from vergence.arrays import FloatArray, IntArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.estimation.looks import Look
 from vergence.estimation.visibility import Visibility
+from vergence.estimation.windows import Windows
 from vergence.signals import Frame, ImagePoints, SearchWindows
 
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
@@ -17,6 +19,7 @@ CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
 # find(frame) -> all features of the target wherever they are in the image, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
+_NO_POINTS, _NO_COVARIANCE = np.empty((0, 2)), np.empty((0, 2, 2))
 UNSEEN = (  # a reason for each `ViewStatus`
     "not chosen",
     "behind the camera",
@@ -53,6 +56,7 @@ class Measure(Protocol):
 def every_point(
     frames: Sequence[Frame],
     visibility: Visibility,
+    windows: Windows,
     looks: Sequence[Look],
     agreeing: Sequence[IntArray],
     widest_px: float,
@@ -65,31 +69,38 @@ def every_point(
     Args:
         frames: the images, C.
         visibility: what was expected of them.
-        looks: what was measured in some of them.
+        windows: that were opened in some of them.
+        looks: what was measured in those.
         agreeing: for each look, the numbers of the features that agree with the pose.
         widest_px: half the widest window.
     """
-    places = visibility.points_px.copy()
-    covariance = np.zeros((*places.shape, 2))
-    covariance[..., 0, 0] = covariance[..., 1, 1] = widest_px**2
-    found = np.zeros(places.shape[:2], dtype=np.bool_)
-    center_px, half_px = np.full((2, *places.shape), np.nan)
-    reasons = [[UNSEEN[value] for value in row] for row in visibility.status.tolist()]
+    found = np.zeros(visibility.status.shape, dtype=np.bool_)
     for look, kept in zip(looks, agreeing, strict=True):
-        found[look.number, kept] = True
-    if looks:
-        row = np.repeat([look.number for look in looks], [len(look.features) for look in looks])
-        features = np.concatenate([look.features for look in looks])
-        center_px[row, features] = places[row, features]
-        half_px[row, features] = np.concatenate([look.half_px for look in looks])
-        agrees = found[row, features]
-        at = row[agrees], features[agrees]
-        places[at] = np.concatenate([look.found.points_px for look in looks])[agrees]
-        covariance[at] = np.concatenate([look.found.covariance_px for look in looks])[agrees]
-        told = [reason for look in looks for reason in look.found.reasons]
-        every = zip(row.tolist(), features.tolist(), agrees.tolist(), told, strict=True)
-        for n, m, agreed, reason in every:
-            reasons[n][m] = reason or ("" if agreed else "disagrees with the pose")
+        found[look.number][kept] = True
+    places, covariance = visibility.points_px.copy(), np.empty((*found.shape, 2, 2))
+    center_px, half_px = np.empty_like(places), np.empty_like(places)
+    fill_points(
+        windows.images,
+        windows.ends,
+        windows.features,
+        windows.center_px,
+        windows.half_px,
+        np.concatenate([look.found.points_px for look in looks] or [_NO_POINTS]),
+        np.concatenate([look.found.covariance_px for look in looks] or [_NO_COVARIANCE]),
+        found,
+        widest_px,
+        places,
+        covariance,
+        center_px,
+        half_px,
+    )
+    reasons = [[UNSEEN[value] for value in row] for row in visibility.status.tolist()]
+    features, start = windows.features.tolist(), 0
+    for look in looks:
+        agrees, row = found[look.number].tolist(), reasons[look.number]
+        for m, reason in zip(features[start:], look.found.reasons, strict=False):
+            row[m] = reason or ("" if agrees[m] else "disagrees with the pose")
+        start += len(look.found.reasons)
     return tuple(
         ImagePoints(
             frame.camera,
@@ -102,6 +113,59 @@ def every_point(
         )
         for n, frame in enumerate(frames)
     )
+
+
+@njit(cache=True)
+def fill_points(
+    images: IntArray,
+    ends: IntArray,
+    features: IntArray,
+    window_center_px: FloatArray,
+    window_half_px: FloatArray,
+    points_px: FloatArray,
+    covariance_px: FloatArray,
+    found: BoolArray,
+    widest_px: float,
+    places: FloatArray,
+    covariance: FloatArray,
+    center_px: FloatArray,
+    half_px: FloatArray,
+) -> None:
+    """Fill in what is known of every feature, whether looked for or not; see `every_point`.
+
+    Args:
+        images: with the next four, `Windows`.
+        ends: (L,).
+        features: (K,).
+        window_center_px: (K, 2).
+        window_half_px: (K, 2).
+        points_px: measured, (K, 2).
+        covariance_px: of those, (K, 2, 2).
+        found: whether a feature was found and agrees with the pose, (C, M).
+        widest_px: half the widest window.
+        places: predicted, (C, M, 2); changed, as all that follow.
+        covariance: (C, M, 2, 2).
+        center_px: (C, M, 2).
+        half_px: (C, M, 2).
+    """
+    center_px[:] = np.nan
+    half_px[:] = np.nan
+    covariance[:] = 0.0
+    for n in range(covariance.shape[0]):
+        for m in range(covariance.shape[1]):
+            covariance[n, m, 0, 0] = covariance[n, m, 1, 1] = widest_px * widest_px
+    k = 0
+    for number in range(len(images)):
+        n = images[number]
+        while k < ends[number]:
+            m = features[k]
+            for i in range(2):
+                center_px[n, m, i], half_px[n, m, i] = window_center_px[k, i], window_half_px[k, i]
+                if found[n, m]:
+                    places[n, m, i] = points_px[k, i]
+                    for j in range(2):
+                        covariance[n, m, i, j] = covariance_px[k, i, j]
+            k += 1
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:

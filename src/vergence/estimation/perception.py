@@ -25,14 +25,14 @@ from vergence.estimation.selection import Candidates, InformationSelection, Sele
 from vergence.estimation.spacing import keep_apart
 from vergence.estimation.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.target_shape import TargetShape
-from vergence.estimation.view import View, view_of
+from vergence.estimation.view import View, usable_view, view_of
 from vergence.estimation.visibility import (
     Blocked,
     Visibility,
     add_obstacles,
     predict_visibility,
 )
-from vergence.estimation.windows import WindowRule, innovation_spread
+from vergence.estimation.windows import WindowRule, Windows, open_windows
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, Observation, TargetState
 
@@ -132,14 +132,14 @@ class PosePerception(Generic[B]):
         predicted = self._predict(sorted(known, key=lambda frame: (frame.time, frame.camera)))
         visibility = self._see(predicted)
         chosen = self._choose(predicted, visibility)
-        looks = [
-            self._look(predicted, n, chosen[n], visibility.points_px[n])
-            for n in np.flatnonzero(chosen.any(axis=1)).tolist()  # no other is even touched
-        ]
+        windows = self._open(predicted, chosen, visibility)
+        looks = self._look(predicted, windows)
         agreeing = self._correct(looks)
         time = predicted.frames[-1].time
         self._judge(time, [look.view for look in looks], predicted.frames)
-        points = every_point(predicted.frames, visibility, looks, agreeing, self._windows.most_px)
+        points = every_point(
+            predicted.frames, visibility, windows, looks, agreeing, self._windows.most_px
+        )
         if self._lost:
             return Observation(time, tuple(nothing_found(p, self._lost) for p in points))
         return Observation(time, points, state_of(self.belief))
@@ -154,10 +154,11 @@ class PosePerception(Generic[B]):
         """Return what is expected of images in order of exposure."""
         for frame in frames:
             require_size(frame, self._rig)
-        at = {time: self._expected(time) for time in {frame.time for frame in frames}}
-        expected = tuple(at[frame.time] for frame in frames)
+        times = sorted({frame.time for frame in frames})
+        expected = tuple(map(self._expected, times))
+        exposures = np.array([times.index(frame.time) for frame in frames])
         T_world_camera = np.array([self._camera_pose(f.camera, f.joints) for f in frames])
-        T_world_target = np.array([e.T_world_target for e in expected])
+        T_world_target = np.array([e.T_world_target for e in expected])[exposures]
         T_camera_world, T_camera_target = seen_from(T_world_camera, T_world_target)
         return Predicted(
             tuple(frames),
@@ -167,6 +168,7 @@ class PosePerception(Generic[B]):
             T_world_target,
             T_camera_target,
             expected,
+            exposures,
         )
 
     def _see(self, predicted: Predicted) -> Visibility:
@@ -207,22 +209,46 @@ class PosePerception(Generic[B]):
         self._held[numbers] = chosen
         return chosen
 
-    def _look(
-        self, predicted: Predicted, n: int, chosen: BoolArray, expected_px: FloatArray
-    ) -> Look:
-        """Measure the features chosen in an image inside windows."""
-        features = np.flatnonzero(chosen)
-        half_px = self._half_sizes(predicted, n, features)
-        found = self._measure(
-            predicted.frames[n],
-            features,
-            expected_px[features],
-            half_px,
-            predicted.T_camera_target[n],
+    def _open(self, predicted: Predicted, chosen: BoolArray, visibility: Visibility) -> Windows:
+        """Return the windows around the features chosen, the widest if the target is lost."""
+        rule, expected = self._windows.numbers, predicted.expected
+        if self._lost:
+            rule = (*rule[:2], rule[3], rule[3])
+        return Windows(
+            *open_windows(
+                chosen,
+                visibility.points_px,
+                predicted.T_world_target,
+                predicted.T_camera_world,
+                self._shape.points,
+                np.array([e.covariance for e in expected]),
+                predicted.exposures,
+                np.array([1.0 + self._settings.doubt_widens * e.doubt for e in expected]),
+                self._rig.lenses,
+                self._rig.noise_px,
+                predicted.numbers,
+                rule,
+            )
         )
-        camera = self._rig.cameras[predicted.numbers[n]]
-        view = view_of(found, camera, predicted.T_world_camera[n], self._shape.points, features)
-        return Look(n, features, half_px, found, view)
+
+    def _look(self, predicted: Predicted, windows: Windows) -> list[Look]:
+        """Measure features inside their windows; images without any are not even touched."""
+        looks, start = [], 0
+        for n, end in zip(windows.images.tolist(), windows.ends.tolist(), strict=True):
+            features = windows.features[start:end]
+            found = self._measure(
+                predicted.frames[n],
+                features,
+                windows.center_px[start:end],
+                windows.half_px[start:end],
+                predicted.T_camera_target[n],
+            )
+            camera = self._rig.cameras[predicted.numbers[n]]
+            points, T_camera_world = windows.points[start:end], predicted.T_camera_world[n]
+            view = usable_view(found, camera, T_camera_world, points, features)
+            looks.append(Look(n, found, view))
+            start = end
+        return looks
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
         """Correct the pose by all images; return which features of each agree with it."""
@@ -233,20 +259,6 @@ class PosePerception(Generic[B]):
             look.view.features[update.kept] if update.verdict in JUDGED else look.view.features
             for look, update in zip(looks, updates, strict=True)
         ]
-
-    def _half_sizes(self, predicted: Predicted, n: int, features: IntArray) -> FloatArray:
-        if self._lost:
-            return np.full((len(features), 2), self._windows.most_px)
-        expected, number = predicted.expected[n], predicted.numbers[n]
-        spread = innovation_spread(
-            predicted.T_world_target[n],
-            predicted.T_camera_world[n],
-            self._shape.points[features],
-            expected.covariance,
-        )
-        camera, noise_px = self._rig.cameras[number], float(self._rig.noise_px[number])
-        scale = 1.0 + self._settings.doubt_widens * expected.doubt
-        return self._windows.half_sizes(spread, camera.focal_px, noise_px, scale)
 
     def _judge(self, time: float, views: list[View], frames: Sequence[Frame]) -> None:
         """Drop a target that contradicts the images for too long; search for a dropped one."""

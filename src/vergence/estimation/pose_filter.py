@@ -88,6 +88,19 @@ def correct(
 
 
 @njit(cache=True)
+def predict(
+    T_world_target: FloatArray,
+    velocity: FloatArray,
+    P: FloatArray,
+    dt: float,
+    densities: tuple[float, float],
+) -> tuple[FloatArray, FloatArray]:
+    """Return pose (4, 4) and covariance (12, 12) after dt seconds; see `motion`."""
+    pose = predict_pose(T_world_target, velocity, dt)
+    return pose, predict_covariance(P, velocity, abs(dt), np.array(densities))
+
+
+@njit(cache=True)
 def predict_and_correct(
     T_world_target: FloatArray,
     velocity: FloatArray,
@@ -101,8 +114,7 @@ def predict_and_correct(
     gate: float,
 ) -> Correction:
     """Predict by dt seconds, then `correct`: in one call, since calls cost more than sums."""
-    predicted = predict_covariance(P, velocity, abs(dt), np.array(densities))
-    pose = predict_pose(T_world_target, velocity, dt)
+    pose, predicted = predict(T_world_target, velocity, P, dt, densities)
     return correct(pose, velocity, predicted, poses, points, measured, covariance, gate)
 
 
@@ -165,16 +177,18 @@ class PoseFilter:
         dt = time - belief.time
         if dt == 0.0:
             return belief
+        pose, covariance = predict(
+            belief.T_world_target,
+            belief.velocity,
+            belief.covariance,
+            dt,
+            self._densities(belief),
+        )
         return Belief(
             time,
-            predict_pose(belief.T_world_target, belief.velocity, dt),
+            pose,
             belief.velocity,
-            predict_covariance(
-                belief.covariance,
-                belief.velocity,
-                abs(dt),
-                np.array(self._densities(belief)),
-            ),
+            covariance,
             belief.consistency,
             belief.seen,
             belief.doubts,

@@ -115,16 +115,16 @@ def of_each_image(update: Update, views: Sequence[View]) -> list[Update]:
     """
     if len(views) == 1:
         return [update]
-    parts, start = [], 0
+    parts, start, kept = [], 0, update.kept.tolist()
     for view in views:
-        own = slice(start, start + view.size)
-        kept, verdict = update.kept[own], update.verdict
-        if view.size == 0:
+        end, verdict = start + view.size, update.verdict
+        if end == start:
             verdict = Verdict.EMPTY
-        elif not kept.any():
+        elif True not in kept[start:end]:
             verdict = Verdict.CONTRADICTED
-        parts.append(Update(update.belief, verdict, kept, update.squares[own]))
-        start += view.size
+        own = slice(start, end)
+        parts.append(Update(update.belief, verdict, update.kept[own], update.squares[own]))
+        start = end
     return parts
 
 

@@ -60,17 +60,17 @@ Seen = View | Exposure  # what a filter takes in
 
 def together(views: Sequence[View]) -> Seen:
     """Put the points of images one after the other, as if all were taken when the first was."""
-    filled = [view for view in views if view.size]
+    filled = [view for view in views if len(view.points)]
     if len(filled) < 2:
         return filled[0] if filled else views[0]
-    cameras = np.array([view.T_camera_world for view in filled])
+    _, _, cameras, _, points, measured, covariance = zip(*filled, strict=True)
     return Exposure(
         filled[0].time,
         len(filled),
-        np.repeat(cameras, [view.size for view in filled], axis=0),
-        np.concatenate([view.points for view in filled]),
-        np.concatenate([view.measured for view in filled]),
-        np.concatenate([view.covariance for view in filled]),
+        np.array(cameras).repeat([len(own) for own in points], axis=0),
+        np.concatenate(points),
+        np.concatenate(measured),
+        np.concatenate(covariance),
     )
 
 
@@ -112,54 +112,74 @@ def view_of(
     """
     if features is None:
         features = np.arange(len(image_points.points_px))
+    T_camera_world = se3_inverse(T_world_camera)
+    return usable_view(image_points, camera, T_camera_world, target_points[features], features)
+
+
+def usable_view(
+    image_points: ImagePoints,
+    camera: Camera,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    features: IntArray,
+) -> View:
+    """Return the same; of each measured point, `points` (M, 3) and `features` (M,) tell which."""
     places, spread = image_points.points_px, image_points.covariance_px
-    usable = usable_points(places, spread, image_points.found)
-    if not usable.all():
-        places, spread, features = places[usable], spread[usable], features[usable]
     lens = (camera.fx, camera.fy, camera.cx, camera.cy)
-    measured, covariance = pinhole_coordinates(places, spread, lens)
+    count, usable, measured, covariance = usable_coordinates(
+        places, spread, image_points.found, lens
+    )
+    if count < len(usable):
+        places, spread = places[usable], spread[usable]
+        points, features = points[usable], features[usable]
     if camera.distorted:
         measured = camera.normalize(places)
         covariance = camera.normalize_covariance(spread, measured)
     return View(
         image_points.camera,
         image_points.time,
-        se3_inverse(T_world_camera),
+        T_camera_world,
         features,
-        target_points[features],
+        points,
         measured,
         covariance,
     )
 
 
 @njit(cache=True)
-def pinhole_coordinates(
-    points_px: FloatArray, covariance_px: FloatArray, lens: tuple[float, float, float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return normalized coordinates (M, 2) and covariances (M, 2, 2) without distortion.
+def usable_coordinates(
+    points_px: FloatArray,
+    covariance_px: FloatArray,
+    found: BoolArray,
+    lens: tuple[float, float, float, float],
+) -> tuple[int, BoolArray, FloatArray, FloatArray]:
+    """Return how many points are usable, which, and their normalized coordinates.
+
+    A point is usable if it was found, is finite, and has a positive definite covariance. The lens
+    is taken as without distortion.
 
     Args:
         points_px: (M, 2).
         covariance_px: (M, 2, 2), px².
+        found: (M,).
         lens: fx, fy, cx, cy, px.
+
+    Returns:
+        The number N; the mask (M,); coordinates (N, 2); their covariance (N, 2, 2).
     """
     fx, fy, cx, cy = lens
-    points, covariance = np.empty_like(points_px), np.empty_like(covariance_px)
-    for n in range(len(points_px)):
-        points[n, 0], points[n, 1] = (points_px[n, 0] - cx) / fx, (points_px[n, 1] - cy) / fy
-        covariance[n, 0, 0] = covariance_px[n, 0, 0] / (fx * fx)
-        covariance[n, 1, 1] = covariance_px[n, 1, 1] / (fy * fy)
-        covariance[n, 0, 1] = covariance[n, 1, 0] = covariance_px[n, 1, 0] / (fx * fy)
-    return points, covariance
-
-
-@njit(cache=True)
-def usable_points(points_px: FloatArray, covariance_px: FloatArray, found: BoolArray) -> BoolArray:
-    """Return which points (M,) were found, are finite, and have a positive definite covariance."""
     usable = np.empty(len(points_px), dtype=np.bool_)
+    points, covariance = np.empty_like(points_px), np.empty_like(covariance_px)
+    count = 0
     for n in range(len(points_px)):
-        C = covariance_px[n]
-        finite = np.isfinite(points_px[n, 0] + points_px[n, 1] + C[0, 0] + C[1, 0] + C[1, 1])
+        u, v, C = points_px[n, 0], points_px[n, 1], covariance_px[n]
+        finite = np.isfinite(u + v + C[0, 0] + C[1, 0] + C[1, 1])
         positive = C[0, 0] > 0.0 and C[0, 0] * C[1, 1] > C[1, 0] * C[1, 0]
         usable[n] = found[n] and finite and positive
-    return usable
+        if usable[n]:
+            points[count, 0], points[count, 1] = (u - cx) / fx, (v - cy) / fy
+            covariance[count, 0, 0] = C[0, 0] / (fx * fx)
+            covariance[count, 1, 1] = C[1, 1] / (fy * fy)
+            covariance[count, 0, 1] = covariance[count, 1, 0] = C[1, 0] / (fx * fy)
+            count += 1
+    return count, usable, points[:count], covariance[:count]

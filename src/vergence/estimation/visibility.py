@@ -49,7 +49,7 @@ class Visibility(NamedTuple):
     @property
     def visible(self) -> BoolArray:
         """The features that are seen, (C, M)."""
-        seen: BoolArray = self.status == ViewStatus.VISIBLE
+        seen: BoolArray = self.status == VISIBLE
         return seen
 
 

@@ -1,11 +1,13 @@
 """Where to look: windows around predicted features."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.camera.lens import FX, FY
 from vergence.errors import InputError
 from vergence.estimation.measurement import POSE, point_rows
 
@@ -40,7 +42,11 @@ def innovation_spread(
 
 @njit(cache=True)
 def window_sizes(
-    spread: FloatArray, focal_px: FloatArray, noise_px: float, scale: float, rule: FloatArray
+    spread: FloatArray,
+    focal_px: FloatArray,
+    noise_px: float,
+    scale: float,
+    rule: tuple[float, float, float, float],
 ) -> FloatArray:
     """Return half the sizes (M, 2) of windows; `rule` is (deviations, border, least, most)."""
     sizes = np.empty_like(spread)
@@ -50,6 +56,69 @@ def window_sizes(
             half = scale * (rule[1] + rule[0] * deviation)
             sizes[n, i] = min(max(half, rule[2]), rule[3])
     return sizes
+
+
+class Windows(NamedTuple):
+    """Windows in L of C images, those of an image one after the other."""
+
+    images: IntArray  # (L,) numbers of the images that have one
+    ends: IntArray  # (L,) how many windows there are in all images up to each
+    features: IntArray  # (K,) of the target
+    center_px: FloatArray  # (K, 2)
+    half_px: FloatArray  # (K, 2)
+    points: FloatArray  # (K, 3) the features' places in the target's frame, m
+
+
+@njit(cache=True)
+def open_windows(
+    chosen: BoolArray,
+    places: FloatArray,
+    T_world_target: FloatArray,
+    T_camera_world: FloatArray,
+    points: FloatArray,
+    covariances: FloatArray,
+    exposures: IntArray,
+    scales: FloatArray,
+    lenses: FloatArray,
+    noise_px: FloatArray,
+    cameras: IntArray,
+    rule: tuple[float, float, float, float],
+) -> tuple[IntArray, IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """Return the windows around the chosen features of all images, as `Windows` has them.
+
+    Args:
+        chosen: (C, M).
+        places: predicted, (C, M, 2), px.
+        T_world_target: predicted for each image, (C, 4, 4).
+        T_camera_world: inverse poses of the cameras, (C, 4, 4).
+        points: in the target's frame, (M, 3), m.
+        covariances: predicted for each exposure, of the pose at least, (E, 6 or more, 6 or more).
+        exposures: number of each image's, (C,).
+        scales: of the windows of each exposure, (E,).
+        lenses: of all cameras, (N, 11).
+        noise_px: expected standard deviation of their measured points, (N,).
+        cameras: number of each image's, (C,).
+        rule: as in `window_sizes`.
+    """
+    images, ends = np.empty(len(chosen), dtype=np.int64), np.empty(len(chosen), dtype=np.int64)
+    total = int(np.sum(chosen))
+    features = np.empty(total, dtype=np.int64)
+    center, half, asked = np.empty((total, 2)), np.empty((total, 2)), np.empty((total, 3))
+    count, end = 0, 0
+    for n in range(len(chosen)):
+        own = np.flatnonzero(chosen[n])
+        if len(own) == 0:
+            continue
+        start, end = end, end + len(own)
+        features[start:end], center[start:end], asked[start:end] = own, places[n][own], points[own]
+        spread = innovation_spread(
+            T_world_target[n], T_camera_world[n], asked[start:end], covariances[exposures[n]]
+        )
+        focal, scale = lenses[cameras[n], FX : FY + 1], scales[exposures[n]]
+        half[start:end] = window_sizes(spread, focal, noise_px[cameras[n]], scale, rule)
+        images[count], ends[count] = n, end
+        count += 1
+    return images[:count], ends[:count], features, center, half, asked
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +149,10 @@ class WindowRule:
             noise_px: expected standard deviation of a measured point.
             scale: of the whole window, above 1 for a filter in doubt.
         """
-        sizes: FloatArray = window_sizes(
-            spread,
-            focal_px,
-            noise_px,
-            scale,
-            np.array((self.deviations, self.border_px, self.least_px, self.most_px)),
-        )
+        sizes: FloatArray = window_sizes(spread, focal_px, noise_px, scale, self.numbers)
         return sizes
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float]:
+        """What kernels need: deviations, border, and half a window at least and at most, px."""
+        return float(self.deviations), self.border_px, self.least_px, self.most_px
