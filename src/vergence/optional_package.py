@@ -1,7 +1,6 @@
 """Optional packages, installed by extras of vergence."""
 
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 from vergence.errors import InputError, echo
@@ -44,8 +43,3 @@ def optional_package(what: str, module: str, extra: str, source: str = "--driver
         else:
             trouble = "is not installed"
         raise MissingPackage(source, what, trouble, extra) from None
-
-
-def is_installed(module: str) -> bool:
-    """Return whether a module can be found, without importing it."""
-    return find_spec(module) is not None

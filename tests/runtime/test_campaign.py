@@ -393,19 +393,14 @@ def test_a_run_that_nobody_survives_ends_in_a_clear_message(source, trials, tmp_
         cluster.close()
 
 
-def test_without_dask_one_process_runs_all_unless_several_are_asked_for(
-    source, trials, results, monkeypatch
-):
+def test_without_dask_only_a_scheduler_is_refused(source, trials, results, monkeypatch):
     from vergence import optional_package
-    from vergence.experiments import executor
 
     def missing(module):
         raise ImportError(f"No module named {module!r}", name=module)
 
-    monkeypatch.setattr(executor, "is_installed", lambda _: False)
     monkeypatch.setattr(optional_package, "import_module", missing)
-    alone = list(Executor().run(source, trials[:2], 2.0))
-    assert [result.key for result in alone] == [result.key for result in results[:2]]
-    for asked in (Executor(workers=2), Executor(scheduler="tcp://127.0.0.1:1")):
-        with pytest.raises(InputError, match=r"pip install 'vergence\[cluster\]'"):
-            list(asked.run(source, trials[:2], 2.0))
+    shared = list(Executor(workers=2).run(source, trials[:2], 2.0))
+    assert {result.key for result in shared} == {result.key for result in results[:2]}
+    with pytest.raises(InputError, match=r"pip install 'vergence\[cluster\]'"):
+        list(Executor(scheduler="tcp://127.0.0.1:1").run(source, trials[:2], 2.0))

@@ -1,12 +1,12 @@
 """What `vergence compare` and `vergence map` have in common: running, data, pages."""
 
 import csv
-import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from time import process_time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vergence.app import markup
@@ -114,7 +114,8 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> Campai
     from vergence.experiments import Executor, WorkersLostError, run_campaign
 
     counts: list[int] = []  # of runs that are done: at first those of an earlier campaign
-    began_s = _cpu_s()
+    spent: list[float] = []  # CPU time of other processes, s
+    began_s = process_time()
     with bar("{task.completed} of {task.total} runs") as progress:
         task = progress.add_task("runs", total=len(trials))
 
@@ -127,7 +128,7 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> Campai
                 source,
                 trials,
                 how.folder,
-                executor=Executor(how.options.workers, how.options.scheduler),
+                executor=Executor(how.options.workers, how.options.scheduler, spent.append),
                 tolerance_px=how.tolerance_px,
                 physics=how.options.physics,
                 progress=show,
@@ -139,13 +140,8 @@ def run(source: "CellSource", trials: "Sequence[Trial]", how: Running) -> Campai
             warn(f"{error}; repeat the command with --out {how.folder} to resume")
             raise SystemExit(FAILURE) from None
     new, here = counts[-1] - counts[0], how.options.scheduler is None
-    return Campaign(results, new / (_cpu_s() - began_s) if new and here else None)
-
-
-def _cpu_s() -> float:
-    """Return the CPU time that this process and its workers have taken, s."""
-    own_user, own_system, workers_user, workers_system, _ = os.times()
-    return own_user + own_system + workers_user + workers_system
+    cpu_s = process_time() - began_s + sum(spent)
+    return Campaign(results, new / cpu_s if new and here else None)
 
 
 _COLUMNS = (

@@ -1,13 +1,10 @@
 """Who runs the trials: this process, processes of this machine, or a cluster."""
 
-import logging
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from functools import partial
 from math import ceil
-from typing import Any
 
 from vergence.cell import Cell
 from vergence.errors import InputError, VergenceError
@@ -15,16 +12,13 @@ from vergence.experiments.kinematic import is_ideal, is_quick
 from vergence.experiments.run_trial import as_they_come, run_trials
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
-from vergence.optional_package import is_installed, optional_package
+from vergence.experiments.workers import DEATHS, DeadlyTaskError, share_out
+from vergence.optional_package import optional_package
 
-_LOG = logging.getLogger(__name__)
 _CONNECT_S = 10
 _CHUNK = 256  # quick trials handed out at once: about a second of one core
 _SHARES = 8  # of a worker: tasks of ideal runs, so that all workers end at much the same time
 _MOST = 16  # ideal runs in a task
-_NO_PAGES: dict[str, list[str]] = {
-    f"distributed.{role}.http.routes": [] for role in ("scheduler", "worker")
-}
 _SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
 
 
@@ -43,6 +37,7 @@ class Executor:
 
     workers: int | None = None  # every core's if None; 1 is this process
     scheduler: str | None = None  # address of a Dask scheduler, such as tcp://10.0.0.1:8786
+    spent: Callable[[float], object] | None = None  # told the CPU time of those processes, s
 
     def run(
         self,
@@ -57,10 +52,11 @@ class Executor:
         this process, on as many cores: a thousand of them take less than processes to start.
 
         Raises:
-            InputError: if there is no scheduler at the address, or Dask is not installed.
+            InputError: if there is no scheduler at the address, or Dask, which it needs, is not
+                installed.
             WorkersLostError: if every worker dies that is given the same trials.
         """
-        count = self.workers or os.cpu_count() or 1
+        count = self.workers or len(os.sched_getaffinity(0))
         quick, ideal, slow = _by_pace(source, trials, physics)
         if self.scheduler is None:
             for some in _chunks(quick, _CHUNK):
@@ -68,79 +64,54 @@ class Executor:
             quick = []
         size = min(_MOST, ceil(len(ideal) / (_SHARES * count)))
         tasks = [*_chunks(quick, _CHUNK), *_chunks(ideal, size), *_chunks(slow, 1)]
-        if self.scheduler is None and self.workers is None and not is_installed("distributed"):
-            _LOG.info("one process runs all: pip install 'vergence[cluster]' for one a core")
-            count = 1
-        if self.scheduler is None and min(count, len(tasks)) <= 1:
+        if self.scheduler is not None:
+            yield from _by_dask(self.scheduler, source, tasks, tolerance_px, physics)
+        elif min(count, len(tasks)) <= 1:
             yield from as_they_come(source, [*ideal, *slow], tolerance_px, physics)
         else:
-            yield from self._distribute(source, tasks, tolerance_px, physics, count)
-
-    def _distribute(
-        self,
-        source: CellSource,
-        tasks: Sequence[Sequence[Trial]],
-        tolerance_px: float,
-        physics: bool,
-        count: int,
-    ) -> Iterator[TrialResult]:
-        distributed = _distributed(self)
-        with self._client(min(count, len(tasks))) as client:
-            given = {
-                client.submit(run_trials, source, task, tolerance_px, physics, pure=False): task
-                for task in tasks
-            }
-            for future in distributed.as_completed(given):
-                try:
-                    yield from future.result()
-                except distributed.scheduler.KilledWorker as error:
-                    count = error.allowed_failures + 1
-                    what = f"every worker that took it was killed, {count} in all; out of memory?"
-                    raise WorkersLostError(given[future], what) from None
-                except distributed.client.FutureCancelledError:
-                    raise WorkersLostError(given[future], "the scheduler has disappeared") from None
-
-    @contextmanager
-    def _client(self, count: int) -> Iterator[Any]:
-        distributed = _distributed(self)
-        if self.scheduler is not None:
+            do = partial(_run_task, source, tolerance_px, physics)
             try:
-                client = distributed.Client(self.scheduler, timeout=_CONNECT_S)
-            except (OSError, TimeoutError, ValueError) as error:
-                given = f"{self.scheduler} ({error})"
-                raise InputError("--scheduler", "", given, _SCHEDULER) from None
-            with client:
-                yield client
-            return
-        with (
-            import_module("dask").config.set(_NO_PAGES),
-            distributed.LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                # Workers run what they are sent: only who has this run's certificate is heard.
-                security=distributed.Security.temporary(),
-                dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.ERROR,
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            client.run(_keep_quiet)
-            yield client
+                for results in share_out(do, tasks, min(count, len(tasks)), self.spent):
+                    yield from results
+            except DeadlyTaskError as error:
+                raise WorkersLostError(tasks[error.number], _killed(DEATHS)) from None
 
 
-def _keep_quiet() -> None:
-    """Leave warnings about a cell, in a worker, to the process that shares out its runs."""
-    logging.getLogger("vergence").setLevel(logging.ERROR)
+def _run_task(
+    source: CellSource, tolerance_px: float, physics: bool, task: Sequence[Trial]
+) -> list[TrialResult]:
+    return run_trials(source, task, tolerance_px, physics)
 
 
-def _distributed(executor: Executor) -> Any:
-    if executor.scheduler is None:
-        given = f"sharing runs among {executor.workers} processes"
-        return optional_package(given, "distributed", "cluster", "--workers")
-    return optional_package("a Dask scheduler", "distributed", "cluster", "--scheduler")
+def _killed(count: int) -> str:
+    return f"every worker that took it was killed, {count} in all; out of memory?"
+
+
+def _by_dask(
+    scheduler: str,
+    source: CellSource,
+    tasks: Sequence[Sequence[Trial]],
+    tolerance_px: float,
+    physics: bool,
+) -> Iterator[TrialResult]:
+    distributed = optional_package("a Dask scheduler", "distributed", "cluster", "--scheduler")
+    try:
+        client = distributed.Client(scheduler, timeout=_CONNECT_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError("--scheduler", "", f"{scheduler} ({error})", _SCHEDULER) from None
+    with client:
+        given = {
+            client.submit(run_trials, source, task, tolerance_px, physics, pure=False): task
+            for task in tasks
+        }
+        for future in distributed.as_completed(given):
+            try:
+                yield from future.result()
+            except distributed.scheduler.KilledWorker as error:
+                what = _killed(error.allowed_failures + 1)
+                raise WorkersLostError(given[future], what) from None
+            except distributed.client.FutureCancelledError:
+                raise WorkersLostError(given[future], "the scheduler has disappeared") from None
 
 
 def _by_pace(

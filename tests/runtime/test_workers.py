@@ -1,0 +1,134 @@
+"""Processes that share tasks: nothing is lost when one dies, and none outlives its work."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from multiprocessing import active_children
+from pathlib import Path
+
+import pytest
+
+from vergence.cell import load_cell
+from vergence.experiments import CellSource, Executor, Trial, WorkersLostError
+from vergence.experiments.workers import DEATHS, IMPORTED, DeadlyTaskError, share_out
+
+
+def square(number: int) -> int:
+    if number < 0:
+        raise ValueError(f"{number} is below zero")
+    return number * number
+
+
+def square_once_dead(folder: Path, number: int) -> int:
+    """Die at 3 the first time."""
+    mark = folder / "died"
+    if number == 3 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(number)
+
+
+def die_at_3(number: int) -> int:
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(number)
+
+
+def process_and_signals(_: int) -> tuple[int, bool]:
+    time.sleep(0.2)
+    return os.getpid(), signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_every_task_is_done_once_by_as_many_processes_that_leave_ctrl_c_alone():
+    assert sorted(share_out(square, range(10), 2)) == [n * n for n in range(10)]
+    seen = list(share_out(process_and_signals, range(8), 2))
+    assert len({process for process, _ in seen}) == 2
+    assert os.getpid() not in {process for process, _ in seen}
+    assert all(blocked for _, blocked in seen)
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_the_task_of_a_process_that_dies_is_given_to_another(tmp_path):
+    found = sorted(share_out(partial(square_once_dead, tmp_path), range(6), 2))
+    assert (tmp_path / "died").exists()
+    assert found == [n * n for n in range(6)]
+
+
+def test_a_task_that_no_process_survives_is_named_and_the_others_end():
+    with pytest.raises(DeadlyTaskError, match=f"{DEATHS} processes died over task 3") as error:
+        list(share_out(die_at_3, range(6), 2))
+    assert error.value.number == 3
+    assert not active_children()
+
+
+def test_what_a_task_raises_is_raised_here_and_the_processes_end():
+    with pytest.raises(ValueError, match="-1 is below zero"):
+        list(share_out(square, [1, -1, 2, 3], 2))
+    assert not active_children()
+
+
+def test_what_processes_inherit_opens_no_display():
+    program = f"import sys, {', '.join(IMPORTED)}; print('mujoco' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)
+    assert said.stdout.strip() == b"False"
+
+
+def test_processes_end_with_the_iterator():
+    shared = share_out(partial(time.sleep), [0.0, 600.0, 600.0], 2)
+    next(shared)
+    began = time.monotonic()
+    shared.close()
+    assert not active_children()
+    assert time.monotonic() - began < 60.0
+
+
+def test_a_run_that_kills_every_process_ends_in_a_clear_message(monkeypatch):
+    source = CellSource.of("puma560", {"duration_s": "1.0", "task.feature_count": "4"}, None)
+    own = load_cell("puma560").as_tables()["law"]
+    trials = [Trial(f"run{n}", {"law": own}) for n in range(2)]
+
+    def deadly(do, tasks, count, spent):
+        raise DeadlyTaskError(1)
+        yield
+
+    monkeypatch.setattr("vergence.experiments.executor.share_out", deadly)
+    with pytest.raises(WorkersLostError, match=f"run run1: every worker .* {DEATHS} in all"):
+        list(Executor(workers=2).run(source, trials, 2.0, physics=True))
+
+
+def descendants(process: int) -> list[int]:
+    try:
+        own = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    except FileNotFoundError:
+        return []
+    return [one for child in map(int, own) for one in (child, *descendants(child))]
+
+
+ENDLESS = """
+import sys, time
+from vergence.experiments.workers import share_out
+if __name__ == "__main__":
+    list(share_out(time.sleep, [0.0, 600.0, 600.0], 2))
+"""
+
+
+def test_ctrl_c_ends_all_processes_without_a_word_from_them(tmp_path):
+    script = tmp_path / "endless.py"
+    script.write_text(ENDLESS)
+    running = subprocess.Popen(
+        [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    while len(descendants(running.pid)) < 4:  # two, what forks them, and a tracker of resources
+        time.sleep(0.05)
+    workers = descendants(running.pid)
+    os.killpg(running.pid, signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert said.count("Traceback") == 1  # of the script itself
+    assert "KeyboardInterrupt" in said
+    deadline = time.monotonic() + 60.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
