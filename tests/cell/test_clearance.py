@@ -1,7 +1,9 @@
 """Distances of an arm's bodies from each other and from what is around them."""
 
+from copy import copy
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -106,6 +108,21 @@ def test_gradients_and_drifts_are_the_differences_of_the_distances(model):
         np.testing.assert_array_equal(now[near.pair], near.distance)
         compared += apart.sum()
     assert compared > 200
+
+
+def test_near_distances_are_those_of_mujoco_to_the_last_bit(model):
+    m, data, rng = model.model, copy(model.data), np.random.default_rng(82)
+    clearance, arm = clearance_of(model), model.arms["arm"]
+    compared = 0
+    for _ in range(20):
+        q = rng.uniform(arm.q_min, arm.q_max)
+        model.write_position(data, "arm", q)
+        mujoco.mj_kinematics(m, data)
+        pairs = clearance.geoms.tolist()
+        every = np.array([mujoco.mj_geomDistance(m, data, *g, NEAR_M, None) for g in pairs])
+        np.testing.assert_array_equal(clearance.distances(q), every)
+        compared += (every < NEAR_M).sum()
+    assert compared > 50
 
 
 def test_no_motion_changes_a_distance_by_more_than_the_reach_of_the_joints(model):

@@ -10,9 +10,10 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.robot import NearPairs
 from vergence.robot.chain import Chain, joint_columns
-from vergence.robot.distance_gradient import distance_gradients, least_distances
+from vergence.robot.distance_gradient import distance_gradients
 from vergence.signals import JointState
 from vergence.simulation.collision_pairs import KINDS, collision_pairs, moved_by, name_of
+from vergence.simulation.geom_distance import near_distances
 
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
@@ -129,7 +130,7 @@ class CellClearance:
 
     def _place(self, q: FloatArray) -> Mapping[str, JointState]:
         """Put the arms where they are; return the states of the others."""
-        if self._states is None and np.array_equal(q, self._q):
+        if self._states is None and q.tobytes() == self._q.tobytes():
             return {}
         states = self._others()
         self._q, self._measured = np.array(q), None
@@ -140,19 +141,10 @@ class CellClearance:
         return states
 
     def _measure(self) -> _Measured:
-        """Return how near the pairs are that may be near.
-
-        Of one that is not, MuJoCo says `NEAR_M`, and both points are the origin.
-        """
-        if self._measured is not None:
-            return self._measured
-        m, data = self._model.model, self._data
-        least = least_distances(self.geoms, data.geom_xpos, data.geom_xmat, self._radius)
-        pair = np.flatnonzero(least < NEAR_M)
-        ends, distance = np.empty((len(pair), 6)), np.empty(len(pair))
-        for k, (a, b) in enumerate(self.geoms[pair].tolist()):
-            distance[k] = mujoco.mj_geomDistance(m, data, a, b, NEAR_M, ends[k])
-        self._measured = _Measured(pair, ends, distance)
+        """Return how near the pairs are that may be near."""
+        if self._measured is None:
+            m, data = self._model.model, self._data
+            self._measured = _Measured(*near_distances(m, data, self.geoms, self._radius, NEAR_M))
         return self._measured
 
     def _gradient(
