@@ -168,6 +168,14 @@ def test_blur_does_not_draw_corners_to_what_lies_next_to_them(
     assert squares.max() < 9.0
 
 
+@pytest.mark.parametrize("shift", [0.0, 0.25, 0.47, 0.5])
+def test_a_sharp_image_without_noise_is_not_left_out_along_the_edges(shift: float) -> None:
+    """All residuals are at the edges then, and must not pass for outliers."""
+    square = np.array([[109.0, 59.0], [209.0, 59.0], [209.0, 159.0], [109.0, 159.0]]) + shift
+    marks = MarkerDetector("apriltag_36h11").detect(marker_image(7, square))
+    assert np.linalg.norm(marks.corners_px[0] - square, axis=1).max() < 0.05
+
+
 def test_a_marker_that_is_partly_covered_keeps_its_corners() -> None:
     image = marker_image(7, QUAD)
     image[95:115, 150:158] = 255

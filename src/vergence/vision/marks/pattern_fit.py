@@ -32,6 +32,7 @@ _MOST_CURVE = 0.9  # beyond 1, grey values would turn back
 _CURVE_DEVIATION = 0.5  # a camera's gamma of 2.2 makes 0.6
 _BEND_DEVIATION = 0.02  # of half a side: paper that is not quite flat
 _OUTLIER = 4.0  # residuals of so many standard deviations count for a quarter
+_ROUGH = 0.32  # of the range of grey values: smaller ones are edges half a pixel off, not outliers
 _LEAST_NOISE = 0.3  # grey levels: rounding
 _BOW = 2.0 / 3.0  # mean of 1 - p² along a side: the line through a bowed one
 _STEPS = 25
@@ -127,6 +128,7 @@ def normal_equations(
     )
     xs, ys = corners[0] / corners[2], corners[1] / corners[2]
     step = max(int(0.618 * thin), 1)
+    wide = max(_OUTLIER * noise, _ROUGH * abs(light[7]))
     for y in range(max(int(ys.min()), 0), min(int(ys.max()) + 1, len(image) - 1) + 1):
         for x in range(max(int(xs.min()), 0), min(int(xs.max()) + 1, image.shape[1] - 1) + 1):
             if (x + step * y) % thin:
@@ -179,7 +181,7 @@ def normal_equations(
             J[12], J[13], J[14] = 1.0, p, q
             J[15], J[16], J[17] = shade, shade * p, shade * q
             J[18], J[19], J[20], J[21] = a * pp, a * bow_u, b * bow_v, b * qq
-            weight = 1.0 / (1.0 + (residual / (_OUTLIER * noise)) ** 2) ** 2
+            weight = 1.0 / (1.0 + (residual / wide) ** 2) ** 2
             count += 1
             weights += weight
             squares += weight * residual * residual
