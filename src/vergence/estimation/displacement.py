@@ -1,4 +1,4 @@
-"""How far a camera still is from where a photograph was taken, once it looks almost the same."""
+"""The displacement of a camera from where a photograph was taken, once it is small."""
 
 from typing import NamedTuple
 
@@ -8,11 +8,11 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.geometry import se3, so3_exp, so3_log
 
 _ITERATIONS = 8
-_DOUBTFUL = 3.0  # standard deviations from which a point counts less and less
+_DOUBTFUL = 3.0  # standard deviations beyond which a point is downweighted
 
 
 class Displacement(NamedTuple):
-    """Pose of a camera in the frame of the photograph."""
+    """Pose of a camera in the frame of the photograph's camera."""
 
     T_goal_camera: FloatArray  # (4, 4) m
     covariance: FloatArray  # (6, 6) of its position and rotation, m and rad
@@ -20,17 +20,17 @@ class Displacement(NamedTuple):
 
     @property
     def distance_m(self) -> float:
-        """How far the camera is from its goal."""
+        """Distance of the camera from its goal."""
         return float(np.linalg.norm(self.T_goal_camera[:3, 3]))
 
     @property
     def angle_rad(self) -> float:
-        """How far it is turned from its goal."""
+        """Angle between the camera's orientation and its goal."""
         R = np.ascontiguousarray(self.T_goal_camera[:3, :3])
         return float(np.linalg.norm(so3_log(R)))
 
     def at_most(self, deviations: float = 3.0) -> tuple[float, float]:
-        """Return the largest distance, m, and angle, rad, in the confidence region."""
+        """Return the largest distance, m, and angle, rad, within the confidence region."""
         position, turn = self.covariance[:3, :3], self.covariance[3:, 3:]
         return (
             self.distance_m + deviations * float(np.sqrt(np.linalg.eigvalsh(position)[-1])),
@@ -41,20 +41,20 @@ class Displacement(NamedTuple):
 def fit_displacement(
     points: FloatArray, covariance: FloatArray, points_goal: FloatArray, relief: FloatArray
 ) -> Displacement | None:
-    """Fit the pose of a camera to points of the photograph that it sees again.
+    """Fit the pose of a camera to points of the photograph found again in its image.
 
-    What the depths are off moves a point along the flow of the camera's translation, so it matters
-    less and less the nearer the camera is to its goal.
+    An error of the depths moves a point along the flow of the camera's translation, so it matters
+    less the closer the camera is to its goal.
 
     Args:
-        points: where it sees them, (K, 2), normalized coordinates.
+        points: measured, (K, 2), normalized coordinates.
         covariance: of these, (K, 2, 2).
-        points_goal: the points in the frame of the photograph, (K, 3), m.
-        relief: standard deviations of their depths, shares of these, (K,).
+        points_goal: the points in the frame of the photograph's camera, (K, 3), m.
+        relief: relative standard deviations of their depths, (K,).
 
     Returns:
-        The pose, its covariance by what the points leave unexplained if that is more than stated;
-        None with fewer than four points, or if they do not determine it.
+        The pose, with a covariance inflated to the residuals if they exceed the stated noise; None
+        with fewer than four points, or if they do not determine the pose.
     """
     if len(points) < 4:
         return None
@@ -84,7 +84,7 @@ def fit_displacement(
 
 
 def _root(covariance: FloatArray, X: FloatArray, t: FloatArray) -> FloatArray:
-    """Return what whitens residuals, (K, 2, 2), if a translation t (K, 3) may move each point."""
+    """Return the whitening matrices of residuals, (K, 2, 2), if t (K, 3) may move each point."""
     z = X[:, 2:]
     flow = (t[:, :2] - X[:, :2] / z * t[:, 2:]) / z
     doubt = covariance + flow[:, :, None] * flow[:, None, :]
@@ -95,7 +95,7 @@ def _root(covariance: FloatArray, X: FloatArray, t: FloatArray) -> FloatArray:
 def _residuals(
     X: FloatArray, points: FloatArray, root: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return whitened residuals (K, 2) and slopes (K, 2, 6) by translation and rotation."""
+    """Return whitened residuals (K, 2) and their Jacobian (K, 2, 6) by translation and rotation."""
     z = X[:, 2]
     m = X[:, :2] / z[:, None]
     by_X = np.zeros((len(X), 2, 3))

@@ -21,25 +21,25 @@ _camera_of = attrgetter("camera")
 
 class _Entry(NamedTuple, Generic[B]):
     time: float  # s
-    views: tuple[View, ...]  # of that time, by the names of their cameras
+    views: tuple[View, ...]  # at that time, sorted by camera name
     seen: Seen  # all their points
     after: B
 
 
 @dataclass(frozen=True, slots=True)
 class FilterHistory(Generic[B]):
-    """The images of the last moments in order of exposure, with the belief after each; a value.
+    """Recent images in order of exposure, with the belief after each; immutable.
 
-    The images of one exposure correct the belief together. One that arrives late is put in its
-    place, beside those of its exposure that were there before it, and all is used again from there
-    on. So the belief depends on which images arrived, never on the order they arrived in.
+    The images of one exposure update the belief together. A late one is inserted at its place,
+    together with those of its exposure that arrived before it, and everything after it is replayed.
+    The belief therefore depends on which images arrived, never on the order of their arrival.
     """
 
     filter: TargetFilter[B]
     base: B  # before the first entry
-    horizon: float = 0.5  # s, how long an image may be under way
+    horizon: float = 0.5  # s, longest delay of an image
     entries: tuple[_Entry[B], ...] = ()
-    closed: float = -float("inf")  # s, the newest exposure pruned
+    closed: float = -float("inf")  # s, the newest exposure that was pruned
 
     @property
     def belief(self) -> B:
@@ -54,14 +54,14 @@ class FilterHistory(Generic[B]):
         return self.filter.predict(self._before(place), time)
 
     def add(self, view: View) -> tuple["FilterHistory[B]", Update]:
-        """Return the history with one more image, and what was made of that image."""
+        """Return the history with one more image, and the update by that image."""
         history, updates = self.add_all([view])
         return history, updates[0]
 
     def add_all(self, views: Sequence[View]) -> tuple["FilterHistory[B]", list[Update]]:
-        """Return the history with more images, of any times, and what was made of each."""
+        """Return the history with more images, of any times, and the update by each."""
         made: list[Update | None] = [self._refused(view) for view in views]
-        new: dict[tuple[float, str], int] = {}  # time and camera: number of the image
+        new: dict[tuple[float, str], int] = {}  # time and camera: index of the image
         for n, view in enumerate(views):
             if made[n] is None and new.setdefault((view.time, view.camera), n) != n:
                 made[n] = unused(self.belief, view.size, Verdict.REPEATED)
@@ -89,7 +89,7 @@ class FilterHistory(Generic[B]):
     def _replayed(
         self, views: Sequence[View]
     ) -> tuple["FilterHistory[B]", dict[tuple[float, str], Update]]:
-        """Return the history with images in their places, and all updates made for it."""
+        """Return the history with images inserted, and all updates made."""
         place = self._place(min(view.time for view in views))
         groups = {entry.time: (entry.views, entry.seen) for entry in self.entries[place:]}
         new: dict[float, list[View]] = {}
@@ -111,7 +111,7 @@ class FilterHistory(Generic[B]):
         return self._pruned(entries), made
 
     def _place(self, time: float) -> int:
-        """Return where an exposure is, or would have to be put."""
+        """Return the index of an exposure, or where it would be inserted."""
         if not self.entries or time > self.entries[-1].time:
             return len(self.entries)
         return bisect_left(self.entries, time, key=lambda entry: entry.time)
@@ -122,7 +122,7 @@ class FilterHistory(Generic[B]):
     def _pruned(self, entries: list[_Entry[B]]) -> "FilterHistory[B]":
         oldest = entries[-1].time - self.horizon
         first = 0
-        while entries[first].time < oldest:  # rarely more than once or twice
+        while entries[first].time < oldest:  # rarely more than one or two iterations
             first += 1
         base, closed = self.base, self.closed
         if first:

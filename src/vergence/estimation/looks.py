@@ -1,4 +1,4 @@
-"""What the tracking loop keeps of an image while it processes it."""
+"""Intermediate data of the tracking loop about an image."""
 
 from typing import NamedTuple
 
@@ -8,19 +8,19 @@ from vergence.signals import Frame, ImagePoints
 
 
 class Expected(NamedTuple):
-    """What is expected at an exposure."""
+    """The prediction at an exposure."""
 
     T_world_target: FloatArray  # (4, 4) predicted
-    covariance: FloatArray  # (12, 12) of that prediction
-    doubt: float  # share of the last points that disagreed
+    covariance: FloatArray  # (12, 12) of the prediction
+    doubt: float  # fraction of recent points that disagreed
     certain: bool  # whether the filter is consistent
 
 
 class Predicted(NamedTuple):
-    """The C images of a tick, in order of exposure, with what is expected of them."""
+    """The C images of a tick, in order of exposure, with their predictions."""
 
     frames: tuple[Frame, ...]
-    numbers: IntArray  # (C,) of their cameras in the rig
+    numbers: IntArray  # (C,) indices of their cameras in the rig
     T_world_camera: FloatArray  # (C, 4, 4)
     T_camera_world: FloatArray  # (C, 4, 4)
     T_world_target: FloatArray  # (C, 4, 4) predicted for each exposure
@@ -30,12 +30,12 @@ class Predicted(NamedTuple):
 
     @property
     def newest(self) -> Expected:
-        """What is expected of the last images."""
+        """The prediction for the last image."""
         return self.expected[-1]
 
 
 class Look(NamedTuple):
-    """What was measured in an image."""
+    """The measurement of an image."""
 
     number: int  # of the image
     found: ImagePoints  # the points in its windows, one at least

@@ -1,4 +1,4 @@
-"""What perception asks of others: the poses of its cameras, and points inside windows."""
+"""The interfaces that perception needs: camera poses, and points measured in windows."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -16,11 +16,11 @@ from vergence.signals import Frame, ImagePoints, SearchWindows
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)
 CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
-# find(frame) -> all features of the target wherever they are in the image, or None
+# find(frame) -> all features of the target, wherever they are in the image, or None
 Find: TypeAlias = Callable[[Frame], ImagePoints | None]
 
 _NO_POINTS, _NO_COVARIANCE = np.empty((0, 2)), np.empty((0, 2, 2))
-UNSEEN = (  # a reason for each `ViewStatus`
+UNSEEN = (  # the reason for each `ViewStatus`
     "not chosen",
     "behind the camera",
     "outside the image",
@@ -41,14 +41,15 @@ class Measure(Protocol):
         half_px: FloatArray,
         T_camera_target: FloatArray,
     ) -> ImagePoints:
-        """Return the K points asked for, in that order.
+        """Return the requested K points, in that order.
 
         Args:
             frame: the image.
-            features: which features of the target, (K,).
-            points_px: where they are expected: the windows' centres, (K, 2).
+            features: indices of the target's features, (K,).
+            points_px: expected positions: the windows' centres, (K, 2).
             half_px: half the width and height of the windows, (K, 2).
-            T_camera_target: the expected pose, (4, 4): how edges and marks will lie.
+            T_camera_target: the expected pose, (4, 4), which determines the appearance of edges and
+                marks.
         """
         ...
 
@@ -61,18 +62,19 @@ def every_point(
     agreeing: Sequence[IntArray],
     widest_px: float,
 ) -> tuple[ImagePoints, ...]:
-    """Return the image points of all M features of each of C images, whether looked for or not.
+    """Return the image points of all M features in each of C images, whether searched for or not.
 
-    A feature that was not found gets its expected place, with a covariance as wide as the
-    widest window and the reason. The images share arrays: most of many are not even looked at.
+    A feature that was not found gets its expected position, with a covariance as large as the
+    largest window, and the reason. Images share arrays, since most of many images are not
+    evaluated.
 
     Args:
         frames: the images, C.
-        visibility: what was expected of them.
-        windows: that were opened in some of them.
-        looks: what was measured in those.
-        agreeing: for each look, the numbers of the features that agree with the pose.
-        widest_px: half the widest window.
+        visibility: their predicted visibility.
+        windows: opened in some of them.
+        looks: the measurements inside those.
+        agreeing: for each measurement, the indices of the features that agree with the pose.
+        widest_px: half size of the largest window.
     """
     found = np.zeros(visibility.status.shape, dtype=np.bool_)
     for look, kept in zip(looks, agreeing, strict=True):
@@ -169,6 +171,6 @@ def fill_points(
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:
-    """Return the same points, none of them found, all for one reason."""
+    """Return the same points, all marked as not found for one reason."""
     none = np.zeros(len(points.found), dtype=np.bool_)
     return replace(points, found=none, reasons=(why,) * len(none))

@@ -36,22 +36,20 @@ from vergence.estimation.windows import WindowRule, Windows, open_windows
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, Observation, TargetState
 
-DOUBT = 0.4  # share of the last points that disagreed, from which more of them are measured
+DOUBT = 0.4  # fraction of recent points that disagreed, above which more of them are measured
 JUDGED = (Verdict.USED, Verdict.RECOVERED, Verdict.CONTRADICTED)
 
 
 class PosePerception(Generic[B]):
-    """Follows one target with any number of cameras; a stage of the loop.
+    """Tracks one target with any number of cameras; a stage of the loop.
 
-    For every image that arrives: the target's pose is predicted to its exposure, the features the
-    camera will see are worked out, the few worth measuring chosen over all cameras together, and
-    only small windows around them looked at; what is found there corrects the pose, the images of
-    one exposure together.
-    [Lippiello2005] section IV, Fig. 3.
+    For every image that arrives, the target's pose is predicted to its exposure, the features that
+    the camera will see are determined, the few worth measuring are selected over all cameras
+    together, and only small windows around them are searched. The points found there update the
+    pose, those of one exposure together. [Lippiello2005] section IV, Fig. 3.
 
-    A target that is lost is searched for around the place where it was seen last, with the widest
-    windows, and over whole images if `find` is given; while it is lost no pose is reported, and
-    no point counts as found.
+    A lost target is searched for around its last pose, with the largest windows, and in whole
+    images if `find` is given. While it is lost, no pose is reported and no point counts as found.
     """
 
     def __init__(
@@ -69,21 +67,21 @@ class PosePerception(Generic[B]):
         blocked_at: Callable[[Frame], Blocked] | None = None,
         find: Find | None = None,
     ) -> None:
-        """Prepare to follow a target.
+        """Prepare to track a target.
 
         Args:
             rig: the cameras.
             shape: the target.
-            camera_pose: gives the pose of a camera from the joints at the exposure.
+            camera_pose: computes the pose of a camera from the joints at the exposure.
             measure: finds features inside windows.
             target_filter: `PoseFilter`, or `RpyPoseFilter` for the paper's.
-            start: what is believed at first, of that filter.
-            selection: how features are chosen; by information unless told.
-            windows: how large windows are.
+            start: initial belief of that filter.
+            selection: how features are selected; by information by default.
+            windows: sizes of the windows.
             settings: budget and limits on missed images.
-            blocked_at: gives, for what was so at an exposure, the function that returns what is
-                between a camera and points of the target; the target itself must not count.
-            find: finds the target in a whole image, when it is lost.
+            blocked_at: returns, for an exposure, a function that returns what occludes points of
+                the target for a camera; the target itself must not count.
+            find: finds the target in a whole image when it is lost.
         """
         self._rig, self._shape, self._camera_pose = rig, shape, camera_pose
         self._measure, self._blocked_at, self._find = measure, blocked_at, find
@@ -101,30 +99,30 @@ class PosePerception(Generic[B]):
 
     @property
     def belief(self) -> B:
-        """What is believed after the newest image."""
+        """The belief after the newest image."""
         return self._history.belief
 
     @property
     def lost(self) -> str:
-        """Why the target counts as lost; empty while it is followed."""
+        """Why the target counts as lost; empty while it is tracked."""
         return self._lost
 
     @property
     def state(self) -> TargetState:
-        """What is believed after the newest image, as it is passed on."""
+        """The belief after the newest image, in the form that perception delivers."""
         return state_of(self.belief)
 
     def pose_at(self, frame: Frame) -> FloatArray:
-        """Return T_world_target (4, 4) as it is expected at an exposure; of a lost one the last."""
+        """Return the expected T_world_target (4, 4) at an exposure; the last one if lost."""
         return self._expected(frame.time).T_world_target
 
     def observe(self, frames: Sequence[Frame]) -> Observation | None:
-        """Return what the images show and where the target is, or None without an image.
+        """Return the observation in the images and the target's pose, or None without an image.
 
-        Images of cameras that are not in the rig do not concern it.
+        Images of cameras that are not in the rig are ignored.
 
         Raises:
-            InputError: if an image has not the size that its camera's model is for.
+            InputError: if an image does not have the size of its camera's model.
         """
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
@@ -151,7 +149,7 @@ class PosePerception(Generic[B]):
         return Expected(belief.T_world_target, belief.honest_covariance, doubt, certain)
 
     def _predict(self, frames: list[Frame]) -> Predicted:
-        """Return what is expected of images in order of exposure."""
+        """Return the predictions for images in order of exposure."""
         for frame in frames:
             require_size(frame, self._rig)
         times = sorted({frame.time for frame in frames})
@@ -210,7 +208,7 @@ class PosePerception(Generic[B]):
         return chosen
 
     def _open(self, predicted: Predicted, chosen: BoolArray, visibility: Visibility) -> Windows:
-        """Return the windows around the features chosen, the widest if the target is lost."""
+        """Return the windows around the selected features, of the largest size if it is lost."""
         rule, expected = self._windows.numbers, predicted.expected
         if self._lost:
             rule = (*rule[:2], rule[3], rule[3])
@@ -232,7 +230,7 @@ class PosePerception(Generic[B]):
         )
 
     def _look(self, predicted: Predicted, windows: Windows) -> list[Look]:
-        """Measure features inside their windows; images without any are not even touched."""
+        """Measure features inside their windows; images without any are not accessed."""
         looks, start = [], 0
         for n, end in zip(windows.images.tolist(), windows.ends.tolist(), strict=True):
             features = windows.features[start:end]
@@ -251,7 +249,7 @@ class PosePerception(Generic[B]):
         return looks
 
     def _correct(self, looks: list[Look]) -> list[IntArray]:
-        """Correct the pose by all images; return which features of each agree with it."""
+        """Update the pose by all images; return which features of each agree with it."""
         if self._lost or not looks:
             return [look.view.features for look in looks]
         self._history, updates = self._history.add_all([look.view for look in looks])
@@ -261,7 +259,7 @@ class PosePerception(Generic[B]):
         ]
 
     def _judge(self, time: float, views: list[View], frames: Sequence[Frame]) -> None:
-        """Drop a target that contradicts the images for too long; search for a dropped one."""
+        """Drop a target that contradicts the images for too long; search for a dropped target."""
         belief = self._history.belief
         if not self._lost:
             if belief.seen == belief.time:
@@ -283,7 +281,7 @@ class PosePerception(Generic[B]):
         self.restart(fit.time, fit.T_world_target, fit.covariance)
 
     def restart(self, time: float, T_world_target: FloatArray, covariance: FloatArray) -> None:
-        """Follow the target from a pose on, whatever was believed before.
+        """Track the target from a pose on, whatever was believed before.
 
         Args:
             time: of the pose, s.
@@ -319,7 +317,7 @@ def seen_from(
 
 
 def require_size(frame: Frame, rig: CameraRig) -> None:
-    """Raise InputError if an image has not the size that its camera's model is for."""
+    """Raise InputError if an image does not have the size of its camera's model."""
     if frame.image is None:
         return
     camera = rig.cameras[rig.numbers[frame.camera]]

@@ -1,4 +1,4 @@
-"""What every filter of a target's pose offers, and what it says about an image."""
+"""The interface of a pose filter, and its verdict on an image."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -14,7 +14,7 @@ from vergence.signals import TargetState
 
 
 class Verdict(StrEnum):
-    """What became of an image."""
+    """The result of an image."""
 
     USED = "used"
     RECOVERED = "used after enlarging the covariance"
@@ -25,11 +25,11 @@ class Verdict(StrEnum):
 
 
 class TargetBelief(Protocol):
-    """What a filter knows about its target at one time; a value."""
+    """The state of a filter at one time; immutable."""
 
     @property
     def time(self) -> float:
-        """When, s."""
+        """Time of the state, s."""
         ...
 
     @property
@@ -59,12 +59,12 @@ class TargetBelief(Protocol):
 
     @property
     def doubts(self) -> int:
-        """Images in a row that contradicted the prediction and were not used."""
+        """Consecutive images that contradicted the prediction and were not used."""
         ...
 
     @property
     def disagreeing(self) -> float:
-        """Share of the last points that fell outside the gate, fading."""
+        """Fading fraction of recent points outside the gate."""
         ...
 
 
@@ -72,16 +72,16 @@ B = TypeVar("B", bound=TargetBelief)
 
 
 class Update(NamedTuple):
-    """The belief after the images of one exposure, and what was made of them."""
+    """The belief after the images of one exposure, and the verdict on them."""
 
     belief: Any  # of the filter's own kind
     verdict: Verdict
     kept: BoolArray  # (M,) points that passed the gate
-    squares: FloatArray  # (M,) Mahalanobis distance squared of each point, before the update
+    squares: FloatArray  # (M,) squared Mahalanobis distance of each point, before the update
 
 
 class TargetFilter(Protocol[B]):
-    """A filter: a value whose methods take a prior belief and return the posterior one."""
+    """A filter without state: its methods take a prior belief and return the posterior one."""
 
     def start(
         self,
@@ -90,7 +90,7 @@ class TargetFilter(Protocol[B]):
         velocity: FloatArray | None = None,
         covariance: FloatArray | None = None,
     ) -> B:
-        """Return the belief to start from; pose (4, 4), twist (6,) and covariance (12, 12)."""
+        """Return the initial belief, given pose (4, 4), twist (6,) and covariance (12, 12)."""
         ...
 
     def predict(self, belief: B, time: float) -> B:
@@ -98,20 +98,20 @@ class TargetFilter(Protocol[B]):
         ...
 
     def update(self, belief: B, seen: Seen) -> Update:
-        """Predict to an exposure and correct by its points, of one image or of several."""
+        """Predict to an exposure and update by its points, of one image or of several."""
         ...
 
 
 def unused(belief: TargetBelief, size: int, verdict: Verdict) -> Update:
-    """Return the update by so many points of which none was used."""
+    """Return the update by a number of points of which none was used."""
     return Update(belief, verdict, np.zeros(size, np.bool_), np.full(size, np.nan))
 
 
 def of_each_image(update: Update, views: Sequence[View]) -> list[Update]:
-    """Return what an update by several images made of each.
+    """Return the results of each image from an update by several images.
 
-    An image without a point contributed nothing; one of whose points none was kept, while others
-    were, contradicts them.
+    An image without a point contributed nothing; one of which no point was kept, although points of
+    others were, contradicts them.
     """
     if len(views) == 1:
         return [update]
@@ -129,20 +129,20 @@ def of_each_image(update: Update, views: Sequence[View]) -> list[Update]:
 
 
 def fading_share(share: float, kept: int, count: int, fading: float = 0.93) -> float:
-    """Return the share of points outside the gate, with those of one more exposure.
+    """Return the fading fraction of points outside the gate, updated by one more exposure.
 
     Args:
         share: before.
-        kept: how many points of the exposure passed the gate.
-        count: how many there were, above zero.
-        fading: weight of the past for each point; 0.93 looks back over some thirty points.
+        kept: number of points of the exposure that passed the gate.
+        count: number of its points, positive.
+        fading: weight of the past per point; 0.93 averages over about thirty points.
     """
     weight: float = fading**count
     return weight * share + (1.0 - weight) * (1.0 - kept / count)
 
 
 def state_of(belief: TargetBelief) -> TargetState:
-    """Return a belief as perception hands it on."""
+    """Return a belief in the form that perception delivers."""
     return TargetState(
         belief.time,
         belief.T_world_target,
@@ -158,13 +158,13 @@ def first_values(
     velocity: FloatArray | None,
     covariance: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what a filter starts from: pose (4, 4), twist (6,) and covariance (12, 12).
+    """Return the initial values of a filter: pose (4, 4), twist (6,) and covariance (12, 12).
 
-    The target is at rest unless a twist is given; the covariance of (δp, δθ, δv, δω) is that of
-    3 cm, 0.1 rad, 0.2 m/s and 0.5 rad/s unless one is given.
+    The target is at rest unless a twist is given; the default covariance of (δp, δθ, δv, δω) is
+    that of 3 cm, 0.1 rad, 0.2 m/s and 0.5 rad/s.
 
     Raises:
-        InputError: of the source, if the covariance is not one, or anything is not finite.
+        InputError: of the source, if the covariance is not valid, or any value is not finite.
     """
     if covariance is None:
         covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)

@@ -1,4 +1,4 @@
-"""What one image says, in the form the filters take it in."""
+"""The measurements of an image, in the form that filters take."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,24 +13,24 @@ from vergence.signals import ImagePoints
 
 
 class View(NamedTuple):
-    """The usable points of one image, and where its camera stood at the exposure."""
+    """The usable points of one image, and the pose of its camera at the exposure."""
 
     camera: str
     time: float  # s, of exposure
     T_camera_world: FloatArray  # (4, 4) inverse pose of the camera at the exposure
-    features: IntArray  # (M,) which features of the target were measured
-    points: FloatArray  # (M, 3) their places in the target's frame, m
+    features: IntArray  # (M,) indices of the target's features that were measured
+    points: FloatArray  # (M, 3) their positions in the target's frame, m
     measured: FloatArray  # (M, 2) normalized coordinates
     covariance: FloatArray  # (M, 2, 2) of `measured`, positive definite
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self.points)
 
     @property
     def images(self) -> int:
-        """How many images have points: this one or none."""
+        """Number of images with points: 1 or 0."""
         return 1 if len(self.points) else 0
 
     @property
@@ -40,10 +40,10 @@ class View(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """The points of all images taken at one time, one after the other."""
+    """The points of all images taken at one time, concatenated."""
 
     time: float  # s
-    images: int  # how many of them have points
+    images: int  # number of images with points
     poses: FloatArray  # (M, 4, 4) T_camera_world of each point's camera
     points: FloatArray  # (M, 3) in the target's frame, m
     measured: FloatArray  # (M, 2) normalized coordinates
@@ -51,15 +51,15 @@ class Exposure(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self.points)
 
 
-Seen = View | Exposure  # what a filter takes in
+Seen = View | Exposure  # the input of a filter
 
 
 def together(views: Sequence[View]) -> Seen:
-    """Put the points of images one after the other, as if all were taken when the first was."""
+    """Concatenate the points of images, as if all were taken at the time of the first one."""
     filled = [view for view in views if len(view.points)]
     if len(filled) < 2:
         return filled[0] if filled else views[0]
@@ -75,11 +75,11 @@ def together(views: Sequence[View]) -> Seen:
 
 
 def chosen_points(seen: Seen, kept: BoolArray) -> Exposure:
-    """Return the chosen points alone.
+    """Return a subset of the points.
 
     Args:
         seen: points of any number of images.
-        kept: which of them, (M,).
+        kept: mask of the subset, (M,).
     """
     return Exposure(
         seen.time,
@@ -100,15 +100,15 @@ def view_of(
 ) -> View:
     """Prepare measured image points for a filter.
 
-    Points not found, not finite, or with a covariance that is not positive definite carry no
-    usable information and are left out, so that they can never harden a pose.
+    Points that were not found, are not finite, or have a covariance that is not positive definite
+    carry no usable information and are ignored, so they can never reduce the covariance of a pose.
 
     Args:
         image_points: as measured, in pixels.
         camera: the model of the camera that measured them.
         T_world_camera: its pose at the exposure, (4, 4).
         target_points: all features in the target's frame, (F, 3), m.
-        features: which feature each measured point is, (M,); by default point j is feature j.
+        features: the feature index of each measured point, (M,); by default point j is feature j.
     """
     if features is None:
         features = np.arange(len(image_points.points_px))

@@ -1,4 +1,4 @@
-"""Where to look: windows around predicted features."""
+"""Search windows around predicted features."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -123,16 +123,16 @@ def open_windows(
 
 @dataclass(frozen=True, slots=True)
 class WindowRule:
-    """How large a window is: half = border + deviations · √(H P Hᵀ + noise²), within bounds.
+    """Size of a window: half = border + deviations · √(H P Hᵀ + noise²), within bounds.
 
-    P is the honest covariance, so windows widen by themselves while the filter is inconsistent. A
-    window that is too small silently gates what the filter would need to see.
+    P is the inflated covariance, so windows widen automatically while the filter is inconsistent. A
+    window that is too small would act as a gate and exclude what the filter needs to see.
     """
 
     deviations: float = 4.0
-    border_px: float = 6.0  # what the extractor needs around a feature
-    least_px: float = 8.0  # half a window, at least
-    most_px: float = 96.0  # half a window, at most
+    border_px: float = 6.0  # needed by the extractor around a feature
+    least_px: float = 8.0  # lower bound on half a window
+    most_px: float = 96.0  # upper bound on half a window
 
     def __post_init__(self) -> None:
         if not 0.0 < self.least_px <= self.most_px:
@@ -144,10 +144,10 @@ class WindowRule:
         """Return half the width and height of each window, (M, 2), px.
 
         Args:
-            spread: of the predicted points, normalized, (M, 2).
+            spread: standard deviation of the predicted points, normalized, (M, 2).
             focal_px: (fx, fy) of the camera, (2,).
             noise_px: expected standard deviation of a measured point.
-            scale: of the whole window, above 1 for a filter in doubt.
+            scale: factor on the whole window, above 1 for a filter in doubt.
         """
         sizes: FloatArray = window_sizes(spread, focal_px, noise_px, scale, self.numbers)
         return sizes

@@ -21,29 +21,29 @@ from vergence.signals import Frame, ImagePoints, Observation, Outcome, OutcomeKi
 from vergence.vision import SsdTracker, TwoViewFailure
 from vergence.vision.tracks import Tracks
 
-_FEWEST = 6  # points found, below which the photograph is searched for again
+_FEWEST = 6  # tracked points, below which the photograph is searched for again
 _AGAIN_S = 0.7  # between two searches for the photograph
-_LOOKS = 4  # in a row without success
+_LOOKS = 4  # consecutive failed searches before the task ends
 _SETTLE_S = 1.5  # after the path, before the photograph is searched for again
-_HALFWAY = 0.6  # share of the path at which the photograph is searched for again
+_HALFWAY = 0.6  # fraction of the path at which the photograph is searched for again
 
 
 class Approach:
     """Recognises a photograph, plans a path to where it was taken, follows it and arrives.
 
-    While the camera moves, tracked points and the arm's joints tell the scale and which of several
-    motions is right (`fit_goal`); the path is planned anew where it contradicts them. On the way,
-    and where too few points are left, the photograph is searched for again. At the end its own
-    windows are tracked, so that nothing has drifted.
+    While the camera moves, tracked points and the arm's joints determine the scale and which of
+    several motions is right (`fit_goal`); the path is replanned if it contradicts them. On the way,
+    and when too few points are left, the photograph is searched for again. At the end, windows of
+    the photograph itself are tracked, which eliminates drift.
 
     Args:
         goal: the photograph.
-        camera: name of the camera that is to be brought there.
+        camera: name of the camera to bring there.
         carrier: name of the arm that carries it.
         arm: that arm, up to the camera.
         plan: finds a path.
         settings: see `ApproachSettings`.
-        worker: does what takes longer than an image.
+        worker: runs jobs that take longer than an image.
     """
 
     def __init__(
@@ -63,17 +63,17 @@ class Approach:
         self._recognition: Recognition | None = None
         self._tracker: SsdTracker | None = None
         self._trajectory: Trajectory | None = None
-        self._began = 0.0  # s, when the trajectory began
-        self._looked = 0.0  # s, when the photograph was searched for last
-        self._failures = 0  # looks in a row that found nothing
-        self._stays = 0  # looks because the camera is at rest, but not surely at the goal
+        self._began = 0.0  # s, start of the trajectory
+        self._looked = 0.0  # s, last search for the photograph
+        self._failures = 0  # consecutive searches that found nothing
+        self._stays = 0  # searches while the camera was at rest, but not certainly at the goal
         self._halfway_done = False
-        self._fitted_at = 1  # images in the last fit
+        self._fitted_at = 1  # number of images in the last fit
         self._outcome: Outcome | None = None
         self._told: list[Told] = []
 
     def begin(self, frame: Frame) -> Trajectory | PlanFailure | TwoViewFailure:
-        """Recognise the photograph from the start and plan; or say why not, before a move."""
+        """Recognise the photograph from the start and plan, or return why not, before moving."""
         answer = self._search.first(frame)
         if not isinstance(answer, Answer):
             return answer
@@ -83,12 +83,12 @@ class Approach:
 
     @property
     def recognition(self) -> Recognition | None:
-        """What is known of the photograph."""
+        """What is known about the photograph."""
         return self._recognition
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The path that is followed."""
+        """The path being followed."""
         return self._trajectory
 
     @property
@@ -97,14 +97,14 @@ class Approach:
         return self._closing.points
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
-        """Return the points followed in the images that arrived."""
+        """Return the tracked points in the images that arrived."""
         views = [self._view(f) for f in frames if f.camera == self._camera and f.image is not None]
         if not views:
             return None
         return Observation(views[-1].time, (views[-1],))
 
     def reference(self, time: float) -> Reference:
-        """Return the path at a time, or the photograph's points once they are followed."""
+        """Return the path at a time, or the photograph's points once they are tracked."""
         if self._closing.begun:
             assert self._closing.points is not None
             return self._closing.points.reference(time)
@@ -112,20 +112,20 @@ class Approach:
         return replace(self._trajectory.reference(time - self._began), time=time)
 
     def conclusion(self, time: float) -> Outcome | None:
-        """Return how the task ends, once it does."""
+        """Return the outcome of the task once it has ended."""
         return self._outcome
 
     def unfinished(self, time: float) -> Outcome:
-        """Return how the task ends if its time is over."""
+        """Return the outcome of the task if its time is over."""
         return self._closing.unfinished(time)
 
     def events(self) -> list[Told]:
-        """Return what happened since the last call."""
+        """Return the events since the last call."""
         told, self._told = self._told, []
         return told
 
     def _view(self, frame: Frame) -> ImagePoints:
-        """Follow the points into an image, and look again where that is due."""
+        """Track the points into an image, and start a new search if one is due."""
         answer = self._worker.answer()
         if answer is not None:
             self._take(answer, frame)
@@ -150,7 +150,7 @@ class Approach:
         return self._tracker.track(frame.image)
 
     def _consider(self, frame: Frame, tracks: Tracks) -> None:
-        """Ask for what the image gives reason to."""
+        """Start the job that the image calls for, if any."""
         if self._closing.begun:
             self._judge(frame)
             return
@@ -175,7 +175,7 @@ class Approach:
             self._worker.ask(lambda: self._search.checked(known.fitted(), frame, leads_to, False))
 
     def _judge(self, frame: Frame) -> None:
-        """Conclude once the camera is at the goal for sure."""
+        """Conclude once the camera is certainly at the goal."""
         displacement = self._closing.at_rest()
         if displacement is None:
             return
@@ -192,7 +192,7 @@ class Approach:
         return frame.time - self._looked >= _AGAIN_S
 
     def _look(self, frame: Frame) -> None:
-        """Look for the photograph again."""
+        """Search for the photograph again."""
         assert self._recognition is not None
         assert self._trajectory is not None
         self._looked = frame.time
@@ -200,7 +200,7 @@ class Approach:
         self._worker.ask(lambda: self._search.again(known, frame, leads_to))
 
     def _take(self, answer: Answer | Arrived, frame: Frame) -> bool:
-        """Go by the answer of a job; return whether other points are followed from now on."""
+        """Apply the result of a job; return whether other points are tracked from now on."""
         if isinstance(answer, Arrived):
             self._outcome = answer.outcome(frame.time)
             return False
@@ -217,7 +217,7 @@ class Approach:
         self._recognition = found
         if answer.new_points:
             self._follow_points(found, frame)
-        elif before is not None:  # images may have come meanwhile
+        elif before is not None:  # images may have arrived meanwhile
             self._recognition = replace(found, images=before.images)
         if answer.path is not None:
             self._follow_path(answer.path, found, frame)
@@ -227,13 +227,14 @@ class Approach:
         self._failures += 1
         self._tell(frame.time, "not recognised", str(failure))
         if self._failures >= _LOOKS:
-            reason = f"the goal image is not recognised any more: {failure.reason}"
+            reason = f"the goal image is no longer recognised: {failure.reason}"
             self._outcome = Outcome(OutcomeKind.NOT_REACHED, reason, frame.time)
 
     def _follow_points(self, found: Recognition, frame: Frame) -> None:
-        """Follow other points from now on.
+        """Track other points from now on.
 
-        They are found in the newest image first, which may be much later than theirs.
+        They are first located in the newest image, which may be much later than the one they are
+        from.
         """
         assert frame.image is not None
         self._tracker = SsdTracker(found.image, found.points_px)
@@ -246,7 +247,7 @@ class Approach:
             self._tracker.track(frame.image, self._goal.camera.project(seen))
 
     def _follow_path(self, path: Path, found: Recognition, frame: Frame) -> None:
-        """Follow a path from where it is nearest to the arm."""
+        """Follow a path from the point that is nearest to the arm."""
         self._trajectory = Trajectory.of(path, self._settings.camera_speed_m_s)
         duration, q = self._trajectory.duration, frame.joints[self._carrier]
         times = np.linspace(0.0, 0.5 * duration, 50)

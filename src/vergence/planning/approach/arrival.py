@@ -1,4 +1,4 @@
-"""The end of the path: the photograph itself is what the tracker compares the images with."""
+"""The end of the path, where the tracker compares images with the photograph itself."""
 
 import numpy as np
 
@@ -12,26 +12,26 @@ from vergence.vision import SsdTracker, pick_features
 from vergence.vision.tracks import Tracks
 
 _POINTS = 48
-_FEWEST = 8  # of them that have to be found
+_FEWEST = 8  # points that must be found
 _APART_PX = 16.0
 _BORDER_PX = 40.0
-_VAGUE_PX = 0.5  # stated deviation from which a point tells nothing this close to the goal
-_FLOOR_PX = 0.03  # what a measured place may be off beside its stated deviation
-_ARM_PX = 0.15  # what a point may be off by where the joints say that the camera is
-_LEAST_RELIEF, _MOST_RELIEF = 0.03, 0.3  # deviation of the points' depths, a share of them
-_REST_S, _REST = 0.4, 0.03  # in which the camera must not move more than this share of a tolerance
+_VAGUE_PX = 0.5  # stated deviation from which a point is useless this close to the goal
+_FLOOR_PX = 0.03  # error of a measured position in addition to its stated deviation
+_ARM_PX = 0.15  # error of a point predicted from the joints
+_LEAST_RELIEF, _MOST_RELIEF = 0.03, 0.3  # relative deviation of the points' depths
+_REST_S, _REST = 0.4, 0.03  # at rest: moved by less than this fraction of a tolerance
 
 
 class GoalPoints:
-    """Well-textured points of the photograph, searched for in the images.
+    """Well-textured points of the photograph, tracked in the images.
 
     Args:
         goal: the photograph.
-        star_px: points recognised, (N, 2); the others are picked among them.
+        star_px: recognised points, (N, 2); more points are picked between them.
 
     Attributes:
         points_px: the points, (K, 2).
-        found: how many were found in the last image.
+        found: number found in the last image.
     """
 
     def __init__(self, goal: GoalImage, star_px: FloatArray) -> None:
@@ -40,15 +40,15 @@ class GoalPoints:
         self._tracker = SsdTracker(goal.image, self.points_px)
         self.found = 0
         self._depth_m = np.ones(len(self.points_px))
-        self._relief = np.zeros(len(self.points_px))  # deviations of the depths, shares of them
-        self._depths: PointDepths | None = None  # known once a fit is
+        self._relief = np.zeros(len(self.points_px))  # relative deviations of the depths
+        self._depths: PointDepths | None = None  # None until a fit is known
         self._seen: list[tuple[float, Displacement]] = []
 
     def learn(self, fit: GoalFit) -> None:
-        """Take pose and distance of the goal from a fit; how deep each point is, motion will tell.
+        """Take pose and distance of the goal from a fit; motion will give each point's depth.
 
-        The depths that a fit gives single points pass for relief where they are wrong, and relief
-        tells a motion aside from a turn.
+        The depths that a fit assigns to single points look like relief if they are wrong, and
+        relief is what distinguishes a translation from a rotation.
         """
         depth_m = fit.points_goal[:, 2]
         middle = float(np.median(depth_m))
@@ -58,7 +58,7 @@ class GoalPoints:
         self._depth_m, self._relief = self._depths.at_goal()
 
     def shift_px(self, T_goal_camera: FloatArray) -> float:
-        """Return how far the points are from their places, from a pose of the camera, median."""
+        """Return the median distance of the points from their places at a camera pose, px."""
         seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
         if (seen[:, 2] <= 0).any():
             return float("inf")
@@ -76,9 +76,9 @@ class GoalPoints:
 
         Args:
             image: grey, (height, width).
-            time: of it, s.
-            T_world_camera: where it was taken, (4, 4).
-            T_goal_camera: where the camera is thought to be; where it was last if None.
+            time: of its exposure, s.
+            T_world_camera: pose of the camera that took it, (4, 4).
+            T_goal_camera: assumed pose of the camera; the last one if None.
         """
         predicted = None
         if T_goal_camera is not None:
@@ -121,11 +121,11 @@ class GoalPoints:
 
     @property
     def displacement(self) -> Displacement | None:
-        """How far the camera was from the goal in the last image that told."""
+        """Displacement of the camera from the goal in the last image that determined it."""
         return self._seen[-1][1] if self._seen else None
 
     def at_rest(self, tolerance_m: float, tolerance_rad: float) -> bool:
-        """Return whether the camera has hardly moved lately, in shares of the tolerances."""
+        """Return whether the camera has hardly moved recently, relative to the tolerances."""
         if len(self._seen) < 4 or self._seen[-1][0] - self._seen[0][0] < 0.8 * _REST_S:
             return False
         first, last = self._seen[0][1], self._seen[-1][1]
@@ -134,7 +134,7 @@ class GoalPoints:
         return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
 
     def reference(self, time: float) -> Reference:
-        """Return the points as the photograph shows them, as deep as they are judged."""
+        """Return the points of the photograph, with their estimated depths."""
         depth_m = self._depth_m
         return Reference(
             time,
@@ -151,7 +151,7 @@ class GoalPoints:
 
 
 def _without(tracks: Tracks, chosen: IntArray, why: str) -> Tracks:
-    """Return tracks without some points, such as those on something hidden."""
+    """Return tracks without some points, such as those on a hidden object."""
     found, reasons = tracks.found.copy(), list(tracks.reasons)
     found[chosen] = False
     for number in chosen:

@@ -1,4 +1,4 @@
-"""The last part of the way: the photograph's own points are followed, and the end is judged."""
+"""The last part of the approach: tracking the photograph's own points, and judging the end."""
 
 from collections.abc import Callable
 
@@ -16,11 +16,11 @@ from vergence.signals import Frame, Outcome, OutcomeKind
 from vergence.vision.matching import image_fault
 from vergence.vision.tracks import Tracks
 
-NEAR_PX = 32.0  # of the photograph's points from their places, at which they are followed
+NEAR_PX = 32.0  # distance of the photograph's points from their places below which they are tracked
 
 
 class Closing:
-    """Follows the photograph's points, and says how far the camera is from its goal.
+    """Tracks the photograph's points, and computes how far the camera is from its goal.
 
     Args:
         goal: the photograph.
@@ -28,8 +28,8 @@ class Closing:
 
     Attributes:
         points: the photograph's own points; None before it is recognised.
-        begun: whether they are followed.
-        scale_deviation: relative, of all lengths; the least so far.
+        begun: whether they are tracked.
+        scale_deviation: relative deviation of all lengths; the smallest so far.
     """
 
     def __init__(self, goal: GoalImage, settings: ApproachSettings) -> None:
@@ -37,14 +37,14 @@ class Closing:
         self.points: GoalPoints | None = None
         self.begun = False
         self.scale_deviation = 1.0
-        self._missed = ""  # why they could not be followed, when they were searched for last
+        self._missed = ""  # why they could not be tracked at the last attempt
 
     def take(self, found: Recognition) -> None:
-        """Go on from points recognised anew."""
+        """Continue with newly recognised points."""
         self.points, self.begun = GoalPoints(self._goal, found.recognised_px), False
 
     def begin(self, fit: GoalFit, T_world_camera: FloatArray, frame: Frame) -> str:
-        """Follow the photograph's points if they are where they are expected; say how many are."""
+        """Track the photograph's points if they are where expected; return how many, as text."""
         assert self.points is not None
         assert frame.image is not None
         self.points.learn(fit)
@@ -65,7 +65,7 @@ class Closing:
         return f"{np.count_nonzero(tracks.found)} of {len(tracks.found)}"
 
     def tracks(self, frame: Frame, T_world_camera: FloatArray) -> Tracks | None:
-        """Return the points in an image, as far as they are followed; None where they are lost."""
+        """Return the points in an image if they are tracked; None if they are lost."""
         assert self.points is not None
         assert frame.image is not None
         tracks = self.points.track(frame.image, frame.time, T_world_camera)
@@ -73,7 +73,7 @@ class Closing:
         return tracks
 
     def at_rest(self) -> Displacement | None:
-        """Return how far the camera is from its goal, once it hardly moves."""
+        """Return the displacement of the camera from its goal, once it hardly moves."""
         assert self.points is not None
         settings = self._settings
         if not self.points.at_rest(settings.tolerance_m, settings.tolerance_rad):
@@ -81,7 +81,7 @@ class Closing:
         return self.points.displacement
 
     def arrived(self, displacement: Displacement, frame: Frame) -> Callable[[], Arrived] | None:
-        """Return the last comparison to be made, if the camera is at its goal for sure."""
+        """Return the final comparison to be made, if the camera is certainly at its goal."""
         far_m, far_rad = self._at_most(displacement)
         if far_m > self._settings.tolerance_m or far_rad > self._settings.tolerance_rad:
             return None
@@ -90,12 +90,12 @@ class Closing:
         return lambda: Arrived(confirm(goal, image), reason)
 
     def where(self, displacement: Displacement) -> str:
-        """Return how far the camera is from its goal."""
+        """Return the displacement of the camera from its goal, as text."""
         where = in_words(displacement.distance_m, displacement.angle_rad)
         return f"{where} from the goal; certainly within {in_words(*self._at_most(displacement))}"
 
     def unfinished(self, time: float) -> Outcome:
-        """Return how the task ends if its time is over."""
+        """Return the outcome of the task if its time is over."""
         displacement = self.points.displacement if self.points else None
         reason = f"out of time: {self._missed}" if self._missed else "out of time on the way"
         if self.begun and displacement is not None:
@@ -103,6 +103,6 @@ class Closing:
         return Outcome(OutcomeKind.NOT_REACHED, reason, time)
 
     def _at_most(self, displacement: Displacement) -> tuple[float, float]:
-        """Return the largest distance, m, and angle, rad, that the camera may be off, for sure."""
+        """Return upper bounds on the distance, m, and angle, rad, of the camera from its goal."""
         far_m, far_rad = displacement.at_most()
         return far_m * (1.0 + 3.0 * self.scale_deviation), far_rad

@@ -1,4 +1,4 @@
-"""What is to be reached, and how."""
+"""The goal of an approach, and its settings."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
@@ -9,12 +9,12 @@ from vergence.vision.matching import Matcher
 
 
 class GoalImage(NamedTuple):
-    """A photograph as the arm's camera would have taken it, and what recognises it."""
+    """A photograph as the arm's camera would have taken it, and its description for the matcher."""
 
     image: ImageArray  # (height, width) grey
     camera: Camera  # the arm's
     matcher: Matcher
-    described: Any  # the image as the matcher describes it
+    described: Any  # keypoints and descriptors of the matcher
     mask: BoolArray | None = None  # (height, width) where the photograph shows something
 
     @classmethod
@@ -26,7 +26,7 @@ class GoalImage(NamedTuple):
 
 
 class KnownLength(NamedTuple):
-    """How far two points are apart that the photograph shows."""
+    """The known distance between two points in the photograph."""
 
     points_px: FloatArray  # (2, 2) in the photograph
     length_m: float
@@ -34,14 +34,14 @@ class KnownLength(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ApproachSettings:
-    """How a photograph is approached."""
+    """Settings of an approach to a photograph."""
 
     tolerance_m: float = 1e-3  # distance from the goal that the confidence region must be within
-    tolerance_rad: float = 0.0035  # and angle
+    tolerance_rad: float = 0.0035  # angle likewise
     distance_m: float | None = None  # rough distance from camera to object at the goal
     length: KnownLength | None = None  # in the photograph
     margin_px: float = 10.0  # distance to keep from the border of the image
     # Distance to keep from joint limits, as a fraction of half the range.
     margin_joint: float = 0.01
     camera_speed_m_s: float = 0.25  # on the path
-    points: int = 16  # that are followed
+    points: int = 16  # number of tracked points
