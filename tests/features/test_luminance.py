@@ -77,10 +77,6 @@ def test_the_camera_finds_its_goal_from_coarse_to_fine() -> None:
         ({"image": np.zeros((3, 4))}, "image"),
         ({"depth_m": 0.0}, "depth_m"),
         ({"level": 9}, "level.*0 … 3"),
-        (
-            {"camera": Camera(160, 120, 150.0, 150.0, 79.5, 59.5, (0.1, 0.0, 0.0, 0.0, 0.0))},
-            "camera",
-        ),
     ],
 )
 def test_what_makes_no_luminance_is_refused(change: dict[str, object], match: str) -> None:

@@ -4,14 +4,16 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence.assembly import run_driver, with_goal
+from vergence.assembly import run_cell, run_driver, with_goal
 from vergence.camera.photograph import write_photograph
 from vergence.cell import load_cell
+from vergence.errors import InputError
 from vergence.geometry import se3_inverse, so3_log
 from vergence.signals import OutcomeKind
 from vergence.simulation import SimulatedDriver
 
 TOLERANCE_M, TOLERANCE_DEG = 0.003, 0.2  # asked for, so what `reached` promises
+AT_GOAL = {"goal_deg": [0.0, -100.0, 100.0, -90.0, -90.0, 20.0]}  # of the cell `photograph`
 GOAL_DEG = np.array([1.5, -1.0, 2.0, 3.0, -2.0, 40.0])  # from the start
 
 
@@ -31,11 +33,11 @@ def taken(cell):
     return frame.image, frame.truth.T_world_camera, driver.cameras["wrist"]
 
 
-def run_to(cell, image, folder, name="goal.png"):
+def run_to(cell, image, folder, name="goal.png", finish="points"):
     """Run the cell to a photograph; return the run and where its camera ended."""
     path = folder / name
     assert cv2.imwrite(str(path), image)
-    cell = with_goal(cell, path).replace(task={"tolerance_m": TOLERANCE_M})
+    cell = with_goal(cell, path).replace(task={"tolerance_m": TOLERANCE_M, "finish": finish})
     driver = SimulatedDriver(cell)
     try:
         run = run_driver(cell, driver, (), images=True)
@@ -89,6 +91,51 @@ def test_a_photograph_by_another_camera_leads_to_its_place(cell, taken, tmp_path
     distance, angle = apart(T_end, T_goal)
     assert distance < TOLERANCE_M
     assert angle < TOLERANCE_DEG
+
+
+def test_luminance_takes_over_from_the_points_and_ends_nearer():
+    """With noise in the images, of which a few windows leave more than the whole image does."""
+    cell = load_cell("photograph").replace(
+        task={"finish": "luminance", "goal": None, **AT_GOAL},
+        cameras={"wrist": {"noise_grey": 4.0}},
+    )
+    driver = SimulatedDriver(cell)
+    try:
+        goal = driver.frame_at("wrist", "ur5", np.deg2rad(AT_GOAL["goal_deg"])).truth
+        run = run_driver(cell, driver, (), images=True)
+        end = apart(driver.world.camera_pose("wrist"), goal.T_world_camera)
+    finally:
+        driver.close()
+    assert run.outcome.kind is OutcomeKind.REACHED
+    assert run.outcome.reason.endswith("finished by luminance")
+    (taken,) = (event.time for event in run.events if event.name == "luminance takes over")
+    wrist = run.cameras["wrist"]
+    T = wrist.T_world_camera[np.searchsorted(wrist.time, taken)]
+    by_points = apart(T, goal.T_world_camera)
+    assert end[0] < by_points[0]
+    assert end[1] < by_points[1]
+
+
+def test_luminance_hands_back_where_the_tones_are_not_those_of_the_photograph(
+    cell, taken, tmp_path
+):
+    image, T_goal, _ = taken
+    darker = (255 * (image / 255.0) ** 1.8).astype(np.uint8)
+    run, T_end, _ = run_to(cell, darker, tmp_path, finish="luminance")
+    told = [event.text for event in run.events if event.name == "luminance hands back"]
+    assert len(told) == 1
+    assert "differs" in told[0]
+    assert run.outcome.kind is OutcomeKind.REACHED
+    assert run.outcome.reason.endswith(f"luminance did not help: {told[0]}")
+    distance, angle = apart(T_end, T_goal)
+    assert distance < TOLERANCE_M
+    assert angle < TOLERANCE_DEG
+
+
+def test_luminance_is_refused_where_features_are_known():
+    cell = load_cell("gantry", {"task.finish": "luminance"})
+    with pytest.raises(InputError, match=r"task\.finish: given luminance; allowed: points"):
+        run_cell(cell, images=False)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ from vergence.assembly.switch import require_output
 from vergence.assembly.target_geometry import target_shape
 from vergence.assembly.task_stages import until_of
 from vergence.cell import Cell
-from vergence.cell.schema import AdvanceTable, FollowTable, SwitchTable
+from vergence.cell.schema import AdvanceTable, FollowTable, ReachTable, SwitchTable
 from vergence.control import ServoSettings
+from vergence.errors import InputError
 from vergence.runtime.driver import Driver
 from vergence.runtime.task_ends import looks_for_target
 
@@ -32,6 +33,9 @@ def check_task(cell: Cell, context: LawContext, driver: Driver, images: bool) ->
     require_output(cell, driver)
     if is_by_photograph(cell):
         require_photograph(context, images)
+    elif isinstance(cell.task, ReachTable) and cell.task.finish != "points":
+        allowed = "points; luminance only finishes a photograph without known features"
+        raise InputError(str(cell.path), "task.finish", cell.task.finish, allowed)
     if isinstance(cell.task, FollowTable) or looks_for_target(cell.task.until):
         target_shape(cell, context.model)
     moves_by_law = not isinstance(cell.task, AdvanceTable | SwitchTable)

@@ -103,6 +103,7 @@ def make_approach(context: LawContext, task: ReachTable, driver: StartedDriver) 
         margin_px=task.margin_px,
         margin_joint=task.margin_joint,
         camera_speed_m_s=task.camera_speed_m_s,
+        luminance=task.finish == "luminance",
     )
     matcher = OwnMatcher(task.matcher, str(context.cell.path))
     return Approach(

@@ -1,5 +1,6 @@
 """The displacement of a camera from where a photograph was taken, once it is small."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy as np
 from vergence.arrays import BoolArray, FloatArray
 from vergence.geometry import se3, so3_exp, so3_log
 
+REST_S = 0.4  # over which a camera at rest is watched
+_REST = 0.03  # share of a tolerance that it may move in that time
 _ITERATIONS = 8
 _DOUBTFUL = 3.0  # standard deviations beyond which a point is downweighted
 
@@ -36,6 +39,24 @@ class Displacement(NamedTuple):
             self.distance_m + deviations * float(np.sqrt(np.linalg.eigvalsh(position)[-1])),
             self.angle_rad + deviations * float(np.sqrt(np.linalg.eigvalsh(turn)[-1])),
         )
+
+
+def rested(
+    seen: Sequence[tuple[float, Displacement]], tolerance_m: float, tolerance_rad: float
+) -> bool:
+    """Return whether the camera has hardly moved lately, in shares of the tolerances.
+
+    Args:
+        seen: times, s, and where the camera was, no longer ago than `REST_S`.
+        tolerance_m: of its position.
+        tolerance_rad: of its rotation.
+    """
+    if len(seen) < 4 or seen[-1][0] - seen[0][0] < 0.8 * REST_S:
+        return False
+    first, last = seen[0][1], seen[-1][1]
+    moved = np.linalg.norm(first.T_goal_camera[:3, 3] - last.T_goal_camera[:3, 3])
+    turned = abs(first.angle_rad - last.angle_rad)
+    return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
 
 
 def fit_displacement(

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
+from vergence.camera.distortion import distortion_slopes
 from vergence.errors import InputError
 from vergence.features.interaction import interaction_matrix_points
 
@@ -22,13 +23,13 @@ class Luminance:
 
     Args:
         image: grey, (height, width).
-        camera: its model, without distortion.
+        camera: its model.
         depth_m: of what the image shows, one number or (height, width).
         level: of the pyramid: the image is smoothed and halved so often.
 
     Raises:
-        InputError: if the image has another size or the camera distorts, a depth is not above
-            zero, or the level leaves nothing of the image.
+        InputError: if the image has another size, a depth is not above zero, or the level leaves
+            nothing of the image.
     """
 
     def __init__(
@@ -38,19 +39,16 @@ class Luminance:
         if grey.shape != (camera.height, camera.width):
             allowed = f"grey, {camera.width} x {camera.height}"
             raise InputError("Luminance", "image", f"shape {grey.shape}", allowed)
-        if camera.distorted:
-            raise InputError("Luminance", "camera", "one with distortion", "an undistorted image")
         depth = np.broadcast_to(np.asarray(depth_m, dtype=np.float64), grey.shape)
         if not (depth > 0.0).all():
             raise InputError("Luminance", "depth_m", "a depth not above zero", "depths above zero")
-        most = int(np.log2(min(grey.shape) / (4.0 * _BORDER_PX)))
+        most = coarsest_level(grey.shape)
         if not 0 <= level <= most:
             raise InputError("Luminance", "level", level, f"0 … {most}")
-        self.level = level
+        self.level, self.camera = level, camera
         self._scale = 2**level
         self._grey = _halved(grey, level).astype(np.float64)
         self._depth = depth[:: self._scale, :: self._scale]
-        self._camera = camera
 
     def value(self) -> FloatArray:
         """Return the grey values, (N,), row by row."""
@@ -67,12 +65,15 @@ class Luminance:
         height, width = self._grey.shape
         rows, columns = np.mgrid[:height, :width]
         places = self._scale * np.column_stack((_inner(columns).ravel(), _inner(rows).ravel()))
-        x, y = self._camera.normalize(places).T
-        fx, fy = self._camera.focal_px / self._scale
+        points = self.camera.normalize(places)
         L = interaction_matrix_points(
-            np.column_stack((x, y)), np.ascontiguousarray(_inner(self._depth).ravel())
+            points, np.ascontiguousarray(_inner(self._depth).ravel())
         ).reshape(-1, 2, 6)
-        moved: FloatArray = across[:, None] * fx * L[:, 0] + down[:, None] * fy * L[:, 1]
+        gradient = np.column_stack((across, down)) * self.camera.focal_px / self._scale
+        if self.camera.distorted:
+            slopes = distortion_slopes(points, self.camera.distortion)
+            gradient = np.einsum("ni,nij->nj", gradient, slopes)
+        moved: FloatArray = gradient[:, :1] * L[:, 0] + gradient[:, 1:] * L[:, 1]
         return -moved
 
     def twist(self, desired: Self, gain: float = 1.0, damping: float = 1e-3) -> FloatArray:
@@ -96,6 +97,11 @@ class Luminance:
             raise InputError("Luminance", "image", "one without texture", "an image with texture")
         v = np.linalg.solve(H + damping * np.diag(np.diag(H)), L.T @ self.error(desired))
         return np.asarray(-gain * v)
+
+
+def coarsest_level(shape: tuple[int, ...]) -> int:
+    """Return the coarsest level of the pyramid that leaves something of an image."""
+    return int(np.log2(min(shape) / (4.0 * _BORDER_PX)))
 
 
 def _halved(grey: NDArray[np.float32], level: int) -> NDArray[np.float32]:

@@ -81,7 +81,7 @@ def run_trial(seed: int, method: Method, number: int, imaging: str | None = None
     cell = with_imaging(cell, imaging)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "goal.png"
-        _take_photograph(cell, trial, path)
+        take_photograph(cell, trial, path)
         driver = SimulatedDriver(with_goal(cell, path))
         try:
             return _run(driver, trial, method)
@@ -96,7 +96,7 @@ def _run(driver: SimulatedDriver, trial: Trial, method: Method) -> TrialResult:
     feasible = _feasible(driver, trial, T_goal, T_start)
     outcome = _outcome(driver, method)
     T_end = driver.world.camera_pose(CAMERA)
-    begun, ended = _apart(T_start, T_goal), _apart(T_end, T_goal)
+    begun, ended = apart(T_start, T_goal), apart(T_end, T_goal)
     kind, reason, time = outcome.kind, outcome.reason, outcome.time
     return TrialResult(trial, kind, reason, feasible, time > 0.0, *begun, *ended, time)
 
@@ -108,7 +108,7 @@ def _outcome(driver: SimulatedDriver, method: Method) -> Outcome:
     return run_driver(cell, driver, (), images=True).outcome
 
 
-def _take_photograph(cell: Cell, trial: Trial, path: Path) -> None:
+def take_photograph(cell: Cell, trial: Trial, path: Path) -> None:
     """Render the photograph in its own light, by its own camera, a part of it covered."""
     changes = {CAMERA: {**_OTHER_CAMERA, "pixel_um": None}} if trial.other_camera else {}
     driver = SimulatedDriver(cell.replace(cameras=changes, scene={"light": 1.0}))
@@ -156,7 +156,7 @@ def _feasible(
     return bool(seen.sum() >= OVERLAP * len(grid))
 
 
-def _apart(T: FloatArray, T_goal: FloatArray) -> tuple[float, float]:
+def apart(T: FloatArray, T_goal: FloatArray) -> tuple[float, float]:
     """Return the distance, m, and the angle, degrees, between two poses."""
     E = se3_inverse(T_goal) @ T
     turn = np.linalg.norm(so3_log(np.ascontiguousarray(E[:3, :3])))

@@ -260,6 +260,8 @@ class ReachTable(TaskTable):
     tolerance_m: Length = 1e-3  # the goal is reached when certainly within this distance
     # The goal is reached when certainly within this angle.
     tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 0.2
+    # What a photograph is finished by: its points, or then the grey values of the whole image.
+    finish: Literal["points", "luminance"] = "points"
     planner: Part = "optimised"  # planner of the path in the image
     tracker: Part = "round_marks"  # tracker of the features
     margin_px: Pixels = 10.0  # distance to keep from the border of the image

@@ -8,6 +8,7 @@ from vergence.estimation.goal_fit import points_in
 from vergence.planning.approach.answers import Answer, Arrived, Told, view_of
 from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.closing import Closing
+from vergence.planning.approach.finisher import Finisher
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
 from vergence.planning.approach.kept_images import with_tracks
 from vergence.planning.approach.recognition import Recognition
@@ -144,6 +145,8 @@ class Approach:
         assert self._tracker is not None
         if self._closing.begun:
             tracks = self._closing.tracks(frame, self._search.camera_pose(frame))
+            if fault := self._closing.hand_back():
+                self._tell(frame.time, "luminance hands back", fault)
             if tracks is not None:
                 return tracks
             self._tell(frame.time, "left the goal", "the photograph's points are lost")
@@ -180,9 +183,11 @@ class Approach:
         if displacement is None:
             return
         if job := self._closing.arrived(displacement, frame):
-            self._worker.ask(job)
+            self._worker.ask(self._closing.finish() or job)
+        elif self._closing.finisher is not None:
+            return  # it hands back with the next image
         elif self._stays >= _LOOKS:
-            reason = f"at rest at {self._closing.where(displacement)}"
+            reason = f"at rest at {self._closing.where(displacement)}{self._closing.remark}"
             self._outcome = Outcome(OutcomeKind.NOT_REACHED, reason, frame.time)
         elif self._due(frame):
             self._stays += 1
@@ -199,8 +204,12 @@ class Approach:
         known, leads_to = self._recognition, self._trajectory.path.problem.T_world_goal
         self._worker.ask(lambda: self._search.again(known, frame, leads_to))
 
-    def _take(self, answer: Answer | Arrived, frame: Frame) -> bool:
+    def _take(self, answer: Answer | Arrived | Finisher, frame: Frame) -> bool:
         """Apply the result of a job; return whether other points are tracked from now on."""
+        if isinstance(answer, Finisher):
+            self._closing.finisher = answer
+            self._tell(frame.time, "luminance takes over", "the points have arrived")
+            return False
         if isinstance(answer, Arrived):
             self._outcome = answer.outcome(frame.time)
             return False

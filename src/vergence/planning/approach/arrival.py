@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
-from vergence.estimation.displacement import Displacement, fit_displacement
+from vergence.estimation.displacement import REST_S, Displacement, fit_displacement, rested
 from vergence.estimation.goal_fit import GoalFit, points_in
 from vergence.planning.approach.goal import GoalImage
 from vergence.planning.approach.point_depths import PointDepths
@@ -19,7 +19,6 @@ _VAGUE_PX = 0.5  # stated deviation from which a point is useless this close to 
 _FLOOR_PX = 0.03  # error of a measured position in addition to its stated deviation
 _ARM_PX = 0.15  # error of a point predicted from the joints
 _LEAST_RELIEF, _MOST_RELIEF = 0.03, 0.3  # relative deviation of the points' depths
-_REST_S, _REST = 0.4, 0.03  # at rest: moved by less than this fraction of a tolerance
 
 
 class GoalPoints:
@@ -32,6 +31,7 @@ class GoalPoints:
     Attributes:
         points_px: the points, (K, 2).
         found: number found in the last image.
+        agree: which of them were found and agree with each other, (K,).
     """
 
     def __init__(self, goal: GoalImage, star_px: FloatArray) -> None:
@@ -39,6 +39,7 @@ class GoalPoints:
         self.points_px = _picked(goal, star_px)
         self._tracker = SsdTracker(goal.image, self.points_px)
         self.found = 0
+        self.agree = np.zeros(len(self.points_px), dtype=np.bool_)
         self._depth_m = np.ones(len(self.points_px))
         self._relief = np.zeros(len(self.points_px))  # relative deviations of the depths
         self._depths: PointDepths | None = None  # None until a fit is known
@@ -59,11 +60,15 @@ class GoalPoints:
 
     def shift_px(self, T_goal_camera: FloatArray) -> float:
         """Return the median distance of the points from their places at a camera pose, px."""
-        seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
-        if (seen[:, 2] <= 0).any():
+        seen = self.seen_px(T_goal_camera)
+        if seen is None:
             return float("inf")
-        shift = self.goal.camera.project(seen) - self.points_px
-        return float(np.median(np.linalg.norm(shift, axis=1)))
+        return float(np.median(np.linalg.norm(seen - self.points_px, axis=1)))
+
+    def seen_px(self, T_goal_camera: FloatArray) -> FloatArray | None:
+        """Return where a camera sees the points, (K, 2); None if one is behind it."""
+        seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
+        return None if (seen[:, 2] <= 0).any() else self.goal.camera.project(seen)
 
     def track(
         self,
@@ -82,10 +87,9 @@ class GoalPoints:
         """
         predicted = None
         if T_goal_camera is not None:
-            seen = points_in(T_goal_camera, self._points_goal(self._depth_m))
-            if (seen[:, 2] <= 0).any():
+            predicted = self.seen_px(T_goal_camera)
+            if predicted is None:
                 return None
-            predicted = self.goal.camera.project(seen)
         tracks = self._tracker.track(image, predicted)
         variance = np.trace(tracks.covariance_px, axis1=1, axis2=2) / 2.0
         vague = np.flatnonzero(tracks.found & (variance > _VAGUE_PX**2))
@@ -107,7 +111,8 @@ class GoalPoints:
             return None
         at_odds = np.flatnonzero(found)[~displacement.agrees]
         tracks = _without(tracks, at_odds, "disagrees with the other points")
-        self._seen = [(t, d) for t, d in self._seen if t >= time - _REST_S] + [(time, displacement)]
+        self.agree = tracks.found
+        self._seen = [(t, d) for t, d in self._seen if t >= time - REST_S] + [(time, displacement)]
         return tracks
 
     def _learn_depths(
@@ -126,12 +131,7 @@ class GoalPoints:
 
     def at_rest(self, tolerance_m: float, tolerance_rad: float) -> bool:
         """Return whether the camera has hardly moved recently, relative to the tolerances."""
-        if len(self._seen) < 4 or self._seen[-1][0] - self._seen[0][0] < 0.8 * _REST_S:
-            return False
-        first, last = self._seen[0][1], self._seen[-1][1]
-        moved = np.linalg.norm(first.T_goal_camera[:3, 3] - last.T_goal_camera[:3, 3])
-        turned = abs(first.angle_rad - last.angle_rad)
-        return bool(moved <= _REST * tolerance_m and turned <= _REST * tolerance_rad)
+        return rested(self._seen, tolerance_m, tolerance_rad)
 
     def reference(self, time: float) -> Reference:
         """Return the points of the photograph, with their estimated depths."""

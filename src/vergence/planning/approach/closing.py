@@ -10,6 +10,7 @@ from vergence.estimation.goal_fit import GoalFit
 from vergence.geometry import se3_inverse
 from vergence.planning.approach.answers import Arrived, in_words
 from vergence.planning.approach.arrival import GoalPoints
+from vergence.planning.approach.finisher import Finisher
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
 from vergence.planning.approach.recognition import Recognition, confirm
 from vergence.signals import Frame, Outcome, OutcomeKind
@@ -29,6 +30,8 @@ class Closing:
     Attributes:
         points: the photograph's own points; None before it is recognised.
         begun: whether they are tracked.
+        finisher: uses luminance at the very end; None before and after that.
+        remark: the result of luminance, for the outcome; empty before.
         scale_deviation: relative deviation of all lengths; the smallest so far.
     """
 
@@ -37,11 +40,14 @@ class Closing:
         self.points: GoalPoints | None = None
         self.begun = False
         self.scale_deviation = 1.0
+        self.finisher: Finisher | None = None
+        self.remark = ""
         self._missed = ""  # why they could not be tracked at the last attempt
 
     def take(self, found: Recognition) -> None:
         """Continue with newly recognised points."""
         self.points, self.begun = GoalPoints(self._goal, found.recognised_px), False
+        self.finisher = None
 
     def begin(self, fit: GoalFit, T_world_camera: FloatArray, frame: Frame) -> str:
         """Track the photograph's points if they are where expected; return how many, as text."""
@@ -70,13 +76,34 @@ class Closing:
         assert frame.image is not None
         tracks = self.points.track(frame.image, frame.time, T_world_camera)
         self.begun = tracks is not None
-        return tracks
+        if tracks is None or self.finisher is None:
+            self.finisher = None
+            return tracks
+        return self.finisher.tracks(frame, tracks)
+
+    def finish(self) -> Callable[[], Finisher] | None:
+        """Return the job that prepares to go by luminance; None if that is not asked or over."""
+        points = self.points
+        if not self._settings.luminance or self.remark or self.finisher or points is None:
+            return None
+        return lambda: Finisher(points)
+
+    def hand_back(self) -> str:
+        """Go by the points again where luminance is no use; return why, or nothing."""
+        if self.finisher is None or not self.finisher.fault:
+            return ""
+        fault, self.finisher = self.finisher.fault, None
+        self.remark = f"; luminance did not help: {fault}"
+        return fault
 
     def at_rest(self) -> Displacement | None:
         """Return the displacement of the camera from its goal, once it hardly moves."""
         assert self.points is not None
-        settings = self._settings
-        if not self.points.at_rest(settings.tolerance_m, settings.tolerance_rad):
+        tolerances = self._settings.tolerance_m, self._settings.tolerance_rad
+        if self.finisher is not None:
+            if not self.finisher.at_rest(*tolerances):
+                return None
+        elif not self.points.at_rest(*tolerances):
             return None
         return self.points.displacement
 
@@ -84,8 +111,12 @@ class Closing:
         """Return the final comparison to be made, if the camera is certainly at its goal."""
         far_m, far_rad = self._at_most(displacement)
         if far_m > self._settings.tolerance_m or far_rad > self._settings.tolerance_rad:
+            if self.finisher is not None:
+                self.finisher.fault = "the points are not certainly within the tolerances any more"
             return None
-        goal, image, reason = self._goal, frame.image, self.where(displacement)
+        goal, image = self._goal, frame.image
+        by = self.remark if self.finisher is None else "; finished by luminance"
+        reason = self.where(displacement) + by
         assert image is not None
         return lambda: Arrived(confirm(goal, image), reason)
 

@@ -45,3 +45,4 @@ class ApproachSettings:
     margin_joint: float = 0.01
     camera_speed_m_s: float = 0.25  # on the path
     points: int = 16  # number of tracked points
+    luminance: bool = False  # whether the grey values of the whole image finish the path
