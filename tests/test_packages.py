@@ -37,7 +37,7 @@ ROOMS = (
     "studies",
     "app",
 )
-ROOT_MODULES = sorted(path.stem for path in SOURCE.glob("*.py") if path.stem != "__init__")
+ROOT_MODULES = sorted(path.stem for path in SOURCE.glob("*.py") if not path.stem.startswith("__"))
 HEAVY = ("mujoco", "cv2", "matplotlib", "scipy", "pydantic", "mcap", "foxglove", "dask", "typer")
 
 

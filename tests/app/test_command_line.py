@@ -56,6 +56,14 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     return run
 
 
+def test_python_runs_the_package_as_the_command_line() -> None:
+    told = subprocess.run(
+        [sys.executable, "-m", "vergence", "cells"], capture_output=True, text=True
+    )
+    assert told.returncode == 0
+    assert "puma560" in told.stdout
+
+
 def test_vergence_alone_says_what_to_do_next(command: Command, capsys: object) -> None:
     assert command() == 0
     assert "vergence run puma560" in capsys.readouterr().out

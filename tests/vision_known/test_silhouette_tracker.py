@@ -10,7 +10,8 @@ from vergence.errors import InputError
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, free_axes, shown_by_edges
-from vergence.vision.known_object.contour_lines import BEYOND, REACH, read_lines
+from vergence.vision.known_object.contour_fit import fit_contour
+from vergence.vision.known_object.contour_lines import BEYOND, REACH, ContourLines, read_lines
 from vergence.vision.known_object.primitives import cylinder, ellipsoid
 from vergence.vision.known_object.silhouette import Outline, outline_of
 from vergence.vision.known_object.weak_turns import ELLIPSOID, USUAL, least_shown_of
@@ -62,6 +63,30 @@ def test_a_line_finds_the_contour_where_the_product_over_its_pixels_is_greatest(
         variance = max(chance @ places**2 - (chance @ places) ** 2, 0.05)
         known = max(1.0 / variance - 12.0 / (2 * REACH + 1) ** 2, 0.0)
         assert lines.information[0] == pytest.approx(known)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_that_err_alike_do_not_draw_the_outline_along(seed: int) -> None:
+    """Weighing each line for itself, the outline moves by 0.4 px or more."""
+    rng = np.random.default_rng(seed)
+    T, lens = se3(np.eye(3), np.array((0.01, -0.01, 0.35))), pack_lens(CAMERA)
+    outline = outline_of(T, lens, BALL.vertices, BALL.triangles, True, 200)
+    assert outline is not None
+    count = len(outline.points)
+    sure, anywhere = np.ones(count), np.eye(6)
+
+    def fitted(offsets_px: np.ndarray) -> np.ndarray:
+        lines = ContourLines(offsets_px, sure, sure > 0.0, sure)
+        fit = fit_contour(T, T, anywhere, lens, outline, lines, sure, 1.5, 3)
+        moved: np.ndarray = CAMERA.project(fit[None, :3, 3])[0] - CAMERA.project(T[None, :3, 3])[0]
+        return moved
+
+    noise = rng.normal(0.0, 0.5, count)
+    alike = noise + np.where(np.arange(count) < 40, 1.5, 0.0)
+    assert np.linalg.norm(fitted(alike) - fitted(noise)) < 0.15
+    # What moved as a whole is followed as a whole.
+    shift = np.array((0.8, -0.5))
+    assert fitted(noise + outline.normals @ shift) == pytest.approx(shift + fitted(noise), abs=0.15)
 
 
 def test_one_image_gives_the_place_of_a_ball_and_none_of_its_turns(

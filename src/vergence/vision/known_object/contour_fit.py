@@ -11,6 +11,9 @@ from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.silhouette import Outline
 
 _INWARD = 0.6  # tolerance inward, as a share of that outward
+_BESIDE, _BESIDE_PX = 6, 40.0  # lines to either side that make a run, and how far they may be
+_RUN_PX = 0.6  # mean residual of a run at which it counts a quarter
+_CLIPPED_PX = 4.0  # residual that no line of a run exceeds
 SLIDING_PX = 100.0  # standard deviation along the contour
 
 
@@ -28,6 +31,9 @@ def fit_contour(
 ) -> FloatArray:
     """Return the pose (4, 4) that fits the lines, by Newton steps on their robust squares.
 
+    A line counts less the larger its residual, and a run of neighbours the larger their mean, as
+    compared with that of other runs.
+
     Args:
         T_start: the pose of the outline, (4, 4).
         T_prior: the predicted pose, (4, 4).
@@ -43,6 +49,8 @@ def fit_contour(
     rows = np.empty((2, 6))
     for _ in range(iterations):
         A, b = prior.copy(), prior @ pose_difference(T_prior, T)
+        runs = means_of_runs(residuals_of(T, lens, outline, lines), outline, lines, weights)
+        run_tolerance = max(_RUN_PX, 2.0 * np.median(np.abs(runs)))
         for n in range(len(weights)):
             weight = weights[n] * lines.information[n]
             if weight <= 0.0:
@@ -56,6 +64,7 @@ def fit_contour(
             # What is in front of the object moves the contour inward, nothing moves it outward.
             tolerance = tolerance_px if residual > 0.0 else _INWARD * tolerance_px
             weight /= (1.0 + (residual / tolerance) ** 2) ** 2
+            weight /= (1.0 + (runs[n] / run_tolerance) ** 2) ** 2
             for i in range(6):
                 slope = nu * rows[0, i] + nv * rows[1, i]
                 b[i] += weight * slope * residual
@@ -65,6 +74,40 @@ def fit_contour(
         solve_factored(A, b)
         T = moved_pose(T, b)
     return T
+
+
+@njit(cache=True)
+def means_of_runs(
+    residuals: FloatArray, outline: Outline, lines: ContourLines, weights: FloatArray
+) -> FloatArray:
+    """Return the weighted mean of the residuals of each line and its neighbours, (N,), px.
+
+    Where what is behind the object has its colours, a run of lines errs alike, each by no more
+    than noise: only their mean shows it.
+
+    Args:
+        residuals: how far outside the outline each line finds the contour, (N,), px.
+        outline: where the lines are.
+        lines: where they find the contour.
+        weights: of the lines, (N,) 0 … 1.
+    """
+    means = np.zeros(len(residuals))
+    for n in range(len(residuals)):
+        total, information = 0.0, 0.0
+        for side in (-1, 1):
+            k = n if side > 0 else n - 1
+            for _ in range(_BESIDE):
+                if not 0 <= k < len(residuals):
+                    break
+                if np.abs(outline.points_px[k] - outline.points_px[n]).max() > _BESIDE_PX:
+                    break
+                weight = weights[k] * lines.information[k]
+                total += weight * min(max(residuals[k], -_CLIPPED_PX), _CLIPPED_PX)
+                information += weight
+                k += side
+        if information > 0.0:
+            means[n] = total / information
+    return means
 
 
 @njit(cache=True)
@@ -83,7 +126,11 @@ def residuals_of(
 
 @njit(cache=True)
 def contour_points(
-    outline: Outline, lines: ContourLines, found: BoolArray, enlarged: float
+    outline: Outline,
+    lines: ContourLines,
+    found: BoolArray,
+    enlarged: float,
+    runs: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return points (M, 3), places (M, 2), covariances (M, 2, 2): one of each line found.
 
@@ -94,14 +141,15 @@ def contour_points(
         lines: where they find the contour.
         found: which of them did, (N,).
         enlarged: how much larger the covariances are, for neighbouring lines err together.
+        runs: mean residual of each line and its neighbours, which they share, (N,), px.
     """
     points, measured = outline.points[found], outline.points_px[found]
     normals, offsets = outline.normals[found], lines.offsets_px[found]
-    information = lines.information[found]
+    information, means = lines.information[found], runs[found]
     covariances = np.empty((len(points), 2, 2))
     for n in range(len(points)):
         measured[n] += offsets[n] * normals[n]
-        across = enlarged / information[n]
+        across = enlarged / information[n] + 2.0 * _BESIDE * means[n] ** 2
         nu, nv = normals[n]
         covariances[n, 0, 0] = across * nu * nu + SLIDING_PX**2 * nv * nv
         covariances[n, 1, 1] = across * nv * nv + SLIDING_PX**2 * nu * nu

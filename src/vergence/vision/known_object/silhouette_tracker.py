@@ -21,6 +21,7 @@ from vergence.vision.known_object.contour_fit import (
     contour_points,
     contour_slopes,
     fit_contour,
+    means_of_runs,
     residuals_of,
 )
 from vergence.vision.known_object.contour_lines import (
@@ -247,9 +248,11 @@ class SilhouetteTracker:
         outline: Outline,
         lines: ContourLines,
     ) -> SilhouetteMeasurement:
+        residuals = residuals_of(T, lens, outline, lines)
+        runs = means_of_runs(residuals, outline, lines, _weights(lines))
         found = (
             lines.usable
-            & (np.abs(residuals_of(T, lens, outline, lines)) < _FOUND_PX)
+            & (np.abs(residuals) < _FOUND_PX)
             & (lines.information > _CLEAR)
             & (lines.deep_odds > _DEEP_ODDS)
         )
@@ -263,7 +266,7 @@ class SilhouetteTracker:
         shared = doubt * shared
         enlarged = doubt * max(count / _INDEPENDENT, 1.0)
         return SilhouetteMeasurement(
-            *contour_points(outline, lines, found, enlarged),
+            *contour_points(outline, lines, found, enlarged, runs),
             T,
             expected,
             count,
