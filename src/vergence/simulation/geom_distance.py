@@ -13,8 +13,10 @@ from numba.extending import intrinsic
 from vergence.arrays import FloatArray, IntArray
 from vergence.robot.distance_gradient import least_distances
 
+# Beside the package: on Linux, on macOS, on Windows.
+_NAMES = ("libmujoco.so.*", "libmujoco.*dylib", "mujoco.dll")
 _LIBRARY = ctypes.CDLL(
-    str(Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.mj_versionString()}"))
+    str(next(file for name in _NAMES for file in Path(mujoco.__file__).parent.glob(name)))
 )
 _FUNCTION = ctypes.cast(_LIBRARY.mj_geomDistance, ctypes.c_void_p).value or 0
 
