@@ -6,7 +6,10 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, ImageArray, frozen
 from vergence.signals import SearchWindows
 from vergence.vision.image import grey_image
+from vergence.vision.key_templates import start_points
+from vergence.vision.settled_place import FIT_PX, LOST_CORRELATION, LOST_SHIFT_PX, LOST_STRETCH
 from vergence.vision.ssd import RANGE_PX
+from vergence.vision.track_points import track_points
 from vergence.vision.tracker_state import (
     AT_BORDER,
     COLUMNS,
@@ -16,20 +19,14 @@ from vergence.vision.tracker_state import (
     DEFORMED,
     DETAIL,
     DISAGREES,
-    FIT_PX,
     FOUND,
     LEFT,
-    LOST_CORRELATION,
-    LOST_SHIFT_PX,
-    LOST_STRETCH,
     NO_MATCH,
     NO_TEMPLATE,
     PLACE,
     RESIDUAL,
     VERDICT,
     empty_state,
-    start_points,
-    track_points,
 )
 from vergence.vision.tracks import Tracks, nothing_found
 

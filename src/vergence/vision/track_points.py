@@ -1,0 +1,216 @@
+"""The kernel of the SSD tracker: all points from one image to the next, look-alikes told apart."""
+
+import numpy as np
+from numba import njit
+
+from vergence.arrays import BoolArray, FloatArray, ImageArray
+from vergence.vision.key_templates import PROMISING, SAME_PX, nearest, take_over
+from vergence.vision.pyramid import anchor_of
+from vergence.vision.settled_place import correlation_at, settle
+from vergence.vision.ssd import RANGE_PX, WORKSPACE_SIZE, make_workspace, search, template_in
+from vergence.vision.tracker_state import (
+    AT_BORDER,
+    COLUMNS,
+    CORRELATION,
+    DETAIL,
+    FOUND,
+    LEFT,
+    NO_TEMPLATE,
+    RESIDUAL,
+    VERDICT,
+    TrackerState,
+    twins_of,
+)
+from vergence.vision.two_by_two import apply2
+
+MOST_PLACES = 12  # candidate positions of a point: search, expected, neighbours' motion, twins
+ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
+NEIGHBOURS = 5  # points whose motion decides between look-alikes
+AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
+CONSENSUS = 3  # points found that predict where the others may have moved
+LOOK_AGAIN_PX = 6.0  # if they moved at least this far
+
+
+@njit(cache=True)
+def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) -> bool:
+    """Find all points, each expected at answers[k, PLACE]; return whether all were found."""
+    expected, count = answers[:, :2].copy(), len(answers)
+    places = np.empty((count, MOST_PLACES, COLUMNS + 4))
+    alike = np.zeros(count, dtype=np.int64)
+    for k in range(count):
+        out = answers[k]
+        out[RESIDUAL], out[CORRELATION], out[DETAIL] = np.nan, np.nan, np.nan
+        out[VERDICT] = NO_TEMPLATE
+        if state.keys[k, 0] > 0:
+            alike[k] = that_look_alike(places[k], settle_all(image, k, state, out, places[k]))
+    found = answers[:, VERDICT] == FOUND
+    sure = found & (alike < 2)
+    for k in range(count):
+        if not found[k]:
+            continue
+        chosen = 0
+        if alike[k] > 1:
+            x, y = where_neighbours_go(k, expected, answers, sure)
+            settle(image, x, y, k, state, places[k, alike[k]])  # the search may not have found it
+            alike[k] = that_look_alike(places[k], alike[k] + 1)
+            off = np.hypot(places[k, : alike[k], 0] - x, places[k, : alike[k], 1] - y)
+            chosen = int(np.argmin(off))
+        if alike[k] > 1 and np.sum(sure) < CONSENSUS:
+            widen_for_others(places[k, : alike[k]], chosen)
+        answers[k] = places[k, chosen, :COLUMNS]
+        take_over(image, k, state, places[k, chosen])
+    if CONSENSUS <= np.sum(found) < count:
+        look_again(image, state, expected, answers)
+    complete = True
+    for out in answers:
+        if out[VERDICT] != FOUND:
+            complete = False
+            out[2], out[5] = RANGE_PX * RANGE_PX / 3.0, RANGE_PX * RANGE_PX / 3.0
+            out[3], out[4] = 0.0, 0.0
+    return complete
+
+
+@njit(cache=True, inline="always")
+def look_again(
+    image: ImageArray, state: TrackerState, expected: FloatArray, answers: FloatArray
+) -> None:
+    """Search again for the points not found, at positions from the others' median motion."""
+    found = answers[:, VERDICT] == FOUND
+    moved = answers[:, :2] - expected
+    dx, dy = np.median(moved[found, 0]), np.median(moved[found, 1])
+    if dx * dx + dy * dy < LOOK_AGAIN_PX * LOOK_AGAIN_PX:
+        return
+    for k in range(len(answers)):
+        if not found[k] and state.keys[k, 0] > 0:
+            before = answers[k].copy()
+            answers[k, 0], answers[k, 1] = expected[k, 0] + dx, expected[k, 1] + dy
+            answers[k, VERDICT] = track_point(image, k, state, answers[k])
+            if answers[k, VERDICT] != FOUND:
+                answers[k] = before
+
+
+@njit(cache=True, inline="always")
+def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
+    """Find point k alone, expected at out[PLACE], in an image; return the verdict."""
+    places = np.empty((MOST_PLACES, COLUMNS + 4))
+    settle_all(image, k, state, out, places)
+    if out[VERDICT] == FOUND:
+        take_over(image, k, state, places[0])
+    return int(out[VERDICT])
+
+
+@njit(cache=True)
+def settle_all(
+    image: ImageArray, k: int, state: TrackerState, out: FloatArray, places: FloatArray
+) -> int:
+    """Align point k, expected at out[PLACE], at all its candidate positions; return their number.
+
+    Marks may look alike, so apart from the search's best position, its other candidates and the
+    expected position are aligned if they are promising, as are the present positions of marks near
+    the point that look like it in the first image.
+
+    Args:
+        image: grey, (height, width).
+        k: index of the point.
+        state: of the tracker; not changed.
+        out: set to the result at the search's position; if the point is not there, at the expected
+            one.
+        places: set to that position and then the others, (MOST_PLACES, COLUMNS + 4): columns as in
+            out, and the affine matrix from the first image to this one.
+    """
+    height, width = image.shape
+    x, y = out[0], out[1]
+    out[VERDICT] = LEFT
+    if not (-RANGE_PX <= x < width + RANGE_PX and -RANGE_PX <= y < height + RANGE_PX):
+        return 0
+    starts = starting_places(image, k, state, x, y)
+    places[0, :COLUMNS] = out
+    settle(image, starts[0, 0], starts[0, 1], k, state, places[0])
+    if places[0, VERDICT] != FOUND:
+        out[:] = places[0, :COLUMNS]
+        settle(image, x, y, k, state, places[0])
+        if places[0, VERDICT] == FOUND:
+            out[:] = places[0, :COLUMNS]
+            return 1
+        border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
+        if border < AT_BORDER_PX:
+            out[VERDICT], out[DETAIL] = AT_BORDER, max(border, 0.0)
+        return 0
+    out[:] = places[0, :COLUMNS]
+    count = 1
+    for n in range(1, len(starts)):
+        start_x, start_y = starts[n, 0], starts[n, 1]
+        if nearest(starts[:n], start_x, start_y) < SAME_PX:
+            continue
+        if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
+            settle(image, start_x, start_y, k, state, places[count])
+            count += places[count, VERDICT] == FOUND
+    for twin in twins_of(state, k):  # the position may be the twin's, and the twin's its twin's
+        away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
+        for sign in (1.0, -1.0):
+            start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
+            if nearest(places[:count, :2], start_x, start_y) >= SAME_PX:
+                settle(image, start_x, start_y, k, state, places[count])
+                count += places[count, VERDICT] == FOUND
+    return count
+
+
+@njit(cache=True, inline="always")
+def starting_places(
+    image: ImageArray, k: int, state: TrackerState, x: float, y: float
+) -> FloatArray:
+    """Return initial positions of point k, (N, 2): the search's best first, (x, y) last."""
+    offset_x, offset_y = state.places[k, 6], state.places[k, 7]
+    anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
+    work = make_workspace(state.memory[:WORKSPACE_SIZE])
+    count, best = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    places = np.empty((count + 1, 2))
+    places[:count] = work.candidates[:count]
+    places[0], places[best] = work.candidates[best], work.candidates[0]
+    places[:count, 0] += anchor_x - 0.5 + offset_x
+    places[:count, 1] += anchor_y - 0.5 + offset_y
+    places[count, 0], places[count, 1] = x, y
+    return places
+
+
+@njit(cache=True, inline="always")
+def that_look_alike(places: FloatArray, count: int) -> int:
+    """Move the positions that match about as well as the best to the front; return how many.
+
+    If the first one is the best by a margin, it is the only one.
+    """
+    alike = min(count, 1)
+    for n in range(1, count):
+        found = places[n, VERDICT] == FOUND
+        if found and places[n, CORRELATION] > places[0, CORRELATION] - ALIKE:
+            places[alike] = places[n].copy()
+            alike += 1
+    return alike
+
+
+@njit(cache=True, inline="always")
+def where_neighbours_go(
+    k: int, expected: FloatArray, answers: FloatArray, sure: BoolArray
+) -> tuple[float, float]:
+    """Return point k's position if it moved like the nearest certain points, else as expected."""
+    others = np.flatnonzero(sure)
+    if len(others) < CONSENSUS:
+        return expected[k, 0], expected[k, 1]
+    off = np.hypot(expected[others, 0] - expected[k, 0], expected[others, 1] - expected[k, 1])
+    near = others[np.argsort(off)[:NEIGHBOURS]]
+    moved = answers[near, :2] - expected[near]
+    return expected[k, 0] + np.median(moved[:, 0]), expected[k, 1] + np.median(moved[:, 1])
+
+
+@njit(cache=True, inline="always")
+def widen_for_others(places: FloatArray, chosen: int) -> None:
+    """Widen the covariance of the chosen position so that the others lie within one deviation.
+
+    It is isotropic, since the search follows only some of many marks in rows.
+    """
+    farthest = 0.0
+    for n in range(len(places)):
+        x, y = places[n, 0] - places[chosen, 0], places[n, 1] - places[chosen, 1]
+        farthest = max(farthest, x * x + y * y)
+    places[chosen, 2] += farthest
+    places[chosen, 5] += farthest
