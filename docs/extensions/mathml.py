@@ -1,5 +1,7 @@
 """Formulas as MathML, which browsers draw themselves: no script, no fonts, no network."""
 
+import re
+from html import unescape
 from xml.etree import ElementTree as ET
 
 from docutils import nodes
@@ -10,6 +12,7 @@ from sphinx.errors import ExtensionError
 from sphinx.writers.html5 import HTML5Translator
 
 _NAMESPACE = ' xmlns="http://www.w3.org/1998/Math/MathML"'  # not needed within HTML
+_ENTITY = re.compile(r"&(?!lt;|gt;|amp;|quot;|apos;)[A-Za-z]+;")  # HTML's, which XML does not know
 _DOTS = ("˙", "¨")
 
 
@@ -30,7 +33,8 @@ def _mathml(tex: str, as_block: bool) -> str:
         text = str(tex2mathml(tex, as_block=as_block))
     except MathError as error:
         raise ExtensionError(f"the formula {tex!r}: {error}") from None
-    root = ET.fromstring(text.replace(_NAMESPACE, ""))
+    text = _ENTITY.sub(lambda entity: unescape(entity[0]), text.replace(_NAMESPACE, ""))
+    root = ET.fromstring(text)
     for element in root.iter():
         _separate_dots(element)
     return ET.tostring(root, encoding="unicode")
