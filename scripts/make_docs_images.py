@@ -67,7 +67,7 @@ def own_arm() -> None:
 
 
 def own_object() -> None:
-    """The last image of the page's footage, with the object drawn in by `vergence track`."""
+    """The page's footage as `vergence track` draws the object into it, and its report."""
     page = (DOCS / "guide" / "own-object.md").read_text()
     with tempfile.TemporaryDirectory() as folder:
         for name, text in re.findall(r":caption: (wedge/\S+)\n(.*?)```", page, re.DOTALL):
@@ -79,6 +79,7 @@ def own_object() -> None:
         track = re.search(r"vergence (track \S+ --model .*)", page)[1].split()
         subprocess.run([VERGENCE, *track], cwd=folder, check=True)
         shutil.copy(Path(folder, "tracked", "frame-000014.jpg"), DOCS / "images/own-object.jpg")
+        screenshot(f"file://{folder}/tracked/report.html", (1100, 1195), "track-report.jpg")
 
 
 def gallery(*names: str) -> None:

@@ -8,6 +8,7 @@ from vergence.errors import Absent, InputError, nearest
 CELLS = Path(__file__).parent / "cells"  # those that come with vergence
 CELL = "cell.toml"
 RECORDING = "recording.mcap"
+TRACK = "track.json"  # the answer of `vergence track`
 
 
 def built_in_cells() -> tuple[str, ...]:
@@ -44,6 +45,11 @@ def find_cell(name_or_path: str | Path) -> Path:
     built_in = nearest(str(name_or_path), built_in_cells())
     allowed = f"a cell file, {yours}or a built-in cell: {built_in}"
     raise InputError("cell", "", name_or_path, allowed)
+
+
+def is_track(path: str | Path) -> bool:
+    """Whether a folder holds what `vergence track` has written."""
+    return (Path(path) / TRACK).is_file()
 
 
 def find_recording(path: str | Path) -> Path:

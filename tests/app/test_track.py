@@ -120,6 +120,7 @@ def test_json_is_one_object_and_nothing_else(track: Track, capsys: object) -> No
     assert (answer["frames"], answer["seen"]) == (30, 30)
     assert answer["outcome"]["kind"] == "completed"
     assert answer["overlay"] is None
+    assert Path(answer["report"]).is_file()
     assert answer["position_deviation_max_m"] < 0.005
 
 

@@ -105,13 +105,9 @@ def _write_page(folder: Path, cell: str, driver: str, findings: Sequence["Findin
     folder.mkdir(parents=True, exist_ok=True)
     held = sum(found.holds for found in findings)
     badge = markup.badge(f"{held} of {len(findings)} checks hold", held == len(findings))
-    header = (
-        '<header><span class="kicker">vergence check</span>'
-        f"<h1>{escape(cell)}</h1><p>{badge}driver {escape(driver)}</p></header>"
-    )
     reminders = "".join(f"<li>{escape(text)}</li>" for text in _REMINDERS)
     body = [
-        header,
+        markup.header("vergence check", cell, f"{badge}driver {escape(driver)}"),
         markup.section("Checks", _table(findings)),
         markup.section("To do by hand", f"<ul>{reminders}</ul>"),
     ]

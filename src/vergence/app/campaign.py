@@ -177,12 +177,9 @@ def _cell(value: object) -> object:
 
 def write_page(folder: Path, kicker: str, title: str, remark: str, parts: Sequence[str]) -> Path:
     """Write a page that needs nothing but itself; return where it is."""
-    header = (
-        f'<header><span class="kicker">{escape(kicker)}</span>'
-        f"<h1>{escape(title)}</h1><p>{escape(remark)}</p></header>"
-    )
+    body = "\n".join([markup.header(kicker, title, escape(remark)), *parts])
     path = folder / REPORT
-    path.write_text(markup.page(title, "\n".join([header, *parts])), encoding="utf-8")
+    path.write_text(markup.page(title, body), encoding="utf-8")
     return path
 
 

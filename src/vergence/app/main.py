@@ -30,7 +30,7 @@ from vergence.app.options import (
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.warnings_once import warn_once
 from vergence.errors import InputError, VergenceError
-from vergence.places import cell_description, find_cell, find_recording
+from vergence.places import cell_description, find_cell, find_recording, is_track
 from vergence.prebuilt import use_prebuilt_kernels
 from vergence.studies import PAPERS
 
@@ -107,8 +107,8 @@ def report(
     run: Annotated[
         Path,
         typer.Argument(
-            help="A run folder or a recording; it may be incomplete.",
-            autocompletion=names.recordings,
+            help="A run folder or a recording, which may be incomplete; or the folder of a track.",
+            autocompletion=names.reported,
         ),
     ],
     other: Annotated[
@@ -123,20 +123,35 @@ def report(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write the report of a recording again, or a page that compares two recordings."""
-    find_recording(run)
-    if other is None:
+    """Write a report again: of a recording, of tracked footage, or of two recordings compared."""
+    if is_track(run):
+        path = _track_report(run, other, out)
+    elif other is None:
+        find_recording(run)
         from vergence.app.report import page_at, write_report
 
         path = write_report(run, page_at(out))
     else:
         from vergence.app.report_pair import write_pair
 
+        find_recording(run)
         path = write_pair(run, other, out)
     if as_json:
-        emit({"command": "report", "run": find_recording(run).parent, "report": path})
+        folder = run if is_track(run) else find_recording(run).parent
+        emit({"command": "report", "run": folder, "report": path})
     else:
         say(f"report  {path}")
+
+
+def _track_report(folder: Path, other: Path | None, out: Path | None) -> Path:
+    """Write the report of tracked footage again; return where it is."""
+    from vergence.app.report import page_at
+    from vergence.app.tracking.track_page import write_track_page
+
+    if other is not None:
+        given = f"{folder}, which holds tracked footage"
+        raise InputError("report", "", given, "two recordings of runs to compare, or one folder")
+    return write_track_page(folder, page_at(out))
 
 
 @app.command(epilog="Example: vergence export runs/puma560-20250131-120000 --out puma560-bag")

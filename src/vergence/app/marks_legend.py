@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vergence.app import markup
 from vergence.runtime.results import CameraTrace
 
 _INK = {  # as `overlay` draws them
@@ -27,9 +28,4 @@ def marks_legend(trace: CameraTrace) -> str:
         "desired": np.isfinite(trace.desired_px),
         "true": np.isfinite(trace.true_px),
     }
-    marks = "".join(
-        f'<span><svg viewBox="0 0 16 16">{_INK[name]}</svg>{name}</span>'
-        for name, where in occurs.items()
-        if where.any()
-    )
-    return f'<span class="marks">{marks}</span>'
+    return markup.marks({name: _INK[name] for name, where in occurs.items() if where.any()})

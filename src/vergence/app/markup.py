@@ -2,7 +2,7 @@
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from vergence.app.figures import Chart, chart_svg
 from vergence.app.recorded_images import MarkedImage
 from vergence.app.table import Row
+from vergence.signals import Outcome
 
 if TYPE_CHECKING:
     from vergence.app.figures.layout import Panels
@@ -25,6 +26,27 @@ def page(title: str, body: str) -> str:
     sheets = (folder / "watch" / "page" / "colours.css", folder / "page.css")
     style = "\n".join(sheet.read_text(encoding="utf-8") for sheet in sheets)
     return template.substitute(title=escape(title), style=style, body=body)
+
+
+def header(kicker: str, title: str, *lines: str) -> str:
+    """Return the head of a page.
+
+    Args:
+        kicker: what has made it.
+        title: what it is of.
+        lines: HTML below it.
+    """
+    below = "".join(f"<p>{line}</p>" for line in lines)
+    return (
+        f'<header><span class="kicker">{escape(kicker)}</span>'
+        f"<h1>{escape(title)}</h1>{below}</header>"
+    )
+
+
+def ending(outcome: Outcome) -> str:
+    """Return how a run ended, with its reason."""
+    words = f"after {outcome.time:.2f} s: {outcome.reason}"
+    return badge(outcome.kind.value, outcome.succeeded) + escape(words)
 
 
 def section(title: str, *parts: str) -> str:
@@ -70,6 +92,39 @@ def image(data: bytes, kind: str, caption: str, width: int | None = None) -> str
         f'<figure><img src="{data_url(data, kind)}" alt="{text}"{narrow}>'
         f"<figcaption>{text}</figcaption></figure>"
     )
+
+
+def stills(frames: Sequence[MarkedImage]) -> str:
+    """Return images beside each other, each with its time; empty without any."""
+    shown = "".join(
+        image(
+            frame.jpeg, "image/jpeg", " · ".join(filter(None, (f"{frame.time:.2f} s", frame.words)))
+        )
+        for frame in frames
+    )
+    return f'<div class="frames">{shown}</div>' if shown else ""
+
+
+def marks(entries: Mapping[str, str]) -> str:
+    """Return what marks in an image mean.
+
+    Args:
+        entries: a mark, as the inside of an SVG of 16 x 16, by its meaning.
+    """
+    shown = "".join(
+        f'<span><svg viewBox="0 0 16 16">{ink}</svg>{escape(name)}</span>'
+        for name, ink in entries.items()
+    )
+    return f'<span class="marks">{shown}</span>'
+
+
+def happenings(entries: Iterable[tuple[str, str, str]]) -> str:
+    """Return a numbered list of when what happened, and how; empty if nothing did."""
+    lines = "".join(
+        f"<li>{escape(when)} · <b>{escape(what)}</b> · {escape(how)}</li>"
+        for when, what, how in entries
+    )
+    return f"<ol>{lines}</ol>" if lines else ""
 
 
 def film(frames: Sequence[MarkedImage], name: str, caption: str) -> str:

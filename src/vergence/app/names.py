@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vergence.places import RECORDING, built_in_cells
+from vergence.places import RECORDING, TRACK, built_in_cells
 from vergence.registry import kinds
 from vergence.studies import PAPERS
 
@@ -53,7 +53,18 @@ def benchmarks() -> list[str]:
 
 def recordings(incomplete: str) -> list[str]:
     """Return run folders: those here, and those in runs/, the newest first."""
-    found = [*Path().glob(f"*/{RECORDING}"), *Path("runs").glob(f"*/{RECORDING}")]
+    return _folders(incomplete, RECORDING)
+
+
+def reported(incomplete: str) -> list[str]:
+    """Return the folders of runs and of tracked footage likewise."""
+    return _folders(incomplete, RECORDING, TRACK)
+
+
+def _folders(incomplete: str, *files: str) -> list[str]:
+    found = [
+        path for file in files for top in (".", "runs") for path in Path(top).glob(f"*/{file}")
+    ]
     newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
     return [name for path in newest if (name := str(path.parent)).startswith(incomplete)]
 

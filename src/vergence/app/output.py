@@ -32,7 +32,12 @@ def confirmed(question: str) -> bool:
 
 def emit(answer: Mapping[str, Any]) -> None:
     """Write the one JSON object of a command; null means a number that is not finite."""
-    print(json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False))
+    print(json_text(answer))
+
+
+def json_text(answer: Mapping[str, Any]) -> str:
+    """Return an object as JSON; null means a number that is not finite."""
+    return json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False)
 
 
 def new_folder(name: str) -> Path:

@@ -36,11 +36,8 @@ def write_plan_page(
 
 
 def _header(cell: str, path: PlannedPath) -> str:
-    return (
-        '<header><span class="kicker">vergence plan</span>'
-        f"<h1>{escape(cell)}</h1><p>{markup.badge('path found', True)}"
-        f"by the {escape(path.planner)} planner</p></header>"
-    )
+    words = f"{markup.badge('path found', True)}by the {escape(path.planner)} planner"
+    return markup.header("vergence plan", cell, words)
 
 
 def _rows(numbers: Mapping[str, float]) -> list[Row]:

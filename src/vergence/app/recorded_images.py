@@ -9,10 +9,10 @@ from vergence.app.overlay import Marks, draw
 from vergence.arrays import ImageArray
 from vergence.runtime.recording import Recording
 
-_FILM_FRAMES = 160  # at most, so that a page stays small: about 20 kB each
-_FILM_WIDTH_PX, _FILM_QUALITY = 400, 80
+FILM_FRAMES = 160  # at most, so that a page stays small: about 20 kB each
+FILM_WIDTH_PX, FILM_QUALITY = 400, 80
 _KEY_FRAMES = 4
-_KEY_FRAME_WIDTH_PX, _KEY_FRAME_QUALITY = 640, 88
+KEY_FRAME_WIDTH_PX, KEY_FRAME_QUALITY = 640, 88
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +21,7 @@ class MarkedImage:
 
     time: float  # s, of exposure
     jpeg: bytes
+    words: str = ""  # on what it shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
     """Return the images of a camera that a report shows."""
     times = recording.image_times(camera).tolist()
     count = len(times)
-    film = range(0, count, max(1, -(-count // _FILM_FRAMES)))
+    film = film_numbers(count)
     key = {round(number) for number in np.linspace(0, count - 1, _KEY_FRAMES)} if count else set()
     number_at = {time: number for number, time in enumerate(times)}
     seen = (recording.cameras, *(other.cameras for other in recording.others.values()))
@@ -45,16 +46,25 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
         number = number_at[time]
         marks = [Marks.at(trace, time) for trace in traces]
         if number in film:
-            jpeg = _jpeg(image, marks, _FILM_WIDTH_PX, _FILM_QUALITY)
+            jpeg = _jpeg(image, marks, FILM_WIDTH_PX, FILM_QUALITY)
             frames.append(MarkedImage(time, jpeg))
         if number in key:
-            jpeg = _jpeg(image, marks, _KEY_FRAME_WIDTH_PX, _KEY_FRAME_QUALITY)
+            jpeg = _jpeg(image, marks, KEY_FRAME_WIDTH_PX, KEY_FRAME_QUALITY)
             key_frames.append(MarkedImage(time, jpeg))
     return CameraImages(tuple(frames), tuple(key_frames))
 
 
+def film_numbers(count: int) -> range:
+    """Return which of so many images a film shows."""
+    return range(0, count, max(1, -(-count // FILM_FRAMES)))
+
+
 def _jpeg(image: ImageArray, marks: Sequence[Marks], width: int, quality: int) -> bytes:
+    return jpeg_of(draw(image, marks, width), quality)
+
+
+def jpeg_of(image: ImageArray, quality: int) -> bytes:
+    """Return an image as a JPEG file."""
     import cv2
 
-    drawn = draw(image, marks, width)
-    return bytes(cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, quality])[1])
+    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1])

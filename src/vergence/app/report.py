@@ -112,13 +112,7 @@ def make_report(run: Run, signals: str = SIGNALS) -> str:
 
 
 def _header(run: Run) -> str:
-    outcome = run.outcome
-    reason = f"after {outcome.time:.2f} s: {outcome.reason}"
-    badge = markup.badge(outcome.kind.value, outcome.succeeded)
-    return (
-        '<header><span class="kicker">vergence run</span>'
-        f"<h1>{escape(run.info.cell)}</h1><p>{badge}{escape(reason)}</p></header>"
-    )
+    return markup.header("vergence run", run.info.cell, markup.ending(run.outcome))
 
 
 def _summary(run: Run) -> str:
@@ -163,10 +157,7 @@ def _images(run: Run, camera: str) -> tuple[str, str]:
         return "", ""
     images = camera_images(run, camera)
     player = markup.film(images.film, f"images of {camera}", marks_legend(run.cameras[camera]))
-    stills = "".join(
-        markup.image(frame.jpeg, "image/jpeg", f"{frame.time:.2f} s") for frame in images.key_frames
-    )
-    return player, f'<div class="frames">{stills}</div>' if stills else ""
+    return player, markup.stills(images.key_frames)
 
 
 def _robot(run: Run) -> str:
@@ -249,11 +240,8 @@ def _chart(run: Run, chart: Chart | None, caption: str) -> str:
 
 
 def _events(run: Run) -> str:
-    lines = "".join(
-        f"<li>{event.time:.2f} s · <b>{escape(event.name)}</b> · {escape(event.text)}</li>"
-        for event in run.events
-    )
-    return markup.section("Events", f"<ol>{lines}</ol>" if lines else "")
+    events = ((f"{event.time:.2f} s", event.name, event.text) for event in run.events)
+    return markup.section("Events", markup.happenings(events))
 
 
 def _cell(run: Run) -> str:

@@ -77,14 +77,13 @@ def _common(named: Sequence[Mapping[str, object]]) -> list[str]:
 
 
 def _header(runs: Runs) -> str:
-    lines = "".join(
-        f"<p>{markup.badge(run.outcome.kind.value, run.outcome.succeeded)}"
+    lines = (
+        f"{markup.badge(run.outcome.kind.value, run.outcome.succeeded)}"
         f"<b>{escape(name)}</b> ({escape(run.info.cell)}) after {run.outcome.time:.2f} s: "
-        f"{escape(run.outcome.reason)}</p>"
+        f"{escape(run.outcome.reason)}"
         for name, run in runs.items()
     )
-    title = escape(" and ".join(runs))
-    return f'<header><span class="kicker">vergence report</span><h1>{title}</h1>{lines}</header>'
+    return markup.header("vergence report", " and ".join(runs), *lines)
 
 
 def _summary(runs: Runs, cameras: Sequence[str], arms: Sequence[str]) -> str:

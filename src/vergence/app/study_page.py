@@ -32,10 +32,7 @@ def write_study_page(out: Path, result: StudyResult, remark: str = "") -> Path:
 def _header(result: StudyResult, remark: str) -> str:
     held = sum(check.holds for check in result.checks)
     badge = markup.badge(f"{held} of {len(result.checks)} checks hold", result.holds)
-    return (
-        '<header><span class="kicker">vergence reproduce</span>'
-        f"<h1>{escape(result.title)}</h1><p>{badge}{escape(remark)}</p></header>"
-    )
+    return markup.header("vergence reproduce", result.title, badge + escape(remark))
 
 
 def _figure(figure: Figure) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
+from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
@@ -11,6 +12,7 @@ import numpy as np
 
 from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
 from vergence.errors import NOTHING, InputError
+from vergence.places import TRACK
 
 if TYPE_CHECKING:
     from vergence.app.options import TrackOptions
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 _CAMERA = frozenset(("camera", "fx", "fy", "cx", "cy", "distortion"))
 _ALWAYS = frozenset(("images", "topic", "rate", "overlay", "out", "as_json"))
+_ELSEWHERE = frozenset(("images", "overlay", "out", "as_json"))  # not about what is followed
 # What can be followed, by the option that names it: the module whose function `prepare` begins it,
 # and the options that apply.
 _SUBJECTS = {
@@ -45,19 +48,55 @@ def track(options: "TrackOptions") -> int:
     subject = start(footage, first)
     folder = options.out or new_folder(f"track-{Path(options.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / TRACK).unlink(missing_ok=True)  # it is not about what is written now
     overlay = OverlayFiles(folder, footage, subject, options.overlay)
     with subject.writing(folder), overlay:
         median_ms = _follow(subject, footage, chain((first,), frames), overlay)
     outcome, answer, lines = subject.result(median_ms)
     files = {**subject.files, **overlay.files}
-    if options.as_json:
-        told = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-        emit({**_asked(options), "outcome": told, **answer, "run": folder, **files})
-    else:
-        say(str(outcome))
-        for line in (*lines, *_places(files), f"folder   {folder}"):
+    if not options.as_json:
+        say(str(outcome))  # at once: the report is written later
+        for line in (*lines, *_places(files)):
             say(f"  {line}")
+    told = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
+    answer = {**_asked(options), "outcome": told, **answer}
+    report = _reported(options, {**answer, **_names(files)}, folder)
+    if options.as_json:
+        emit({**answer, "run": folder, **files, "report": report})
+    else:
+        say(f"  report   {report}")
+        say(f"  folder   {folder}")
     return SUCCESS if outcome.succeeded else FAILURE
+
+
+def _reported(options: "TrackOptions", answer: Mapping[str, Any], folder: Path) -> Path:
+    """Write the answer and the report beside what was tracked; return where the report is."""
+    from vergence.app.progress import working
+    from vergence.app.tracking.track_page import write_track_page
+    from vergence.app.tracking.track_record import write_answer
+
+    write_answer(folder, {**answer, "options": _given(options), "vergence": version("vergence")})
+    with working("writing the report"):
+        return write_track_page(folder)
+
+
+def _names(files: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the names of files in their folder."""
+    return {
+        key: [one.name for one in file] if isinstance(file, list) else file and file.name
+        for key, file in files.items()
+    }
+
+
+def _given(options: "TrackOptions") -> dict[str, str]:
+    """Return the options that were given, beside where to write what."""
+    fields = type(options).__dataclass_fields__
+    given = {key: getattr(options, key) for key in fields if key not in _ELSEWHERE}
+    return {
+        key: f" --{key} ".join(value) if isinstance(value, list) else str(value)
+        for key, value in given.items()
+        if value != fields[key].default
+    }
 
 
 def _prepare(options: "TrackOptions") -> "Start":

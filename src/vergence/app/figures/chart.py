@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
+from vergence.app.figures.events import numbers_at
 from vergence.arrays import FloatArray
 
 Dash = Literal["", "dashed", "dotted"]
@@ -36,6 +37,29 @@ class Marks:
     shape: Shape
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """What lies between two lines; it is broken where they are not known."""
+
+    label: str  # in the legend
+    x: FloatArray  # (N,) in the unit of the chart's axis
+    low: FloatArray  # (N,) in the unit of the panel, NaN where not known
+    high: FloatArray  # (N,) likewise
+    color: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Shade:
+    """A part of the horizontal axis, shaded in all panels."""
+
+    label: str  # in the legend: what it means
+    start: float  # in the unit of the chart's axis
+    end: float
+    words: str  # shown under the pointer
+    color: int = 0
+    number: int = 0  # written above it; nothing if 0
+
+
 @dataclass(frozen=True, slots=True)
 class Stretches:
     """When something held, as bars in the row of its name."""
@@ -54,6 +78,7 @@ class Panel:
     curves: tuple[Curve, ...] = ()
     marks: tuple[Marks, ...] = ()
     stretches: tuple[Stretches, ...] = ()
+    bands: tuple[Band, ...] = ()  # cut off at the ends of the axis
     rows: tuple[str, ...] = ()  # names of what has stretches; such a panel has no other axis
     low: float | None = None  # lower end of the axis; where None, the values decide
     high: float | None = None  # upper end; below `low` where the axis points downwards
@@ -70,6 +95,14 @@ class Chart:
     x_low: float = 0.0
     x_high: float = 1.0
     events: tuple[tuple[float, str], ...] = ()  # places of vertical lines, and their names
+    shades: tuple[Shade, ...] = ()
+
+    @property
+    def names(self) -> tuple[tuple[float, str], ...]:
+        """Names above the first panel: those of events, and the numbers of shades."""
+        numbered = (shade for shade in self.shades if shade.number)
+        places = ((one.number, 0.5 * (one.start + one.end)) for one in numbered)
+        return self.events + numbers_at(places, self.x_high)
 
     @property
     def over_time(self) -> bool:

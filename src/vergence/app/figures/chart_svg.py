@@ -4,20 +4,21 @@ Text is text and takes its place from what it can be at most; the legend is abov
 a line of HTML. So no label is cut off, and nothing lies over the data.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 
 import numpy as np
 
 from vergence.app.figures.axis import range_of, thinned, ticks
-from vergence.app.figures.chart import Chart, Curve, Marks, Panel
-from vergence.arrays import FloatArray
+from vergence.app.figures.chart import Band, Chart, Curve, Marks, Panel, Shade
+from vergence.arrays import BoolArray, FloatArray
 
 WIDTH, LEFT, RIGHT = 940.0, 62.0, 14.0  # of the whole, and free beside the axes
 _IMAGE_WIDTH = 420.0  # of an image's frame with its margin
 _TITLE, _EVENTS, _TICKS, _GAP = 24.0, 14.0, 18.0, 10.0  # heights around a panel
 _HEIGHT, _ROW, _BAR = 140.0, 36.0, 12.0  # heights of a panel, of a row of stretches, of its bar
 _MOST_TICKS, _FEW_TICKS = 9, 5
+_DOT = 1.6  # width of a curve that is a single point
 
 _SHAPES = {
     "start": '<circle class="mark hollow" cx="{x}" cy="{y}" r="4"/>',
@@ -67,16 +68,17 @@ def chart_svg(chart: Chart, name: str) -> str:
         chart: what to draw.
         name: of the drawing, for screen readers.
     """
-    top = _EVENTS if chart.events else 0.0  # free for the numbers of the events
+    names = chart.names
+    top = _EVENTS if names else 0.0  # free for them
     parts: list[str] = []
     for panel in chart.panels:
         axes = _Axes(chart, panel, top + _TITLE)
-        parts += _panel(axes, chart.events)
+        parts += _panel(axes, chart)
         top = axes.bottom + _GAP
     parts += _x_axis(axes, chart.x_title)
     parts += (
         _text(float(axes.x(place)), _TITLE + _EVENTS - 4, number, "middle")
-        for place, number in chart.events
+        for place, number in names
     )
     width, height = axes.right + RIGHT, axes.bottom + 2 * _TICKS + 2
     clock = ""
@@ -90,21 +92,23 @@ def chart_svg(chart: Chart, name: str) -> str:
     return _legend(chart) + drawing
 
 
-def _panel(axes: _Axes, events: Sequence[tuple[float, str]]) -> Iterator[str]:
+def _panel(axes: _Axes, chart: Chart) -> Iterator[str]:
     panel = axes.panel
     first = axes.top < 2 * _TITLE
-    title_at = axes.top - 8 - (_EVENTS if first and events else 0)
+    title_at = axes.top - 8 - (_EVENTS if first and chart.names else 0)
     yield _text(axes.left, title_at, panel.title, "title")
+    yield from (_shade(axes, shade) for shade in chart.shades)
     if not panel.rows:
         yield from _y_axis(axes)
     if panel.limits is not None:
         yield from _limits(axes, panel.limits)
     if panel.image is not None:
         yield _image_frame(axes, *panel.image)
+    yield from (_band(axes, band) for band in panel.bands)
     yield from (_curve(axes, curve) for curve in panel.curves)
     yield from (_marks(axes, marks) for marks in panel.marks)
     yield from _stretches(axes)
-    for place, _ in events:
+    for place, _ in chart.events:
         x = float(axes.x(place))
         yield f'<path class="event" d="M{x:.1f} {axes.top:.1f}V{axes.bottom:.1f}"/>'
 
@@ -152,15 +156,48 @@ def _curve(axes: _Axes, curve: Curve) -> str:
     x, y = curve.x, curve.y
     if axes.panel.image is None:
         x, y = thinned(x, y, int(axes.right - axes.left))
-    known = np.isfinite(x) & np.isfinite(y)
-    places = np.column_stack((axes.x(x), axes.y(y)))[known]
-    begins = known & ~np.concatenate(([False], known[:-1]))
-    commands = np.where(begins[known], "M", "L").tolist()
-    path = "".join(
-        f"{command}{u:.1f} {v:.1f}"
-        for command, (u, v) in zip(commands, places.tolist(), strict=True)
+    places = np.column_stack((axes.x(x), axes.y(y)))
+    lines = []
+    for part in _stretches_of(np.isfinite(x) & np.isfinite(y)):
+        points = places[part]
+        if len(points) == 1:  # a dot, drawn into the axes
+            shift = _DOT if points[0, 0] - _DOT < axes.left else -_DOT
+            points = points + [[0.0, 0.0], [shift, 0.0]]
+        lines.append(_line(points))
+    return f'<path class="curve c{curve.color} {curve.dash}" d="{"".join(lines)}"/>'
+
+
+def _band(axes: _Axes, band: Band) -> str:
+    columns = int(axes.right - axes.left)
+    least, most = sorted((axes.low, axes.high))
+    (x, low), (_, high) = (
+        thinned(band.x, np.clip(edge, least, most), columns) for edge in (band.low, band.high)
     )
-    return f'<path class="curve c{curve.color} {curve.dash}" d="{path}"/>'
+    areas = []
+    for part in _stretches_of(np.isfinite(low) & np.isfinite(high)):
+        edges = (np.column_stack((axes.x(x), axes.y(edge)))[part] for edge in (low, high))
+        under, over = edges
+        areas.append(_line(np.concatenate((under, over[::-1]))) + "Z")
+    return f'<path class="fill c{band.color} band" d="{"".join(areas)}"/>'
+
+
+def _stretches_of(known: BoolArray) -> Iterator[slice]:
+    """Yield where values without a gap begin and end."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
+    yield from (slice(begin, end) for begin, end in edges.reshape(-1, 2).tolist())
+
+
+def _line(points: FloatArray) -> str:
+    return "M" + "L".join(f"{u:.1f} {v:.1f}" for u, v in points.tolist())
+
+
+def _shade(axes: _Axes, shade: Shade) -> str:
+    left, right = (float(axes.x(place)) for place in (shade.start, shade.end))
+    return (
+        f'<rect class="fill c{shade.color} shade" x="{left:.1f}" y="{axes.top:.1f}" '
+        f'width="{max(right - left, 1.0):.1f}" height="{axes.height:.1f}">'
+        f"<title>{escape(shade.words)}</title></rect>"
+    )
 
 
 def _marks(axes: _Axes, marks: Marks) -> str:
@@ -196,16 +233,22 @@ def _legend(chart: Chart) -> str:
         for curve in panel.curves:
             line = f'<path class="curve c{curve.color} {curve.dash}" d="M1 8H23"/>'
             entries.setdefault(curve.label, line)
+        for band in panel.bands:
+            entries.setdefault(band.label, _swatch(f"c{band.color} band"))
         for marks in panel.marks:
             if len(marks.points):
                 entries.setdefault(marks.label, _SHAPES[marks.shape].format(x=12, y=8))
         for one in panel.stretches:
-            entries.setdefault(
-                one.label, f'<rect class="fill c{one.color}" x="3" y="3" width="18" height="10"/>'
-            )
+            entries.setdefault(one.label, _swatch(f"c{one.color}"))
+    for shade in chart.shades:
+        entries.setdefault(shade.label, _swatch(f"c{shade.color} shade"))
     entries.pop("", None)
     keys = "".join(
         f'<span><svg viewBox="0 0 24 16" aria-hidden="true">{ink}</svg>{escape(label)}</span>'
         for label, ink in entries.items()
     )
     return f'<p class="legend">{keys}</p>' if entries else ""
+
+
+def _swatch(kind: str) -> str:
+    return f'<rect class="fill {kind}" x="3" y="3" width="18" height="10"/>'

@@ -42,7 +42,7 @@ class CurveFiles:
         self._writers = {}
         for name, path in self.tables.items():
             writer = csv.writer(self._open.enter_context(path.open("w", newline="")))
-            columns = self._kinds[name].columns
+            columns = [column.name for column in self._kinds[name].columns]
             deviations = (f"sd_{column}" for column in columns)
             writer.writerow(["image", "time_s", "curve", "found", *columns, *deviations, "reason"])
             self._writers[name] = writer
@@ -74,6 +74,6 @@ def curve_record(follower: CurveFollower, step: CurveStep) -> dict[str, Any]:
     """Return what is known of a curve after an image, for JSON."""
     record: dict[str, Any] = {"curve": follower.number, "kind": follower.name}
     record |= {"found": step.found, "reason": step.reason}
-    for name, value in zip(follower.kind.columns, step.values.tolist(), strict=True):
-        record[name] = value if step.found else None
+    for column, value in zip(follower.kind.columns, step.values.tolist(), strict=True):
+        record[column.name] = value if step.found else None
     return record | {"covariance": step.covariance.tolist() if step.found else None}

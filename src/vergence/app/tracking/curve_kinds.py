@@ -22,13 +22,21 @@ class Outline(NamedTuple):
     closed: bool
 
 
+class Column(NamedTuple):
+    """One of the values of a curve."""
+
+    name: str  # in tables, with its unit: px, px2 or rad
+    title: str  # in reports, without one
+    period: float = np.inf  # after which an angle is the same, rad
+
+
 class CurveKind(NamedTuple):
     """What one kind of curve is followed with, and what is told of it."""
 
     part: Callable[..., Any]  # the tracker's part, which takes the options' values
     points: str  # how many points name such a curve, in words
     counts: Callable[[int], bool]  # and whether a number of them does
-    columns: tuple[str, ...]  # names of its values
+    columns: tuple[Column, ...]  # its values
     values: Callable[[Any, Tracks], CurveValues]  # of a tracker and its last answer
     outlines: Callable[[Any, ImageArray], list[Outline]]  # where the tracker last found it
     options: Mapping[str, str]  # fields of the part by the option that sets them
@@ -57,13 +65,19 @@ def _mark(tracker: Any, _image: ImageArray) -> list[Outline]:
     return [Outline(tracker.points_px[0] + tracker.radius_px[0] * circle, closed=True)]
 
 
+_CENTRE = (Column("u_px", "centre u"), Column("v_px", "centre v"))
 _EDGES = {"jolt": "reach_px", "contrast": "contrast"}
 KINDS: Mapping[str, CurveKind] = MappingProxyType({
     "ellipse": CurveKind(
         EllipseTracking,
         "one point inside, or five or more on it",
         lambda count: count == 1 or count >= 5,
-        ("u_px", "v_px", "semi_major_px", "semi_minor_px", "angle_rad"),
+        (
+            *_CENTRE,
+            Column("semi_major_px", "longer semi-axis"),
+            Column("semi_minor_px", "shorter semi-axis"),
+            Column("angle_rad", "angle of longer semi-axis", np.pi),
+        ),
         lambda tracker, _tracks: tracker.values,
         _ellipse,
         _EDGES | {"share": "least_share"},
@@ -72,7 +86,10 @@ KINDS: Mapping[str, CurveKind] = MappingProxyType({
         LineTracking,
         "two points on it",
         lambda count: count == 2,
-        ("rho_px", "theta_rad"),
+        (
+            Column("rho_px", "distance ρ from (0, 0)"),
+            Column("theta_rad", "angle θ of the normal", 2.0 * np.pi),
+        ),
         lambda tracker, _tracks: tracker.values[0],
         _line,
         _EDGES,
@@ -81,7 +98,11 @@ KINDS: Mapping[str, CurveKind] = MappingProxyType({
         RegionTracking,
         "one point inside, or three or more around it",
         lambda count: count == 1 or count >= 3,
-        ("area_px2", "u_px", "v_px", "angle_rad"),
+        (
+            Column("area_px2", "area"),
+            *_CENTRE,
+            Column("angle_rad", "direction of longest extent", np.pi),
+        ),
         lambda tracker, _tracks: tracker.values,
         _region,
         {},
@@ -90,7 +111,7 @@ KINDS: Mapping[str, CurveKind] = MappingProxyType({
         MarkTracking,
         "one point on it",
         lambda count: count == 1,
-        ("u_px", "v_px"),
+        _CENTRE,
         lambda _tracker, tracks: CurveValues(tracks.points_px[0], tracks.covariance_px[0]),
         _mark,
         {},

@@ -93,9 +93,10 @@ class PoseSubject:
             "note": follower.note or None,
             "last": pose_record(steps[-1]),
         }
+        spread = f"standard deviation up to {1e3 * place_m:.2g} mm, {turn_deg:.2g}° · "
         lines = [
-            f"seen in {len(seen)} of {len(steps)} images · standard deviation up to "
-            f"{1e3 * place_m:.2g} mm, {turn_deg:.2g}° · {median_ms:.1f} ms per image"
+            f"seen in {len(seen)} of {len(steps)} images · {spread if seen else ''}"
+            f"{median_ms:.1f} ms per image"
         ]
         if free:
             lines.append(f"{free}; its standard deviation is that of an unknown angle, 104°")
