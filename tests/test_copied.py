@@ -19,6 +19,20 @@ def test_a_copy_shares_read_only_arrays_and_functions_and_nothing_that_changes()
     assert copy["changing"] is copy["again"]
 
 
+def test_an_object_of_a_class_within_a_function_is_copied() -> None:
+    """Such as a feature that a notebook makes: its module does not know the class by name."""
+
+    class Counter:
+        def __init__(self) -> None:
+            self.counts = [1]
+
+    original = {"object": Counter(), "class": Counter}
+    copy = copied(original)
+    assert copy["class"] is Counter
+    assert type(copy["object"]) is Counter
+    assert copy["object"].counts is not original["object"].counts
+
+
 def test_a_read_only_mapping_is_copied() -> None:
     copy = copied(MappingProxyType({"a": [1]}))
     assert copy == {"a": [1]}

@@ -163,5 +163,5 @@ def test_python_gives_the_same_answers():
             ImageBased(**wrong)
         assert caught.value.key == next(iter(wrong))
     arm = SimulatedDriver(load_cell("puma560"), images=False).world.arm_to_camera("wrist")
-    with pytest.raises(InputError, match="above zero"):
+    with pytest.raises(InputError, match="positive depths"):
         Servo(arm, Camera(640, 480, 600, 600, 319.5, 239.5), ImageBased(), depth_m=[1.0, np.nan])

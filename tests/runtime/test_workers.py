@@ -1,5 +1,6 @@
 """Processes that share tasks: nothing is lost when one dies, and none outlives its work."""
 
+import logging
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
 
+import psutil
 import pytest
 
 from vergence.cell import load_cell
@@ -49,6 +51,28 @@ def test_every_task_is_done_once_by_as_many_processes_that_leave_ctrl_c_alone():
     assert os.getpid() not in {process for process, _ in seen}
     assert all(blocked for _, blocked in seen)
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def complain(_: int) -> None:
+    """Warn of a cell, as its model does whenever it is read."""
+    logging.getLogger("vergence.robot").warning("this arm has no meshes")
+
+
+def test_processes_leave_warnings_to_the_one_that_shares_out_the_tasks(capfd):
+    list(share_out(complain, range(4), 2))
+    assert capfd.readouterr().err == ""
+
+
+def test_processes_listen_on_no_port():
+    """What they take and run comes by pipes, so that nobody else can send them anything."""
+    this = psutil.Process()
+    shared = share_out(square, range(50), 2)
+    next(shared)
+    family = [this, *this.children(recursive=True)]
+    assert len(family) > 2
+    ports = [each for process in family for each in process.net_connections("inet")]
+    shared.close()
+    assert [each for each in ports if each.status == psutil.CONN_LISTEN] == []
 
 
 def test_the_task_of_a_process_that_dies_is_given_to_another(tmp_path):

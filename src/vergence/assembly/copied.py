@@ -11,7 +11,7 @@ Copied = TypeVar("Copied")
 
 
 def copied(value: Copied) -> Copied:
-    """Return a deep copy that shares functions and read-only arrays with the original.
+    """Return a deep copy that shares functions, classes and read-only arrays with the original.
 
     `copy.deepcopy` makes read-only arrays writeable; for numba they are of another type then, and
     every kernel that takes them is compiled again.
@@ -34,7 +34,7 @@ class _Pickler(pickle.Pickler):
 
     def persistent_id(self, obj: Any) -> int | None:
         read_only = isinstance(obj, np.ndarray) and not obj.flags.writeable
-        if not read_only and not isinstance(obj, FunctionType):
+        if not read_only and not isinstance(obj, FunctionType | type):
             return None
         self.shared.append(obj)
         return len(self.shared) - 1
