@@ -61,7 +61,8 @@ def fit_contour(
                 continue
             moved = nu * (u - outline.points_px[n, 0]) + nv * (v - outline.points_px[n, 1])
             residual = lines.offsets_px[n] - moved
-            # What is in front of the object moves the contour inward, nothing moves it outward.
+            # What is in front of the object moves the contour inward; only a background of its
+            # colours moves it outward.
             tolerance = tolerance_px if residual > 0.0 else _INWARD * tolerance_px
             weight /= (1.0 + (residual / tolerance) ** 2) ** 2
             weight /= (1.0 + (runs[n] / run_tolerance) ** 2) ** 2
