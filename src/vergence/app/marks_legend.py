@@ -3,17 +3,24 @@
 import numpy as np
 
 from vergence.app import markup
+from vergence.app.overlay import DESIRED, FOUND, LOST, TRUE, UNASKED, WINDOW, web_color
 from vergence.runtime.results import CameraTrace
 
-_INK = {  # as `overlay` draws them
-    "tracked": '<circle cx="8" cy="8" r="5" fill="none" stroke="#14e696" stroke-width="2"/>',
-    "not found": '<path d="M4 4l8 8M12 4l-8 8" stroke="#ff6e0a" stroke-width="2"/>',
-    "not looked for": '<path d="M6 6l4 4M10 6l-4 4" stroke="#aaaaaa" stroke-width="2"/>',
-    "window around the predicted place": (
-        '<path d="M2.5 2.5h11v11h-11z" fill="none" stroke="#ebebeb" stroke-width="1"/>'
+_INK = {
+    "tracked": (
+        f'<circle cx="8" cy="8" r="5" fill="none" stroke="{web_color(FOUND)}" stroke-width="2"/>'
     ),
-    "desired": '<path d="M8 2v12M2 8h12" stroke="#f0e442" stroke-width="2"/>',
-    "true": '<circle cx="8" cy="8" r="2.5" fill="none" stroke="#64c8ff" stroke-width="2"/>',
+    "not found": f'<path d="M4 4l8 8M12 4l-8 8" stroke="{web_color(LOST)}" stroke-width="2"/>',
+    "not looked for": (
+        f'<path d="M6 6l4 4M10 6l-4 4" stroke="{web_color(UNASKED)}" stroke-width="2"/>'
+    ),
+    "window around the predicted place": (
+        f'<path d="M2.5 2.5h11v11h-11z" fill="none" stroke="{web_color(WINDOW)}" stroke-width="1"/>'
+    ),
+    "desired": f'<path d="M8 2v12M2 8h12" stroke="{web_color(DESIRED)}" stroke-width="2"/>',
+    "true": (
+        f'<circle cx="8" cy="8" r="2.5" fill="none" stroke="{web_color(TRUE)}" stroke-width="2"/>'
+    ),
 }
 
 

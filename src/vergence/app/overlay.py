@@ -56,6 +56,11 @@ class Marks:
         )
 
 
+def web_color(color: tuple[int, int, int]) -> str:
+    """Return a colour of blue, green and red as a page writes it, such as "#14e696"."""
+    return "#" + bytes(reversed(color)).hex()
+
+
 def draw(image: ImageArray, marks: Sequence[Marks], width: int | None = None) -> NDArray[np.uint8]:
     """Return the image in colour with marks over it.
 

@@ -40,6 +40,7 @@ def track(options: "TrackOptions") -> int:
     """Follow what the options name through footage into a run folder; return the exit code."""
     from vergence.app.tracking.footage import open_footage
     from vergence.app.tracking.overlay_files import OverlayFiles
+    from vergence.runtime.recording import outcome_json
 
     start = _prepare(options)
     footage = open_footage(options.images, options.rate, options.topic)
@@ -58,8 +59,7 @@ def track(options: "TrackOptions") -> int:
         say(str(outcome))  # at once: the report is written later
         for line in (*lines, *_places(files)):
             say(f"  {line}")
-    told = {"kind": outcome.kind.value, "reason": outcome.reason, "time": outcome.time}
-    answer = {**_asked(options), "outcome": told, **answer}
+    answer = {**_asked(options), "outcome": outcome_json(outcome), **answer}
     report = _reported(options, {**answer, **_names(files)}, folder)
     if options.as_json:
         emit({**answer, "run": folder, **files, "report": report})

@@ -16,7 +16,7 @@ from vergence.vision.known_object.silhouette import outline_of
 _SHIFT = 4  # fractional bits of a place
 _PLACES = 60  # along an edge: where it comes out from behind something
 _BESIDE_PX = 4.0  # places on one outline
-_AXES = ((0, 0, 230), (0, 180, 0), (230, 80, 0))  # x red, y green, z blue
+AXES = ((0, 0, 230), (0, 180, 0), (230, 80, 0))  # x red, y green, z blue
 _COLORS = {
     Sighting.SEEN: FOUND,
     Sighting.AMBIGUOUS: DESIRED,
@@ -104,7 +104,7 @@ def _axes(canvas: NDArray[np.uint8], T: FloatArray, length: float, camera: Camer
     pixels = camera.project(points)
     if not (np.abs(pixels) < 1e4).all():
         return
-    for end, color in zip(pixels[1:], _AXES, strict=True):
+    for end, color in zip(pixels[1:], AXES, strict=True):
         cv2.line(canvas, _fixed(pixels[0]), _fixed(end), color, 2, cv2.LINE_AA, _SHIFT)
 
 

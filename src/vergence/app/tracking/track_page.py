@@ -14,7 +14,9 @@ from vergence.app.figures.tracked import (
     rotation_chart,
     share_chart,
 )
+from vergence.app.overlay import DESIRED, FOUND, LOST, web_color
 from vergence.app.report import REPORT
+from vergence.app.tracking.drawing import AXES
 from vergence.app.tracking.overlay_images import overlay_images
 from vergence.app.tracking.track_record import (
     TrackedCurve,
@@ -42,21 +44,20 @@ _FILES = {  # by the key of the answer: what is in it
     "curves_with_covariance": "all values with covariances, a line an image",
     "overlay": "the film in full size",
 }
-_LINE = '<path d="M1 8h14" stroke="{}" stroke-width="2.5"/>'
-_FOUND, _DOUBTFUL, _LOST = "#14e696", "#f0e442", "#ff6e0a"  # as the overlay draws them
+
+
+def _line(color: tuple[int, int, int]) -> str:
+    return f'<path d="M1 8h14" stroke="{web_color(color)}" stroke-width="2.5"/>'
+
+
 _POSE_MARKS = {
-    "seen": _LINE.format(_FOUND),
-    "ambiguous or predicted": _LINE.format(_DOUBTFUL),
-    "lost": _LINE.format(_LOST),
-    "searched for, not found": f'<circle cx="8" cy="8" r="3" fill="{_LOST}"/>',
-    "x axis": _LINE.format("#e60000"),
-    "y axis": _LINE.format("#00b400"),
-    "z axis": _LINE.format("#0050e6"),
+    "seen": _line(FOUND),
+    "ambiguous or predicted": _line(DESIRED),
+    "lost": _line(LOST),
+    "searched for, not found": f'<circle cx="8" cy="8" r="3" fill="{web_color(LOST)}"/>',
+    **{f"{name} axis": _line(color) for name, color in zip("xyz", AXES, strict=True)},
 }
-_CURVE_MARKS = {
-    "found": _LINE.format(_FOUND),
-    "not found, where it was last": _LINE.format(_LOST),
-}
+_CURVE_MARKS = {"found": _line(FOUND), "not found, where it was last": _line(LOST)}
 
 
 def write_track_page(folder: Path, page: Path | None = None) -> Path:
