@@ -3,6 +3,7 @@
 import csv
 import re
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -32,12 +33,14 @@ from vergence.app.figures.tracked import (
 from vergence.app.main import main
 from vergence.app.options import TrackOptions
 from vergence.app.track import track
+from vergence.app.tracking.curve_subject import CurveSubject
 from vergence.app.tracking.track_page import write_track_page
 from vergence.app.tracking.track_record import (
     TrackRecord,
     read_track,
 )
 from vergence.geometry import matrix_to_quaternion, so3_log
+from vergence.signals import OutcomeKind
 
 NAMES = ("box", "tag", "curves")
 BOX_GONE = 12  # first image without the box
@@ -306,6 +309,40 @@ def test_an_answer_of_earlier_footage_does_not_stay(
     shutil.copytree(folders["curves"], tmp_path / "out")
     assert command("track", tmp_path / "torn", *CURVES[:2], "--out", tmp_path / "out") == 2
     assert not (tmp_path / "out" / "track.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("seen", "lost"), [(6, ""), (8, "; target lost by then: ellipse 1 last seen at 0.20 s: not an")]
+)
+def test_an_interrupted_track_has_a_page_of_what_there_is(
+    command: Callable[..., int],
+    tmp_path: Path,
+    folders: dict[str, Path],
+    capsys: object,
+    monkeypatch: pytest.MonkeyPatch,
+    seen: int,
+    lost: str,
+) -> None:
+    write = CurveSubject.write
+
+    def interrupted(subject: CurveSubject, name: str) -> None:
+        write(subject, name)
+        if name == f"{seen - 1:02d}.png":
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(CurveSubject, "write", interrupted)
+    images, folder = folders["curves"].parent / "curves", tmp_path / "cut"
+    assert command("track", images, *CURVES[:2], "--out", folder) == 1
+    reason = f"stopped by the user after {seen} of {COUNT} images{lost}"
+    assert f"stopped at {(seen - 1) / RATE_HZ:.2f} s: {reason}" in capsys.readouterr().out
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert f">stopped</span>after {(seen - 1) / RATE_HZ:.2f} s: {reason}" in page
+    assert f'<td class="number">{seen}' in page
+    assert (folder / f"frame-{seen - 1:06d}.jpg").is_file()  # the last image there is
+    record = read_track(folder)
+    assert record.outcome.kind is OutcomeKind.STOPPED
+    assert len(record.time) == seen
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from vergence.app.tracking.overlay_files import OverlayFiles
     from vergence.app.tracking.track_subject import Start, Subject
     from vergence.arrays import ImageArray
+    from vergence.runtime.interrupt import Interrupt
+    from vergence.signals import Outcome
 
 _CAMERA = frozenset(("camera", "fx", "fy", "cx", "cy", "distortion"))
 _ALWAYS = frozenset(("images", "topic", "rate", "overlay", "out", "as_json"))
@@ -40,6 +42,7 @@ def track(options: "TrackOptions") -> int:
     """Follow what the options name through footage into a run folder; return the exit code."""
     from vergence.app.tracking.footage import open_footage
     from vergence.app.tracking.overlay_files import OverlayFiles
+    from vergence.runtime.interrupt import Interrupt
     from vergence.runtime.recording import outcome_json
 
     start = _prepare(options)
@@ -51,9 +54,11 @@ def track(options: "TrackOptions") -> int:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / TRACK).unlink(missing_ok=True)  # it is not about what is written now
     overlay = OverlayFiles(folder, footage, subject, options.overlay)
-    with subject.writing(folder), overlay:
-        median_ms = _follow(subject, footage, chain((first,), frames), overlay)
-    outcome, answer, lines = subject.result(median_ms)
+    with subject.writing(folder), overlay, Interrupt() as interrupt:
+        followed = _follow(subject, footage, chain((first,), frames), overlay, interrupt)
+    outcome, answer, lines = subject.result(followed.median_ms)
+    if followed.interrupted:
+        outcome = _stopped(outcome, interrupt.reason, answer["frames"], footage.count)
     files = {**subject.files, **overlay.files}
     if not options.as_json:
         say(str(outcome))  # at once: the report is written later
@@ -117,13 +122,21 @@ def _prepare(options: "TrackOptions") -> "Start":
     return start
 
 
+class _Followed(NamedTuple):
+    """How the footage was gone through."""
+
+    median_ms: float  # that finding it in an image took
+    interrupted: bool  # whether the user ended it before the footage did
+
+
 def _follow(
     subject: "Subject",
     footage: "Footage",
     frames: "Iterator[FootageFrame]",
     overlay: "OverlayFiles",
-) -> float:
-    """Follow to the end of the footage, or until it is given up; return the median ms an image."""
+    interrupt: "Interrupt",
+) -> _Followed:
+    """Follow to the end of the footage, or until it is given up or interrupted."""
     from vergence.app.progress import bar
 
     took: list[float] = []
@@ -137,10 +150,21 @@ def _follow(
             subject.follow(image, frame.time)
             took.append(perf_counter() - began)
             subject.write(Path(frame.name).name)
-            frame = None if subject.given_up else next(frames, None)
+            interrupted = interrupt.asked
+            frame = None if interrupted or subject.given_up else next(frames, None)
             overlay.add(number, image, last=frame is None)
             progress.update(task, completed=len(took), description="track")
-    return float(np.median(took)) * 1e3
+    return _Followed(float(np.median(took)) * 1e3, interrupted)
+
+
+def _stopped(outcome: "Outcome", why: str, done: int, count: int) -> "Outcome":
+    """Return the outcome of footage that was left after some of its images; 0 if not known."""
+    from vergence.signals import Outcome, OutcomeKind
+
+    reason = f"{why} after {done} of {count} images" if count else f"{why} after {done} images"
+    if not outcome.succeeded:
+        reason += f"; {outcome.kind.value} by then: {outcome.reason}"
+    return Outcome(OutcomeKind.STOPPED, reason, outcome.time)
 
 
 def _image(subject: "Subject", frame: "FootageFrame") -> "ImageArray":
