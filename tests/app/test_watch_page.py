@@ -36,6 +36,30 @@ TARGET = (
     "return [b.left + b.width / 2 + f * m[0], b.top + b.height / 2 + f * m[1]] })()"
 )
 
+# Looks at the page in every frame from its beginning, and after it has lost its connection.
+LOOKING = """
+if (window === top) {
+  window.seen = { connecting: 0, early: 0, apart: [] };
+  const shown = () => getComputedStyle(watch.scene.frame).visibility === "visible";
+  const badge = () => document.getElementById("badge").textContent;
+  window.WebSocket = class extends WebSocket {
+    constructor(address) {
+      super(address);
+      window.line = this;
+      this.addEventListener("close", () => setTimeout(() => seen.apart.push([badge(), shown()])));
+    }
+  };
+  requestAnimationFrame(function look() {
+    requestAnimationFrame(look);
+    if (!window.watch?.scene.frame) return;
+    const connected = ["/state", "/ui"].every((path) => watch.scene.lines.has(path));
+    seen.connecting += !connected;
+    seen.early += shown() && !connected;
+  });
+}
+"""
+SHOWN = "watch.scene.frame && getComputedStyle(watch.scene.frame).visibility === 'visible'"
+
 
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
@@ -110,6 +134,23 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
     browser.wait("JSON.stringify(watch.scene.outline)", lambda text: text != outline)
     changed = np.abs(browser.image("#stage").astype(float) - before).max(axis=2) > 30
     assert changed.mean() > 0.02
+
+
+def test_the_view_in_space_is_hidden_while_it_is_not_connected(browser: Browser) -> None:
+    script = browser.call("Page.addScriptToEvaluateOnNewDocument", source=LOOKING)
+    browser.call("Page.reload")
+    browser.wait("typeof seen === 'object' && typeof watch === 'object'")
+    browser.wait(SHOWN)
+    assert browser.value("seen.connecting") > 0
+    assert browser.value("seen.early") == 0
+    browser.value("line.close()")
+    assert browser.wait("seen.apart", lambda apart: len(apart)) == [["not connected", False]]
+    browser.wait(SHOWN)
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+    browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+    browser.call("Page.reload")
+    browser.wait("typeof seen === 'undefined' && typeof watch === 'object'")
+    browser.wait(ROWS, lambda rows: rows > 5)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

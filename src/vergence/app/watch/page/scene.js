@@ -12,6 +12,7 @@ const LINES = ["/state", "/ui"]; // its connections
 const AGAIN_MS = 1000;
 const TIMEOUT_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
 const LONGEST_TIMEOUT_MS = 160_000; // doubled up to this, where a slow computer needs longer
+const FRAMES = 3; // drawn after its connections are open, until it shows what has come over them
 const BAR = 32; // px of the viewer's own bar, which is left outside
 const TURN_DEG = 5; // of a press of an arrow
 const ZOOM = 1.1;
@@ -70,7 +71,7 @@ export class Scene {
     this.stage.ariaLabel = "View in 3D: arrow keys turn it, plus and minus zoom";
     frame.style.height = `calc(100% + ${BAR}px)`;
     this.stage.append(frame, this.over);
-    frame.addEventListener("load", () => this.listen(frame));
+    frame.addEventListener("load", () => this.loaded(frame));
     this.frame = frame;
     this.load();
   }
@@ -79,23 +80,33 @@ export class Scene {
   connected(open) {
     this.open = open;
     if (open && this.lost) this.load();
+    this.show();
   }
 
-  get lost() { return this.stage.classList.contains("lost"); }
+  get lost() { return !this.open || !LINES.every((path) => this.lines.has(path)); }
+
+  /** Shows the viewer only while it is connected: it would say that it is not, over whatever it showed last. */
+  show() { this.stage.classList.toggle("lost", this.frame !== null && this.lost); }
 
   /** Loads the viewer, again if it has lost its connection. */
   load() {
-    const { frame } = this;
-    if (!frame) return;
+    if (!this.frame) return;
     clearTimeout(this.waiting);
-    const before = frame.contentWindow?.document;
-    frame.src = VIEWER;
-    const begun = () => { // as soon as the new document is there, before its script connects
-      const page = frame.contentDocument && frame.contentWindow;
-      if (page && page.document !== before && page.location.pathname === VIEWER) this.follow(page);
-      else requestAnimationFrame(begun);
-    };
-    begun();
+    this.lines = new Set();
+    this.show();
+    this.frame.src = VIEWER;
+  }
+
+  /**
+   * Follows a viewer that has just come, before its script connects.
+   * @param {HTMLIFrameElement} frame
+   */
+  loaded(frame) {
+    const page = frame.contentDocument && frame.contentWindow; // null for the browser's page of an error
+    if (page?.location.pathname !== VIEWER) return this.wait(AGAIN_MS);
+    this.follow(page);
+    this.listen(page);
+    this.wait(LONGEST_TIMEOUT_MS);
   }
 
   /**
@@ -119,16 +130,24 @@ export class Scene {
 
   /**
    * @param {Window} page
-   * @param {Set<string>} open  its connections over which something has come
-   * @param {number} wait_ms  until the viewer is loaded again, unless all are open by then
+   * @param {Set<string>} open  connections of a viewer over which something has come
+   * @param {number} wait_ms  until it is loaded again, unless all are open by then
    */
   heard(page, open, wait_ms = this.timeout) {
-    if (this.frame?.contentWindow !== page) return; // one that is no longer shown
-    const lost = !LINES.every((path) => open.has(path));
-    this.stage.classList.toggle("lost", lost);
+    if (open !== this.lines) return; // of a viewer that is no longer there
+    if (this.lost) {
+      this.show();
+      return this.wait(wait_ms);
+    }
     clearTimeout(this.waiting);
-    if (!lost) this.timeout = TIMEOUT_MS;
-    else this.waiting = setTimeout(() => this.again(wait_ms), wait_ms);
+    this.timeout = TIMEOUT_MS;
+    after(FRAMES, page, () => this.show()); // what it has drawn so far says that it is not connected
+  }
+
+  /** @param {number} wait_ms  until the viewer is loaded again */
+  wait(wait_ms) {
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.again(wait_ms), wait_ms);
   }
 
   /** @param {number} waited_ms */
@@ -136,6 +155,7 @@ export class Scene {
     if (waited_ms > AGAIN_MS) this.timeout = Math.min(2 * waited_ms, LONGEST_TIMEOUT_MS);
     if (this.open) this.load();
   }
+
   /** @param {string} text */
   say(text) {
     const words = document.createElement("p");
@@ -143,6 +163,7 @@ export class Scene {
     this.stage.replaceChildren(words);
     this.stage.tabIndex = -1;
     this.frame = null;
+    this.show();
   }
 
   /** @param {Status} status */
@@ -155,11 +176,9 @@ export class Scene {
 
   /**
    * What the viewer needs of the mouse it gets, except while the target is under it or dragged.
-   * @param {HTMLIFrameElement} frame
+   * @param {Window} page
    */
-  listen(frame) {
-    const page = frame.contentDocument && frame.contentWindow;
-    if (!page) return;
+  listen(page) {
     const kinds = /** @type {const} */ (
       ["pointerdown", "mousedown", "pointermove", "mousemove", "pointerup", "mouseup"]
     );
@@ -220,4 +239,14 @@ export class Scene {
       ([x, y]) => [unit * (width / 2 + focal * x), unit * (height / 2 + focal * y)],
     ));
   }
+}
+
+/**
+ * Calls back when a window has drawn so many frames.
+ * @param {number} frames
+ * @param {Window} page
+ * @param {() => void} then
+ */
+function after(frames, page, then) {
+  page.requestAnimationFrame(() => (frames > 1 ? after(frames - 1, page, then) : then()));
 }
