@@ -16,6 +16,7 @@ import pytest
 from vergence.drivers.cameras import Gige
 from vergence.drivers.cameras.gige_camera import GigeCamera
 from vergence.errors import DriverSilent, InputError
+from vergence.runtime.hardware import DeviceClock
 from vergence.signals import Frame
 
 SYSTEM = "/usr/bin/python3"
@@ -86,25 +87,26 @@ def test_images_come_at_their_rate_with_the_cameras_stamps(camera: Camera) -> No
 def test_times_do_not_depend_on_when_images_are_fetched(
     camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source, stamps = opened(), []
-    told = source._told
+    source, told = opened(), []
+    check = source._told
 
     def noted(words: dict[str, float]) -> dict[str, float]:
-        stamps.append(words["stamp"])
-        return told(words)
+        told.append((words["stamp"], words["arrived"] - BEGIN))
+        return check(words)
 
     monkeypatch.setattr(source, "_told", noted)
     frames = [frame for _, frame in taken(source, 2.0)]
-    fitted = len(frames)  # to so many images: the camera's clock is known by then
     for late_s in (*[0.15] * 8, 0.5, 1.0, 2.0):  # a loop that is late, until images are dropped
         if late_s > 0.15 and source.dropped:
             break
         time.sleep(late_s)
         frames += source.frames(lambda t: {})
     source.close()
+    at_once = DeviceClock()  # of a loop that fetches every image when it arrives
+    expected = [at_once.time(stamp, arrived) for stamp, arrived in told[: len(frames)]]
+    np.testing.assert_allclose([frame.time for frame in frames], expected, atol=0.003)
     ahead = time.time() - clock()  # of the camera's clock, which is the system's, before ours
-    late = np.array([f.time for f in frames]) + ahead - np.array(stamps[: len(frames)])
-    assert np.ptp(late[fitted - 1 :]) < 0.003
+    late = np.array(expected) + ahead - np.array([stamp for stamp, _ in told[: len(frames)]])
     assert np.abs(late).max() < 0.05
     assert source.dropped > 0  # only the newest image waits for a slow loop
 
