@@ -107,8 +107,10 @@ class GigeCamera:
         joints_at: Callable[[float], Mapping[str, FloatArray]],
     ) -> Frame:
         self.dropped = int(about["dropped"])
-        # One monotonic clock for all processes of a computer: how long the image has waited here.
-        arrival = self._clock() - max(monotonic() - float(about["arrived"]), 0.0)
+        # One monotonic clock for all processes of a computer. It is read first: an interruption
+        # between the two makes the arrival late, which the device's clock ignores.
+        waited_s = max(monotonic() - float(about["arrived"]), 0.0)
+        arrival = self._clock() - waited_s
         time = self._device_clock.time(float(about["stamp"]), arrival) - self._latency_s
         image = grey_image(block, self._encoding, *self._size)
         if image is None:
