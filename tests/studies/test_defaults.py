@@ -11,12 +11,14 @@ from vergence.geometry import se3_exp
 from vergence.planning import Path
 from vergence.robot import goal_configurations
 from vergence.runtime.arrival import Arrival
-from vergence.studies import defaults_run
+from vergence.studies import defaults_plan
 from vergence.studies.defaults import STARTS_SEED, camera_arm, draw
 from vergence.studies.defaults_checks import better
 from vergence.studies.defaults_choices import CHOICES, DEFAULT, EVERY
+from vergence.studies.defaults_judge import End, TrueScene
 from vergence.studies.defaults_moving import AMPLITUDE_M, Drift, keep
-from vergence.studies.defaults_run import End, TrueScene, follow, plan, serve
+from vergence.studies.defaults_plan import follow, plan
+from vergence.studies.defaults_run import serve
 from vergence.studies.reach_scene import Scene
 
 
@@ -44,7 +46,7 @@ def test_a_plan_that_passes_near_a_singularity_is_followed_to_its_end(
     assert follow(far, found.path, found.goal_px, np.random.default_rng(10)).end is End.REACHED
     # A law that keeps its distance from singularities is held on the way.
     away = Limits(manipulability_share=0.2)
-    monkeypatch.setattr(defaults_run, "limits_on_plan", lambda *_: away)
+    monkeypatch.setattr(defaults_plan, "limits_on_plan", lambda *_: away)
     assert follow(far, found.path, found.goal_px, np.random.default_rng(10)).end is not End.REACHED
 
 

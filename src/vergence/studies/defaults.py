@@ -16,8 +16,10 @@ from vergence.studies.check import Progress, StudyResult
 from vergence.studies.defaults_checks import PLAN_WORST_S, checks_of
 from vergence.studies.defaults_choices import CHOICES, EVERY, MOVING, Tried
 from vergence.studies.defaults_figures import figures
+from vergence.studies.defaults_judge import End
 from vergence.studies.defaults_moving import Drift, keep
-from vergence.studies.defaults_run import NOISE_PX, End, follow, plan, plan_again, serve
+from vergence.studies.defaults_plan import follow, plan, plan_again
+from vergence.studies.defaults_run import NOISE_PX, serve
 from vergence.studies.guarantees_random import CAMERA, SQUARE
 from vergence.studies.processes import processes, try_all
 from vergence.studies.reach_scene import Scene

@@ -8,8 +8,9 @@ import numpy as np
 from vergence.arrays import BoolArray
 from vergence.studies.check import Check
 from vergence.studies.defaults_choices import CHOICES, EVERY, MOVING, Tried
+from vergence.studies.defaults_judge import End
 from vergence.studies.defaults_moving import KEPT_PX
-from vergence.studies.defaults_run import NOISE_PX, End
+from vergence.studies.defaults_run import NOISE_PX
 
 REACHED, PLAN_WORST_S = 0.97, 1.0  # what the defaults have to come to
 

@@ -5,8 +5,9 @@ from itertools import product
 from typing import NamedTuple, get_args
 
 from vergence.control import InteractionModel
+from vergence.studies.defaults_judge import Finish
 from vergence.studies.defaults_moving import Kept
-from vergence.studies.defaults_run import DEPTHS, Choice, Finish
+from vergence.studies.defaults_run import DEPTHS, Choice
 
 DEFAULT = Choice("mean", "from_features", 0.0, 0.01)
 SHARES, MARGINS = (0.0, 0.2), (0.01, 0.03)

@@ -12,7 +12,8 @@ from vergence.control import InteractionModel
 from vergence.drawing import COLORS, figure, legend
 from vergence.studies.check import Figure
 from vergence.studies.defaults_choices import CHOICES, EVERY, Tried
-from vergence.studies.defaults_run import DEPTHS, Choice, End
+from vergence.studies.defaults_judge import End
+from vergence.studies.defaults_run import DEPTHS, Choice
 from vergence.studies.figure_files import save_figures
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from vergence.geometry import se3, se3_inverse, transform_points
 from vergence.planning import FixedReference
 from vergence.robot import goal_configurations
 from vergence.signals import JointState, Observation, Reference
+from vergence.studies.defaults_judge import TrueScene
 from vergence.studies.defaults_run import (
     DEPTHS,
     INNER,
     RATE_HZ,
     Choice,
-    TrueScene,
     believed_depth,
     measured,
     servo_of,

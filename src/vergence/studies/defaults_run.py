@@ -1,19 +1,11 @@
-"""One start and goal, served by one choice of settings, on exact kinematics; judged strictly."""
+"""One start and goal, served by one choice of settings, on exact kinematics."""
 
 from collections import deque
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from time import process_time
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.limits_on_plan import (
-    PLAN_MARGIN_JOINT,
-    PLAN_MARGIN_PX,
-    limits_on_plan,
-)
 from vergence.control import (
     CarriedDepth,
     Depth,
@@ -25,37 +17,26 @@ from vergence.control import (
     Limits,
     MotionSettings,
     PseudoInverse,
-    QuadraticProgram,
     Servo,
     Situation,
     guarded_steps,
 )
-from vergence.estimation import CornerView, NoPose, fit_pose
-from vergence.geometry import se3_exp, se3_inverse, so3_log, transform_points
-from vergence.planning import (
-    FixedReference,
-    OptimisedPlanner,
-    Path,
-    PlanFailure,
-    PlanningProblem,
-    Trajectory,
-)
-from vergence.planning.replanner import MOST_PLANS
+from vergence.geometry import se3_inverse, transform_points
+from vergence.planning import FixedReference
 from vergence.runtime.arrival import Arrival, Goal
 from vergence.runtime.stages import Planner
 from vergence.signals import ImagePoints, JointState, Observation, Reference
+from vergence.studies.defaults_judge import REACHED_PX, End, Finish, TrueScene
 from vergence.studies.reach_scene import Scene
 
 NOISE_PX = 0.3  # on every second start
 RATE_HZ, INNER = 30.0, 4  # images a second, and set-points an image
 LONGEST_S = 20.0  # given to a law
-REACHED_PX, REACHED_M, REACHED_DEG = 1.0, 1e-3, 0.1
 BELIEF = (0.7, 1.4)  # range of the believed over the true depth at the start
-GAIN, GAIN_OF_NEW = 1.0, 3.0  # 1/s: of a law without a plan, and as `new` writes it
+GAIN = 1.0  # 1/s, of a law without a plan
 # Shares of the rate limits up to which an arm is at rest.
 _SLOW, _SLOW_WITH_NOISE = 4e-4, 4e-3
 _NOTICEABLE = 0.1  # 1/s: share of the error by which it falls
-CAMERA_SPEED, SETTLE_S, REST_S = 0.25, 4.0, 1.0  # m/s of a plan, s after its end, s of rest
 
 DEPTHS: dict[str, Depth] = {
     "held": HeldDepth(),
@@ -63,20 +44,6 @@ DEPTHS: dict[str, Depth] = {
     "from_motion": DepthFromMotion(),
     "from_features": DepthFromFeatures(),
 }
-
-
-class End(StrEnum):
-    """How a run ended, judged by what is true."""
-
-    REACHED = "reached"
-    VIEW = "left the view"
-    BEHIND = "behind the target"
-    JOINT = "joint limit"
-    STALLED = "stalled"
-    UNNAMED = "stalled, unnamed"
-    OFF = "right image, wrong pose"
-    LATE = "out of time"
-    NO_PLAN = "no plan"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,75 +60,6 @@ class Choice:
         """The choice on one line."""
         limits = f"w' {self.manipulability_share:g}, margin {self.joint_margin:g}"
         return f"{self.interaction} L, {self.depth}, {limits}"
-
-
-class Finish(NamedTuple):
-    """How a run ended."""
-
-    end: End
-    px: float  # true error of the farthest point
-    m: float  # true distance of the camera from its goal
-    deg: float  # and angle
-    time: float  # s
-    reason: str
-    q: FloatArray  # (n,) where the joints are
-
-
-class TrueScene:
-    """What is true of a scene at joint positions: the study's only use of it.
-
-    Args:
-        scene: with flat marks.
-        goal_noise_px: standard deviation of each coordinate of the marks in the desired image. No
-            one can tell the goal from poses that show the same within three deviations.
-    """
-
-    def __init__(self, scene: Scene, goal_noise_px: float = 0.0) -> None:
-        self._scene, self._points = scene, scene.points_world
-        m, rad = _pose_deviation(scene, goal_noise_px) if goal_noise_px else (0.0, 0.0)
-        self._tolerance_m = REACHED_M + 3.0 * m
-        self._tolerance_deg = REACHED_DEG + 3.0 * float(np.degrees(rad))
-        self._normal = scene.T_world_target[:3, 2] * np.sign(
-            scene.T_world_target[:3, 2] @ (scene.T_world_goal[:3, 3] - self._points.mean(axis=0))
-        )
-
-    def look(self, q: FloatArray) -> tuple[FloatArray, FloatArray, End | None]:
-        """Return points (M, 2) px, their depth (M,), and what of the rules is broken at q (n,)."""
-        T = self._scene.arm.forward_kinematics(q)
-        points = transform_points(se3_inverse(T), self._points)
-        px = self._scene.camera.project(points)
-        broken = None
-        if self._normal @ (T[:3, 3] - self._points.mean(axis=0)) <= 0.0:
-            broken = End.BEHIND
-        elif points[:, 2].min() <= 0.0 or not self._scene.camera.contains(px).all():
-            broken = End.VIEW
-        elif self._scene.arm.outside(q).any():
-            broken = End.JOINT
-        return px, points[:, 2].copy(), broken
-
-    def finish(self, q: FloatArray, end: End, time: float, reason: str) -> Finish:
-        """Judge where a run ended: reached only if image and pose agree with the goal."""
-        px, _, _ = self.look(q)
-        error = float(np.linalg.norm(px - self._scene.goal_px, axis=1).max())
-        off = se3_inverse(self._scene.T_world_goal.copy()) @ self._scene.arm.forward_kinematics(q)
-        m = float(np.linalg.norm(off[:3, 3]))
-        deg = float(np.degrees(np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))))
-        alike = m < self._tolerance_m and deg < self._tolerance_deg
-        close = error < REACHED_PX and alike
-        if close and end in (End.STALLED, End.UNNAMED, End.OFF, End.LATE):
-            end = End.REACHED
-        return Finish(end, error, m, deg, time, reason, q.copy())
-
-
-def _pose_deviation(scene: Scene, noise_px: float) -> tuple[float, float]:
-    """Return how well one image at the goal fixes the camera, m and rad, along the worst axes."""
-    step, J = 1e-5, np.empty((scene.goal_px.size, 6))
-    for k, twist in enumerate(step * np.eye(6)):
-        ends = (scene.seen_px(scene.T_world_goal @ se3_exp(t)) for t in (twist, -twist))
-        J[:, k] = np.subtract(*ends).ravel() / (2.0 * step)
-    covariance = noise_px**2 * np.linalg.inv(J.T @ J)
-    position, angle = (np.linalg.eigvalsh(covariance[k : k + 3, k : k + 3])[-1] for k in (0, 3))
-    return float(np.sqrt(position)), float(np.sqrt(angle))
 
 
 def servo_of(
@@ -191,11 +89,12 @@ def servo_of(
         limits=limits if limited else None,
         solver=None if limited else PseudoInverse(),
         depth_m=believed_m,
-        situation=_situation(scene, still if motion is None else motion),
+        situation=situation(scene, still if motion is None else motion),
     )
 
 
-def _situation(scene: Scene, motion: MotionSettings) -> Situation:
+def situation(scene: Scene, motion: MotionSettings) -> Situation:
+    """Return what a servo knows of a scene besides its objective."""
     return Situation(1.0 / RATE_HZ, motion, features={"": scene.marks})
 
 
@@ -301,88 +200,3 @@ def serve(
     averaged = noise_px * np.sqrt(0.5 * GAIN / RATE_HZ)  # what the law leaves of it at rest
     planner = FixedReference(reference)
     return drive(scene, law, free, planner, random, noise_px, goal_noise_px=averaged)
-
-
-class Planned(NamedTuple):
-    """A path to the goal, or why there is none, and how long it took to find."""
-
-    path: Path | PlanFailure | NoPose
-    cpu_s: float
-    goal_px: FloatArray  # (N, 2) the desired image that it was made with
-
-
-def plan(scene: Scene, random: np.random.Generator, noise_px: float = 0.0) -> Planned:
-    """Plan from the images at start and goal, with the target's features known."""
-    begin = process_time()
-    now, goal_px = (
-        px + noise_px * random.standard_normal(px.shape)
-        for px in (scene.seen_px(scene.arm.forward_kinematics(scene.q_start)), scene.goal_px)
-    )
-    fits = [
-        fit_pose(scene.marks, [CornerView(scene.camera, np.eye(4), px)], max(noise_px, 0.05))
-        for px in (now, goal_px)
-    ]
-    poses = []
-    for fit in fits:
-        if isinstance(fit, NoPose) and not fit.alternatives:
-            return Planned(fit, process_time() - begin, goal_px)
-        poses.append(fit.alternatives[0] if isinstance(fit, NoPose) else fit)
-    now_fit, goal_fit = poses
-    problem = PlanningProblem.from_poses(
-        now_fit, goal_fit, scene.marks, scene.arm, scene.camera, scene.q_start
-    )
-    path = OptimisedPlanner().plan(problem)
-    return Planned(path, process_time() - begin, goal_px)
-
-
-def plan_again(
-    scene: Scene, finish: Finish, random: np.random.Generator, noise_px: float = 0.0
-) -> Finish:
-    """Plan from where the arm stalls and follow that path, as often as `Replanner` does.
-
-    Args:
-        scene: what is true.
-        finish: how the run ended so far.
-        random: draws the noise.
-        noise_px: standard deviation of each measured coordinate.
-    """
-    for _ in range(MOST_PLANS):
-        if finish.end not in (End.STALLED, End.UNNAMED):
-            break
-        here = replace(scene, q_start=finish.q)
-        found = plan(here, random, noise_px)
-        if not isinstance(found.path, Path):
-            break
-        finish = follow(here, found.path, found.goal_px, random, noise_px)
-    return finish
-
-
-def follow(
-    scene: Scene,
-    path: Path,
-    goal_px: FloatArray,
-    random: np.random.Generator,
-    noise_px: float = 0.0,
-) -> Finish:
-    """Follow a path as `track` does in a cell that `new` writes, and settle at its end."""
-    trajectory = Trajectory.of(path, CAMERA_SPEED, goal_px)
-    limits = limits_on_plan(Limits(), PLAN_MARGIN_PX, PLAN_MARGIN_JOINT, 1.0 / RATE_HZ)
-    law, free = (
-        Servo(
-            scene.arm,
-            scene.camera,
-            ImageBased(gain=GAIN_OF_NEW),
-            limits=kept,
-            solver=solver,
-            depth_m=path.depth_m[0],
-            situation=_situation(
-                scene, MotionSettings(feed_forward=False, depth=DepthFromFeatures())
-            ),
-        )
-        for kept, solver in ((limits, QuadraticProgram()), (None, PseudoInverse()))
-    )
-    longest = trajectory.duration + SETTLE_S
-    end = trajectory.duration + REST_S  # the desired image is not quite what the path's end shows
-    return drive(
-        scene, law, free, trajectory, random, noise_px, longest, end, goal_noise_px=noise_px
-    )
