@@ -54,19 +54,20 @@ def html_table(checks: Sequence[Check]) -> str:
     return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>'
 
 
-_KINDS = {**dict.fromkeys(NUMBERS, "number"), "unit": "unit"}
+_KINDS = {**dict.fromkeys(NUMBERS, "number"), **{word: word for word in ("claim", "bound", "unit")}}
 
 
 def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str:
+    """Return a row; on a narrow screen its cells stand below each other, with their headings."""
     row = []
     for heading, cell in zip(headings, map(escape, cells), strict=True):
         if heading == "check":
             row.append(f'<th scope="row">{cell}</th>')
         elif heading == "holds":
-            row.append(f'<td><span class="badge {"good" if holds else "bad"}">{cell}</span></td>')
+            badge = f'<span class="badge {"good" if holds else "bad"}">{cell}</span>'
+            row.append(f'<td class="holds">{badge}</td>')
         else:
-            kind = f' class="{_KINDS[heading]}"' if heading in _KINDS else ""
-            row.append(f"<td{kind}>{cell}</td>")
+            row.append(f'<td class="{_KINDS[heading]}" data-heading="{heading}">{cell}</td>')
     return f"<tr>{''.join(row)}</tr>"
 
 

@@ -25,7 +25,8 @@ def page(title: str, body: str) -> str:
     template = Template((folder / "page.html").read_text(encoding="utf-8"))
     sheets = (folder / "watch" / "page" / "colours.css", folder / "page.css")
     style = "\n".join(sheet.read_text(encoding="utf-8") for sheet in sheets)
-    return template.substitute(title=escape(title), style=style, body=body)
+    parts = f"{body}\n{script('scroll.js')}"
+    return template.substitute(title=escape(title), style=style, body=parts)
 
 
 def header(kicker: str, title: str, *lines: str) -> str:

@@ -44,17 +44,6 @@ function follow(chart) {
 }
 
 /**
- * Lets the keyboard scroll a figure while it is narrower than its chart.
- * @param {HTMLElement} figure
- */
-function scroll(figure) {
-  new ResizeObserver(() => {
-    if (figure.scrollWidth > figure.clientWidth) figure.tabIndex = 0;
-    else figure.removeAttribute("tabindex");
-  }).observe(figure);
-}
-
-/**
  * Plays a film in the run's own time; its slider shows any instant of it.
  * @param {Element} film
  */
@@ -106,6 +95,5 @@ function play(film) {
 
 for (const chart of document.querySelectorAll("svg.chart[data-time]")) {
   if (chart instanceof SVGSVGElement) follow(chart);
-  if (chart.parentElement) scroll(chart.parentElement);
 }
 for (const film of document.querySelectorAll(".film")) play(film);
