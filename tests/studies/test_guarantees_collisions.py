@@ -1,5 +1,6 @@
 """No set-point of a run among obstacles touches anything; without law and guard many do."""
 
+from vergence.experiments.workers import Workers
 from vergence.signals import OutcomeKind
 from vergence.studies.guarantees_collisions import LAWS, collisions_check, try_obstacles
 
@@ -14,6 +15,6 @@ def test_runs_among_obstacles_touch_nothing_and_would_without_the_clearance():
 
 
 def test_the_check_counts_and_tells_the_runs_of_each_law():
-    check = collisions_check(8, 2, None, lambda done: None)
+    check = collisions_check(8, 2, Workers(1), lambda done: None)
     assert (check.measured, check.holds) == (0, True)
     assert "plain: braked by the guard in" in check.note

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vergence.cell import load_cell
+from vergence.experiments.workers import Workers
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
 from vergence.planning import OptimisedPlanner
 from vergence.planning import Path as PlannedPath
@@ -31,7 +32,6 @@ from vergence.studies.mezouar2001_trials import (
     try_start,
     wrong_beliefs,
 )
-from vergence.studies.processes import processes
 from vergence.studies.reach_scene import END_MARGIN_PX, Scene
 
 CHECKS = {
@@ -206,9 +206,9 @@ def test_success_counts_feasible_starts_only() -> None:
 
 
 def test_processes_give_the_same_answers_in_the_same_order(scene: Scene) -> None:
-    with processes(1) as none, processes(2) as pool:
-        alone = wrong_beliefs(scene, 3, none)
-        together = wrong_beliefs(scene, 3, pool)
+    with Workers(1) as this, Workers(2) as others:
+        alone = wrong_beliefs(scene, 3, this)
+        together = wrong_beliefs(scene, 3, others)
     assert alone == together
 
 

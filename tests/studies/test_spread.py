@@ -8,7 +8,6 @@ import pytest
 
 from vergence.errors import InputError, VergenceError
 from vergence.studies import Check, StudyResult, reproduce
-from vergence.studies.processes import processes
 from vergence.studies.spread import over_seeds
 
 MEASURED = {3: 1.0, 4: 8.0, 5: 2.0, 6: float("nan")}
@@ -63,15 +62,3 @@ def test_reproduce_repeats_a_study_with_seeds_that_follow(
     assert check.note == "does not hold with seed 4; not made with seed 5: nothing in view"
     with pytest.raises(InputError, match="at least 1"):
         reproduce("region", seeds=0)
-
-
-def has_pool(_number: int) -> bool:
-    with processes(2) as pool:
-        return pool is not None
-
-
-def test_a_worker_starts_no_workers_of_its_own() -> None:
-    assert has_pool(0)
-    with processes(2) as pool:
-        assert pool is not None
-        assert not pool.submit(has_pool, 0).result()

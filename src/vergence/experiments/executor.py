@@ -1,6 +1,5 @@
 """Who runs the trials: this process, processes of this machine, or a cluster."""
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +11,7 @@ from vergence.experiments.kinematic import is_ideal, is_quick
 from vergence.experiments.run_trial import as_they_come, run_trials
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
-from vergence.experiments.workers import DEATHS, DeadlyTaskError, share_out
+from vergence.experiments.workers import DEATHS, DeadlyTaskError, Workers
 from vergence.optional_package import optional_package
 
 _CONNECT_S = 10
@@ -56,7 +55,8 @@ class Executor:
                 installed.
             WorkersLostError: if every worker dies that is given the same trials.
         """
-        count = self.workers or len(os.sched_getaffinity(0))
+        workers = Workers(self.workers)
+        count = workers.count
         quick, ideal, slow = _by_pace(source, trials, physics)
         if self.scheduler is None:
             for some in _chunks(quick, _CHUNK):
@@ -71,8 +71,9 @@ class Executor:
         else:
             do = partial(_run_task, source, tolerance_px, physics)
             try:
-                for results in share_out(do, tasks, min(count, len(tasks)), self.spent):
-                    yield from results
+                with workers:
+                    for _, results in workers.share_out(do, tasks, self.spent):
+                        yield from results
             except DeadlyTaskError as error:
                 raise WorkersLostError(tasks[error.number], _killed(DEATHS)) from None
 

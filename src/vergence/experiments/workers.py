@@ -1,143 +1,132 @@
 """Processes of this machine that share tasks; the task of one that dies is given to another."""
 
-import logging
-import signal
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from time import process_time
-from typing import Any, TypeVar
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
+from typing import Any, Self, TypeVar
+
+from vergence.errors import VergenceError
+from vergence.experiments.worker import Worker
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 DEATHS = 3  # of processes over one task, after which it is given up
-_END_S = 5.0  # that a process has to end by itself
-# Most of what a run needs, imported once for all processes. Not MuJoCo: it opens an EGL display,
-# and drivers of graphics cards do not survive that a process is copied.
-IMPORTED = (
-    "vergence.planning",
-    "vergence.runtime",
-    "vergence.estimation.object_follower",
-)
 
 
-class DeadlyTaskError(Exception):
+class DeadlyTaskError(VergenceError):
     """No process survives a task; `number` tells which."""
 
     def __init__(self, number: int) -> None:
-        super().__init__(f"{DEATHS} processes died over task {number}")
+        super().__init__(f"{DEATHS} processes died over task {number}; out of memory?")
         self.number = number
 
 
-def share_out(
-    do: Callable[[Task], Result],
-    tasks: Sequence[Task],
-    count: int,
-    spent: Callable[[float], object] | None = None,
-) -> Iterator[Result]:
-    """Yield what tasks come to, in any order.
+class Workers:
+    """Processes that are made when there are tasks, and kept for more until this is left.
 
-    Processes share what was imported before they were made, and are kept while there are tasks.
-    Ctrl-C is left to this process; the others end with it, and with the iterator.
+    With one worker, and in a worker itself, tasks are done in this process. Ctrl-C is left to this
+    process; the others end with it.
 
     Args:
-        do: a function that can be sent to another process.
-        tasks: its arguments.
-        count: how many processes at most.
-        spent: told the CPU time of each task, s.
+        count: how many; as many as there are cores if None.
 
-    Raises:
-        DeadlyTaskError: if `DEATHS` processes have died over one task.
+    Attributes:
+        count: how many at most do tasks at the same time.
     """
-    waiting, deaths = deque(range(len(tasks))), [0] * len(tasks)
-    workers: dict[Any, _Worker] = {}  # by connection
-    try:
-        while waiting or workers:
-            while waiting and len(workers) < count:
-                worker = _Worker.start(do)
-                workers[worker.connection] = worker
-                worker.give(waiting[0], tasks[waiting.popleft()])
-            for connection in wait(list(workers)):
-                worker = workers[connection]
-                try:
-                    error, result, cpu_s = worker.connection.recv()
-                except (EOFError, OSError):
-                    workers.pop(connection).end()
-                    deaths[worker.number] += 1
-                    if deaths[worker.number] == DEATHS:
-                        raise DeadlyTaskError(worker.number) from None
-                    waiting.appendleft(worker.number)
-                    continue
-                if spent is not None:
-                    spent(cpu_s)
-                if error is not None:
-                    raise error
-                if waiting:
-                    worker.give(waiting[0], tasks[waiting.popleft()])
-                else:
-                    workers.pop(connection).end()
-                yield result
-    finally:
-        for worker in workers.values():
-            worker.process.terminate()
-        for worker in workers.values():
-            worker.end()
 
+    def __init__(self, count: int | None = None) -> None:
+        alone = parent_process() is not None
+        self.count = 1 if alone else count or len(os.sched_getaffinity(0))
+        self._idle: list[Worker] = []
 
-@dataclass(slots=True)
-class _Worker:
-    process: BaseProcess
-    connection: "Connection[Any, Any]"
-    number: int = -1  # of its task
+    def __enter__(self) -> Self:
+        return self
 
-    @classmethod
-    def start(cls, do: Callable[[Any], Any]) -> "_Worker":
-        context = get_context("forkserver")
-        context.set_forkserver_preload(list(IMPORTED))
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_work, args=(do, theirs), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # they inherit this
+    def __exit__(self, *_: object) -> None:
+        while self._idle:
+            self._idle.pop().end()
+
+    def share_out(
+        self,
+        do: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        spent: Callable[[float], object] | None = None,
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield the number of each task with what it comes to, in any order.
+
+        Tasks in hand end with the iterator.
+
+        Args:
+            do: a function that can be sent to another process.
+            tasks: its arguments.
+            spent: told the CPU time that another process took for each task, s.
+
+        Raises:
+            DeadlyTaskError: if `DEATHS` processes have died over one task.
+        """
+        if self.count == 1:
+            yield from enumerate(map(do, tasks))
+            return
+        waiting, deaths = deque(range(len(tasks))), [0] * len(tasks)
+        busy: dict[Any, Worker] = {}  # by connection
+
+        def occupy(worker: Worker) -> None:
+            number = waiting.popleft()
+            worker.give(number, do, tasks[number])
+            busy[worker.connection] = worker
+
         try:
-            process.start()
+            while waiting or busy:
+                while waiting and len(busy) < self.count:
+                    occupy(self._idle.pop() if self._idle else Worker.start())
+                for connection in wait(list(busy)):
+                    worker = busy.pop(connection)
+                    number = worker.number
+                    try:
+                        error, result, cpu_s = worker.connection.recv()
+                    except (EOFError, OSError):
+                        worker.end()
+                        deaths[number] += 1
+                        if deaths[number] == DEATHS:
+                            raise DeadlyTaskError(number) from None
+                        waiting.appendleft(number)
+                        continue
+                    if waiting and error is None:
+                        occupy(worker)
+                    else:
+                        self._idle.append(worker)
+                    if spent is not None:
+                        spent(cpu_s)
+                    if error is not None:
+                        raise error
+                    yield number, result
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            theirs.close()
-        return cls(process, ours)
+            for worker in busy.values():
+                worker.process.terminate()
+            for worker in busy.values():
+                worker.end()
 
-    def give(self, number: int, task: Any) -> None:
-        self.number = number
-        with suppress(OSError):  # of one that has died, which is found out when it should answer
-            self.connection.send(task)
+    def try_all(
+        self,
+        case: Callable[[int], Result],
+        count: int,
+        progress: Callable[[float], object] = lambda _share: None,
+    ) -> list[Result]:
+        """Return the results of cases 0 … count - 1, in order.
 
-    def end(self) -> None:
-        self.connection.close()  # upon which an idle one ends
-        self.process.join(_END_S)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-        self.process.close()
+        Args:
+            case: a function of the case's number that can be sent to a process.
+            count: how many.
+            progress: called with the share done.
 
-
-def _work(do: Callable[[Any], Any], connection: "Connection[Any, Any]") -> None:
-    """Do tasks until the other process closes the connection or is gone."""
-    logging.getLogger("vergence").setLevel(logging.ERROR)  # that process warns, too, and once
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    while True:
-        try:
-            task = connection.recv()
-        except (EOFError, OSError):
-            return
-        error, result, began_s = None, None, process_time()
-        try:
-            result = do(task)
-        except KeyboardInterrupt:  # terminated amid a run
-            return
-        except Exception as raised:
-            error = raised
-        with suppress(OSError):
-            connection.send((error, result, process_time() - began_s))
+        Raises:
+            DeadlyTaskError: if `DEATHS` processes have died over one case.
+        """
+        results: dict[int, Result] = {}
+        for number, result in self.share_out(case, range(count)):
+            results[number] = result
+            progress(len(results) / count)
+        return [results[number] for number in range(count)]

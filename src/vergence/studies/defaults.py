@@ -8,6 +8,7 @@ import numpy as np
 
 from vergence.camera import Camera
 from vergence.cell import load_cell
+from vergence.experiments.workers import Workers
 from vergence.planning import Path as CameraPath
 from vergence.planning import PlanFailure, proves_no_path
 from vergence.robot import Arm
@@ -21,7 +22,6 @@ from vergence.studies.defaults_moving import Drift, keep
 from vergence.studies.defaults_plan import follow, plan, plan_again
 from vergence.studies.defaults_run import NOISE_PX, serve
 from vergence.studies.guarantees_random import CAMERA, SQUARE
-from vergence.studies.processes import processes, try_all
 from vergence.studies.reach_scene import Scene
 
 TITLE = "Default settings compared with the alternatives"
@@ -54,13 +54,12 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
 def study(out: Path, count: int, progress: Progress, seed: int = 0) -> StudyResult:
     """Make the study with a number of starts for each cell."""
     found: dict[str, list[Tried]] = {}
-    with processes() as pool:
+    with Workers() as pool:
         for k, name in enumerate(CELLS):
             arm = camera_arm(name)
-            found[name] = try_all(
+            found[name] = pool.try_all(
                 partial(attempt, arm, STARTS_SEED + seed),
                 count,
-                pool,
                 lambda done, k=k, name=name: progress(  # type: ignore[misc]
                     f"{count} starts of {name}", (k + done) / len(CELLS)
                 ),

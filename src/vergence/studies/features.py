@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vergence.drawing import figure, legend
+from vergence.experiments.workers import Workers
 from vergence.studies import features_visp as visp
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.ending_bars import ending_bars
@@ -17,7 +18,6 @@ from vergence.studies.features_scene import KINDS, Start, draw_start
 from vergence.studies.features_servo import Servoing, servo
 from vergence.studies.figure_files import save_figures
 from vergence.studies.ideal_loop import Ending
-from vergence.studies.processes import processes, try_all
 
 TITLE = "Servoing with every kind of feature, compared with ViSP"
 STARTS, QUICK_STARTS = 300, 20
@@ -46,8 +46,8 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     starts = [draw_start(seed, number) for number in range(count)]
     found: dict[tuple[str, str, str], list[Servoing]] = {}
     told = partial(progress, f"{count} starts")
-    with processes() as pool:
-        tried = try_all(partial(_try_start, seed), count, pool, lambda share: told(0.7 * share))
+    with Workers() as pool:
+        tried = pool.try_all(partial(_try_start, seed), count, lambda share: told(0.7 * share))
     for n, (plant, kind) in enumerate(_CASES):
         found[OURS, plant, kind] = [start[n] for start in tried]
     version = ""

@@ -1,7 +1,6 @@
 """What the constrained law and the guard promise, tried on many runs and on the hard cases."""
 
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control.limits import RELAXED
+from vergence.experiments.workers import Workers
 from vergence.robot import Arm
 from vergence.runtime import Run, RunRecorder
 from vergence.signals import OutcomeKind
@@ -30,7 +30,6 @@ from vergence.studies.guarantees_runs import (
     joint_path,
     run_ideal,
 )
-from vergence.studies.processes import processes, try_all
 
 TITLE = "Guarantees of the constrained servo and the guard"
 ATTEMPTS, ATTEMPTS_QUICK = 10_000, 400
@@ -57,12 +56,11 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     known = arms()
     puma, _, gantry, *_ = known
     count = PAIRS_QUICK if quick else PAIRS
-    with processes() as pool:
+    with Workers() as pool:
         limits, ends = _limits(ATTEMPTS_QUICK if quick else ATTEMPTS, seed, pool, progress)
-        pairs = try_all(
+        pairs = pool.try_all(
             partial(try_pair, gantry, PAIRS_SEED + seed),
             count,
-            pool,
             lambda done: progress(f"{count} random pairs", 0.4 + 0.3 * done),
         )
         faults = faults_check(known, seed, pool, lambda done: progress("faults", 0.7 + 0.05 * done))
@@ -105,14 +103,11 @@ def _try(count: int, seed: int, batch: int) -> tuple[list[Excess], Ends]:
     return [excess for _, (excess, _) in tried], ends
 
 
-def _limits(
-    count: int, seed: int, pool: ProcessPoolExecutor | None, progress: Progress
-) -> tuple[Check, Ends]:
+def _limits(count: int, seed: int, pool: Workers, progress: Progress) -> tuple[Check, Ends]:
     """Run everything at random on every core, in an order that changes nothing."""
-    batches = try_all(
+    batches = pool.try_all(
         partial(_try, count, seed),
         -(-count // BATCH),
-        pool,
         lambda done: progress(f"{count} random runs", 0.4 * done),
     )
     excess = [worst for some, _ in batches for worst in some]

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.cell import load_cell
+from vergence.experiments.workers import Workers
 from vergence.geometry import matrix_to_quaternion, so3_exp
 from vergence.robot import Arm
 from vergence.runtime import DriverWrapper, Loop
@@ -22,7 +22,6 @@ from vergence.simulation.clearance import CellClearance
 from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.check import Check
 from vergence.studies.guarantees_runs import CAMERA_MODEL, build, facing, goal, joint_path
-from vergence.studies.processes import try_all
 from vergence.studies.wrong_beliefs import WrongDepthPose
 
 OBSTACLES = ("post", "ball", "block")
@@ -132,11 +131,11 @@ def try_obstacles(seed: int, index: int, guarded: bool = True) -> Encounter:
 def collisions_check(
     count: int,
     seed: int,
-    pool: ProcessPoolExecutor | None,
+    pool: Workers,
     progress: Callable[[float], None],
 ) -> Check:
     """Return the check: no set-point of any run brings two bodies together."""
-    runs = try_all(partial(try_obstacles, seed), count, pool, progress)
+    runs = pool.try_all(partial(try_obstacles, seed), count, progress)
     penetrations = sum(run.least_m <= 0.0 for run in runs)
     return Check(
         "collision.penetrations",

@@ -2,7 +2,6 @@
 
 import signal
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
+from vergence.experiments.workers import Workers
 from vergence.planning import FixedReference
 from vergence.robot import Arm
 from vergence.runtime import Loop, Timeouts
@@ -21,7 +21,6 @@ from vergence.studies.driver_faults import DRIVER_FAULTS
 from vergence.studies.faulty_driver import FaultyDriver
 from vergence.studies.guarantees_runs import CELLS
 from vergence.studies.law_faults import LAW_FAULTS, FaultyLaw
-from vergence.studies.processes import try_all
 
 FAULTS = (*DRIVER_FAULTS, *LAW_FAULTS)
 BLIND_RUNS = 20  # for each arm
@@ -95,12 +94,12 @@ def keeps_limits(driver: FaultyDriver, to_rest: bool = True) -> bool:
 def faults_check(
     arms: tuple[Arm, ...],
     seed: int,
-    pool: ProcessPoolExecutor | None,
+    pool: Workers,
     progress: Callable[[float], None],
 ) -> Check:
     """Return the check: every fault on every arm ends by name, inside all limits until rest."""
     count = len(FAULTS) * len(arms)
-    runs = try_all(partial(try_fault, arms, seed), count, pool, progress)
+    runs = pool.try_all(partial(try_fault, arms, seed), count, progress)
     bad = sorted({FAULTS[i // len(arms)] for i, run in enumerate(runs) if not run.good})
     return Check(
         "faults.named",

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from vergence.drawing import COLORS, figure, legend
+from vergence.experiments.workers import Workers
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
 from vergence.studies.honesty_answer import Answer
-from vergence.studies.processes import processes, try_all
 
 TITLE = "Do errors agree with their stated uncertainty?"
 SCENES = {"two_views": 4000, "poses": 6000, "points": 6000, "tags": 4000}  # random scenes each
@@ -44,11 +44,10 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
         for first in range(0, count, BATCH)
     ]
     scenes = sum(last - first for _, first, last in batches)
-    with processes() as pool:
-        tried = try_all(
+    with Workers() as pool:
+        tried = pool.try_all(
             partial(_try, seed, batches),
             len(batches),
-            pool,
             lambda share: progress(f"{scenes} random scenes", share),
         )
     answers = [answer for batch in tried for answer in batch]

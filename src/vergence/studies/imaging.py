@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.drawing import COLORS, figure, legend
+from vergence.experiments.workers import Workers
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
 from vergence.studies.imaging_cases import CASES, IMAGINGS, Case, Measured, Trial, measure
-from vergence.studies.processes import processes, try_all
 
 TITLE = "Laws and trackers with a realistic camera"
 SEEDS, QUICK_SEEDS = 3, 1
@@ -43,13 +43,9 @@ def reproduce(out: Path, quick: bool, progress: Progress, seed: int = 0) -> Stud
     seeds = range(seed, seed + count)
     trials = dict.fromkeys(case.trial for case in cases)
     jobs = [(trial, imaging, k) for trial in trials for imaging in IMAGINGS for k in seeds]
-    with processes() as pool:
-        made = try_all(
-            partial(_do, jobs),
-            len(jobs),
-            pool,
-            lambda share: progress(f"{len(jobs)} runs", share),
-            at_once=1,
+    with Workers() as pool:
+        made = pool.try_all(
+            partial(_do, jobs), len(jobs), lambda share: progress(f"{len(jobs)} runs", share)
         )
     found = dict(zip(jobs, made, strict=True))
     rows = [

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from vergence.cell import Cell, load_cell
+from vergence.experiments.workers import Workers
 from vergence.studies import lippiello2005_figures as figures
 from vergence.studies.check import Progress, StudyResult
 from vergence.studies.lippiello2005_checks import checks_of
@@ -23,7 +24,6 @@ from vergence.studies.lippiello2005_trials import (
     slowed,
     start,
 )
-from vergence.studies.processes import processes, try_all
 from vergence.studies.rendered import with_imaging
 
 TITLE = "Lippiello, Siciliano and Villani (2005): eye-in-hand and eye-to-hand cameras together"
@@ -50,13 +50,9 @@ def reproduce(
     if quick:
         cell = cell.replace(perception={"noise_px": NOISE_PX})
     jobs = _jobs(cell, not quick)
-    with processes() as pool:
-        made = try_all(
-            partial(_do, jobs),
-            len(jobs),
-            pool,
-            lambda share: progress(f"{len(jobs)} runs", 0.8 * share),
-            at_once=1,
+    with Workers() as pool:
+        made = pool.try_all(
+            partial(_do, jobs), len(jobs), lambda share: progress(f"{len(jobs)} runs", 0.8 * share)
         )
     trials = dict(zip(jobs, made, strict=True))
     begun = [trials.pop(f"start {k}") for k in range(STARTS)]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vergence.cell import load_cell
+from vergence.experiments.workers import Workers
 from vergence.planning import Path as PlannedPath
 from vergence.studies import mezouar2001_figures as figures
 from vergence.studies.check import Check, Progress, StudyResult, within
@@ -30,7 +31,6 @@ from vergence.studies.mezouar2001_trials import (
     random_starts,
     wrong_beliefs,
 )
-from vergence.studies.processes import processes
 from vergence.studies.reach_scene import Scene
 from vergence.studies.rendered import with_imaging
 
@@ -60,7 +60,7 @@ def reproduce(
         seed: of the cell, the random starts and the wrong beliefs.
         imaging: of the camera, see `ImagingTable`.
         counts: random starts and wrong beliefs to try, instead of the usual numbers.
-        workers: processes for those; see `processes`.
+        workers: processes for those; see `Workers`.
     """
     cell = with_imaging(load_cell("gantry", seed=seed), imaging)
     if quick:
@@ -80,7 +80,7 @@ def reproduce(
         return lambda done: progress(what, start + done * (end - start))
 
     scene = section.scene
-    with processes(workers) as pool:
+    with Workers(workers) as pool:
         beliefs = wrong_beliefs(
             scene, counts["perturbed"], pool, share("wrong beliefs", 0.25, 0.4), seed
         )

@@ -1,6 +1,5 @@
 """[Mezouar2001] section 3.3: the joint trajectory by L_w⁻¹ as printed, and with its sign right."""
 
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -8,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.experiments.workers import Workers
 from vergence.geometry import (
     se3_inverse,
     so3_exp,
@@ -16,7 +16,6 @@ from vergence.geometry import (
 )
 from vergence.planning import Path, PotentialFieldPlanner
 from vergence.robot import Arm
-from vergence.studies.processes import try_all
 from vergence.studies.reach_scene import Scene
 
 SEED = 3  # of the draws; see `mezouar2001_trials`
@@ -31,11 +30,9 @@ class Joined(NamedTuple):
     minus: bool  # with a minus
 
 
-def join_paths(
-    scene: Scene, count: int, pool: ProcessPoolExecutor | None, seed: int = 0
-) -> list[Joined]:
+def join_paths(scene: Scene, count: int, pool: Workers, seed: int = 0) -> list[Joined]:
     """Follow the paths of random starts in the joints; those without a path are left out."""
-    tried = try_all(partial(_join, scene, seed), count, pool)
+    tried = pool.try_all(partial(_join, scene, seed), count)
     return [one for one in tried if one is not None]
 
 

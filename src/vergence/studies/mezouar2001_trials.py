@@ -2,16 +2,15 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from vergence.experiments.workers import Workers
 from vergence.planning import proves_no_path
 from vergence.studies.ideal_loop import Ending, Motion
 from vergence.studies.mezouar2001_methods import METHODS, Belief, Method, servo
-from vergence.studies.processes import try_all
 from vergence.studies.reach_scene import Scene
 
 NOISE_PX = 0.3
@@ -76,23 +75,23 @@ def random_starts(
     scene: Scene,
     roll_deg: tuple[float, float] | None,
     count: int,
-    pool: ProcessPoolExecutor | None = None,
+    pool: Workers,
     progress: Callable[[float], None] = lambda _share: None,
     seed: int = 0,
 ) -> list[Trial]:
     """Return what came of a number of random starts."""
-    return try_all(partial(try_start, scene, roll_deg, seed=seed), count, pool, progress)
+    return pool.try_all(partial(try_start, scene, roll_deg, seed=seed), count, progress)
 
 
 def wrong_beliefs(
     scene: Scene,
     count: int,
-    pool: ProcessPoolExecutor | None = None,
+    pool: Workers,
     progress: Callable[[float], None] = lambda _share: None,
     seed: int = 0,
 ) -> list[End]:
     """Return what came of a number of wrong beliefs with the planner to use."""
-    return try_all(partial(try_belief, scene, "optimised", seed=seed), count, pool, progress)
+    return pool.try_all(partial(try_belief, scene, "optimised", seed=seed), count, progress)
 
 
 def endings(trials: Sequence[Trial], method: str) -> Counter[Ending]:

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from vergence.experiments.workers import Workers
 from vergence.signals import OutcomeKind
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
 from vergence.studies.photograph_figures import TOLERANCE_DEG, TOLERANCE_M, End, ends, errors
 from vergence.studies.photograph_methods import Method
 from vergence.studies.photograph_trials import TrialResult, run_trial
-from vergence.studies.processes import processes, try_all
 
 TRIALS, QUICK = 200, 20
 COMPARED, COMPARED_QUICK = 40, 2  # of the trials, by each of the other methods
@@ -31,11 +31,11 @@ def reproduce(
     counts[Method.OPTIMISED] = QUICK if quick else TRIALS
     total = sum(counts.values())
     found: dict[Method, list[TrialResult]] = {}
-    with processes() as pool:
+    with Workers() as pool:
         for method, count in counts.items():
             told = partial(_tell, progress, method, sum(map(len, found.values())), count, total)
-            found[method] = try_all(
-                partial(run_trial, seed, method, imaging=imaging), count, pool, told
+            found[method] = pool.try_all(
+                partial(run_trial, seed, method, imaging=imaging), count, told
             )
     return result_of(found, out, seed)
 

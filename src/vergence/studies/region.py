@@ -11,11 +11,11 @@ from vergence.arrays import FloatArray
 from vergence.drawing import COLORS, figure, legend
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting, Step
 from vergence.estimation.unseen_turns import pose_error
+from vergence.experiments.workers import Workers
 from vergence.geometry import so3_exp
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
 from vergence.studies.honesty_answer import deviations_of
-from vergence.studies.processes import processes, try_all
 from vergence.studies.region_films import CAMERA, RATE_HZ, film
 from vergence.studies.region_objects import OBJECTS
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker
@@ -59,11 +59,10 @@ def reproduce(
     objects = list(OBJECTS)[: _QUICK_OBJECTS if quick else None]
     films = [(name, condition) for name in objects for condition in CONDITIONS]
     frames = QUICK_FRAMES if quick else FRAMES
-    with processes() as pool:
-        tried = try_all(
+    with Workers() as pool:
+        tried = pool.try_all(
             partial(_follow, films, frames, seed, imaging),
             len(films),
-            pool,
             lambda share: progress(f"{len(films)} films of {frames} images", share),
         )
     images = [image for followed in tried for image in followed]

@@ -8,7 +8,6 @@ from tempfile import mkdtemp
 
 from vergence.errors import InputError, VergenceError, nearest
 from vergence.studies.check import Progress, StudyResult
-from vergence.studies.processes import processes, try_all
 from vergence.studies.rendered import check_imaging
 
 PAPERS = (
@@ -66,13 +65,14 @@ def reproduce(
     out = Path(folder if folder is not None else mkdtemp(prefix=f"{paper}-"))
     if seeds == 1:
         return _study(paper, out, quick, seed, imaging, progress)
+    from vergence.experiments.workers import Workers
     from vergence.studies.spread import over_seeds
 
-    with processes(workers) as pool:
+    with Workers(workers) as pool:
         told = f"{seeds} seeds"
         progress(told, 0.0)
         one = partial(_one_of_many, paper, out, quick, seed, imaging)
-        results = try_all(one, seeds, pool, lambda share: progress(told, share), at_once=1)
+        results = pool.try_all(one, seeds, lambda share: progress(told, share))
     return over_seeds(dict(enumerate(results, seed)))
 
 

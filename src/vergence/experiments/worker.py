@@ -1,0 +1,95 @@
+"""A process of this machine that does tasks which another one gives it."""
+
+import logging
+import os
+import signal
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from threading import Thread
+from time import process_time
+from typing import Any
+
+_END_S = 5.0  # that a process has to end by itself
+# Most of what a run needs, imported once for all processes. Not MuJoCo: it opens an EGL display,
+# and drivers of graphics cards do not survive that a process is copied.
+IMPORTED = (
+    "vergence.planning",
+    "vergence.runtime",
+    "vergence.estimation.object_follower",
+)
+
+
+@dataclass(slots=True)
+class Worker:
+    """One process: it shares what was imported before it was made, and ends with its parent."""
+
+    process: BaseProcess
+    connection: "Connection[Any, Any]"  # gives (error or None, result, CPU time in s) of a task
+    number: int = -1  # of its task
+
+    @classmethod
+    def start(cls) -> "Worker":
+        """Start a process, which Ctrl-C does not reach."""
+        context = get_context("forkserver")
+        context.set_forkserver_preload(list(IMPORTED))
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_work, args=(theirs,), daemon=True)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # they inherit this
+        try:
+            process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            theirs.close()
+        return cls(process, ours)
+
+    def give(self, number: int, do: Callable[[Any], Any], task: Any) -> None:
+        """Let it do a task: call a function that can be sent to it, with an argument."""
+        self.number = number
+        with suppress(OSError):  # of one that has died, which is found out when it should answer
+            self.connection.send((do, task))
+
+    def end(self) -> None:
+        """Wait until it has ended; an idle one does so by itself."""
+        self.connection.close()
+        self.process.join(_END_S)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+        self.process.close()
+
+
+def _work(connection: "Connection[Any, Any]") -> None:
+    """Do tasks until the other process closes the connection or is gone."""
+    import numba
+
+    logging.getLogger("vergence").setLevel(logging.ERROR)  # that process warns, too, and once
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    numba.set_num_threads(1)  # the other cores are those of other processes
+    Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            do, task = connection.recv()
+        except (EOFError, OSError):
+            return
+        error, result, began_s = None, None, process_time()
+        try:
+            result = do(task)
+        except KeyboardInterrupt:  # terminated amid a run
+            return
+        except Exception as raised:
+            raised.add_note(f"In a process of its own:\n{traceback.format_exc()}")
+            error = raised
+        with suppress(OSError):
+            connection.send((error, result, process_time() - began_s))
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent is gone, whatever it does."""
+    if (parent := parent_process()) is not None:
+        wait([parent.sentinel])
+        os._exit(1)
