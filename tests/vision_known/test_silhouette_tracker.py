@@ -10,8 +10,9 @@ from vergence.errors import InputError
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
 from vergence.geometry import se3, so3_exp
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, free_axes, shown_by_edges
-from vergence.vision.known_object.contour_fit import fit_contour
+from vergence.vision.known_object.contour_fit import fit_contour, outline_motion
 from vergence.vision.known_object.contour_lines import BEYOND, REACH, ContourLines, read_lines
+from vergence.vision.known_object.pose_fit import moved_pose
 from vergence.vision.known_object.primitives import cylinder, ellipsoid
 from vergence.vision.known_object.silhouette import Outline, outline_of
 from vergence.vision.known_object.weak_turns import ELLIPSOID, USUAL, least_shown_of
@@ -87,6 +88,23 @@ def test_lines_that_err_alike_do_not_draw_the_outline_along(seed: int) -> None:
     # What moved as a whole is followed as a whole.
     shift = np.array((0.8, -0.5))
     assert fitted(noise + outline.normals @ shift) == pytest.approx(shift + fitted(noise), abs=0.15)
+
+
+def test_the_motion_of_an_outline_has_the_slopes_that_are_stated() -> None:
+    T, lens = (
+        se3(so3_exp(np.array((0.2, -0.1, 0.3))), np.array((0.02, -0.01, 0.35))),
+        pack_lens(CAMERA),
+    )
+    outline = outline_of(T, lens, BALL.vertices, BALL.triangles, True, 60)
+    assert outline is not None
+    moved, slopes = outline_motion(T, lens, outline)
+    assert np.abs(moved).max() < 1e-9
+    for axis, step in enumerate(1e-6 * np.eye(6)):
+        ahead, _ = outline_motion(moved_pose(T, step), lens, outline)
+        behind, _ = outline_motion(moved_pose(T, -step), lens, outline)
+        assert (ahead - behind) / 2e-6 == pytest.approx(slopes[:, axis], rel=1e-5, abs=1e-3)
+    away = se3(np.eye(3), np.array((0.0, 0.0, -1.0)))
+    assert np.isnan(outline_motion(away, lens, outline)[0]).all()
 
 
 def test_one_image_gives_the_place_of_a_ball_and_none_of_its_turns(

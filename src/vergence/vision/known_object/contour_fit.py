@@ -46,31 +46,26 @@ def fit_contour(
         iterations: how many steps.
     """
     T = T_start.copy()
-    rows = np.empty((2, 6))
     for _ in range(iterations):
         A, b = prior.copy(), prior @ pose_difference(T_prior, T)
-        runs = means_of_runs(residuals_of(T, lens, outline, lines), outline, lines, weights)
+        moved, slopes = outline_motion(T, lens, outline)
+        residuals = lines.offsets_px - moved
+        runs = means_of_runs(residuals, outline, lines, weights)
         run_tolerance = max(_RUN_PX, 2.0 * np.median(np.abs(runs)))
         for n in range(len(weights)):
-            weight = weights[n] * lines.information[n]
-            if weight <= 0.0:
+            weight, residual = weights[n] * lines.information[n], residuals[n]
+            if weight <= 0.0 or np.isnan(residual):
                 continue
-            nu, nv = outline.normals[n]
-            u, v, depth = pixel_rows(T, lens, outline.points[n], rows)
-            if not depth > 0.0:
-                continue
-            moved = nu * (u - outline.points_px[n, 0]) + nv * (v - outline.points_px[n, 1])
-            residual = lines.offsets_px[n] - moved
             # What is in front of the object moves the contour inward; only a background of its
             # colours moves it outward.
             tolerance = tolerance_px if residual > 0.0 else _INWARD * tolerance_px
             weight /= (1.0 + (residual / tolerance) ** 2) ** 2
             weight /= (1.0 + (runs[n] / run_tolerance) ** 2) ** 2
             for i in range(6):
-                slope = nu * rows[0, i] + nv * rows[1, i]
+                slope = slopes[n, i]
                 b[i] += weight * slope * residual
                 for k in range(i + 1):
-                    A[i, k] += weight * slope * (nu * rows[0, k] + nv * rows[1, k])
+                    A[i, k] += weight * slope * slopes[n, k]
         factor_spd(A)
         solve_factored(A, b)
         T = moved_pose(T, b)
@@ -112,17 +107,29 @@ def means_of_runs(
 
 
 @njit(cache=True)
-def residuals_of(
-    T: FloatArray, lens: FloatArray, outline: Outline, lines: ContourLines
-) -> FloatArray:
-    """Return how far outside the outline under a pose each line finds the contour, (N,), px."""
-    residuals, rows = np.empty(len(lines.offsets_px)), np.empty((2, 6))
-    for n in range(len(residuals)):
+def outline_motion(
+    T: FloatArray, lens: FloatArray, outline: Outline
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far the places of an outline move across it, and how that depends on the pose.
+
+    Args:
+        T: the pose that they move to, (4, 4).
+        lens: packed camera, (11,).
+        outline: where they are.
+
+    Returns:
+        outward motion (N,), px, NaN behind the camera; its derivative by (δp, δθ), (N, 6), px per
+        m and rad.
+    """
+    count = len(outline.points)
+    moved, slopes, rows = np.empty(count), np.empty((count, 6)), np.empty((2, 6))
+    for n in range(count):
+        nu, nv = outline.normals[n]
         u, v, _ = pixel_rows(T, lens, outline.points[n], rows)
-        moved = outline.normals[n, 0] * (u - outline.points_px[n, 0])
-        moved += outline.normals[n, 1] * (v - outline.points_px[n, 1])
-        residuals[n] = lines.offsets_px[n] - moved
-    return residuals
+        moved[n] = nu * (u - outline.points_px[n, 0]) + nv * (v - outline.points_px[n, 1])
+        for i in range(6):
+            slopes[n, i] = nu * rows[0, i] + nv * rows[1, i]
+    return moved, slopes
 
 
 @njit(cache=True)
@@ -156,14 +163,3 @@ def contour_points(
         covariances[n, 1, 1] = across * nv * nv + SLIDING_PX**2 * nu * nu
         covariances[n, 0, 1] = covariances[n, 1, 0] = (across - SLIDING_PX**2) * nu * nv
     return points, measured, covariances
-
-
-@njit(cache=True)
-def contour_slopes(T: FloatArray, lens: FloatArray, outline: Outline) -> FloatArray:
-    """Return how each place moves across the outline with (δp, δθ), (N, 6), px per m and rad."""
-    slopes, rows = np.empty((len(outline.points), 6)), np.empty((2, 6))
-    for n in range(len(slopes)):
-        pixel_rows(T, lens, outline.points[n], rows)
-        for i in range(6):
-            slopes[n, i] = outline.normals[n, 0] * rows[0, i] + outline.normals[n, 1] * rows[1, i]
-    return slopes

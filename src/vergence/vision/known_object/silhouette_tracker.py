@@ -19,10 +19,9 @@ from vergence.vision.known_object.color_model import (
 )
 from vergence.vision.known_object.contour_fit import (
     contour_points,
-    contour_slopes,
     fit_contour,
     means_of_runs,
-    residuals_of,
+    outline_motion,
 )
 from vergence.vision.known_object.contour_lines import (
     REACH,
@@ -248,7 +247,8 @@ class SilhouetteTracker:
         outline: Outline,
         lines: ContourLines,
     ) -> SilhouetteMeasurement:
-        residuals = residuals_of(T, lens, outline, lines)
+        moved, slopes = outline_motion(T, lens, outline)
+        residuals = lines.offsets_px - moved
         runs = means_of_runs(residuals, outline, lines, _weights(lines))
         found = (
             lines.usable
@@ -256,7 +256,7 @@ class SilhouetteTracker:
             & (lines.information > _CLEAR)
             & (lines.deep_odds > _DEEP_ODDS)
         )
-        slopes = contour_slopes(T, lens, outline)[found]
+        slopes = slopes[found]
         learned = found & (lines.deep_odds > _LEARNED_ODDS)
         covered = lines.usable & (lines.deep_odds < -_LEARNED_ODDS)
         unseen, shared = self._unseen(T, lens, slopes), _shared_error(slopes, self.bias_px)

@@ -11,7 +11,7 @@ from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
 from vergence.geometry import se3, so3_exp
-from vergence.vision.known_object.contour_fit import contour_slopes
+from vergence.vision.known_object.contour_fit import outline_motion
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import outline_of
 from vergence.vision.known_object.symmetry import FreeAxes
@@ -58,7 +58,7 @@ def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
         outline = outline_of(T, lens, model.vertices, model.triangles, closed, _PLACES)
         if outline is None:  # thinner than a cell
             continue
-        squares, _ = _shown(contour_slopes(T, lens, outline), axes.motions(T))
+        squares, _ = _shown(outline_motion(T, lens, outline)[1], axes.motions(T))
         if len(squares):
             least.append(np.sqrt(max(squares[0], 0.0)) * T[2, 3] / (0.5 * model.size * lens[0]))
     return ELLIPSOID if least and float(np.median(least)) < _LIKE_ELLIPSOID else USUAL
