@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.overlay import FOUND, LOST
+from vergence.app.tracking.banner import draw_banner
 from vergence.app.tracking.curve_follower import CurveFollower, CurveStep
 from vergence.arrays import FloatArray, ImageArray
 
 _SHIFT = 4  # fractional bits of a place
 _INK = (20, 20, 20)
-_FONT, _SCALE = 0, 0.4
-_LINE_PX, _LETTER_PX = 15, 7
+_FONT, _SCALE = 0, 0.4  # OpenCV's plain one
+_MARGIN_PX = (4, 15, 12, 6)  # of its place to the left, top, right and bottom
 
 
 def draw_curves(
@@ -43,13 +44,7 @@ def draw_curves(
         _label(canvas, str(follower.number), outlines[0].points_px.mean(axis=0), color)
         if step.reason:
             words.append(f"{follower.title}: {step.reason}")
-    cv2.rectangle(
-        canvas, (0, 0), (_LETTER_PX * max(map(len, words)) + 8, _LINE_PX * len(words) + 4), 0, -1
-    )
-    for row, line in enumerate(words, 1):
-        cv2.putText(
-            canvas, line, (4, _LINE_PX * row - 2), _FONT, _SCALE, (255,) * 3, 1, cv2.LINE_AA
-        )
+    draw_banner(canvas, words)
     return canvas
 
 
@@ -60,6 +55,7 @@ def _label(
     import cv2
 
     height, width = canvas.shape[:2]
-    u, v = np.clip(place_px, (4, _LINE_PX), (width - 12, height - 6)).astype(int).tolist()
+    left, top, right, bottom = _MARGIN_PX
+    u, v = np.clip(place_px, (left, top), (width - right, height - bottom)).astype(int).tolist()
     for ink, thickness in ((_INK, 3), (color, 1)):
         cv2.putText(canvas, text, (u, v), _FONT, _SCALE, ink, thickness, cv2.LINE_AA)

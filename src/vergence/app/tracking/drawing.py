@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.overlay import DESIRED, FOUND, LOST
+from vergence.app.tracking.banner import draw_banner
 from vergence.app.tracking.tag_follower import Shown
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
@@ -51,9 +52,7 @@ def draw_step(
     for place, found in zip(step.samples_px, step.samples_found, strict=True):
         if not found:
             cv2.circle(canvas, _fixed(place), 1 << _SHIFT, LOST, -1, cv2.LINE_AA, _SHIFT)
-    words = f"{step.time:.2f} s  {step.sighting.value}  {step.share:.0%}"
-    cv2.rectangle(canvas, (0, 0), (10 + 9 * len(words), 24), (0, 0, 0), -1)
-    cv2.putText(canvas, words, (8, 17), 0, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+    draw_banner(canvas, [f"{step.time:.2f} s  {step.sighting.value}  {step.share:.0%}"])
     return canvas
 
 
