@@ -105,8 +105,8 @@ def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsy
 def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsys, body) -> None:
     assert command("new", ARMS[6][0], "--body", body) == 2
     said = capsys.readouterr().err
-    assert "the last of each branch: flange" in said
-    assert ("no body is named; needed" in said) == (body == "")
+    assert "the last of each branch: flange; all bodies: " in said
+    assert ("no body is named; needed: the last body of the arm; " in said) == (body == "")
 
 
 def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:

@@ -119,5 +119,5 @@ def _drop_meshes(spec: Any, path: Path) -> None:
     if faults:
         spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
         name, fault = next(iter(faults.items()))
-        others = f" (and {len(faults) - 1} more meshes)" if len(faults) > 1 else ""
+        others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         _LOG.warning("%s: drawn without mesh %s, which %s%s", path, name, fault, others)

@@ -69,7 +69,7 @@ def report_faults(shapes: Shapes, needed: bool) -> None:
     more = len(shapes.undrawn) - _NAMED
     names += f" and {more} more" if more > 0 else ""
     faults = dict.fromkeys(fault for faults in shapes.undrawn.values() for fault in faults)
-    others = f" (and {len(faults) - 1} more meshes)" if len(faults) > 1 else ""
+    others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if needed:
         given = next(iter(faults)) + others
         raise InputError(str(shapes.path), f"shapes of {names}", given, "meshes that can be drawn")

@@ -97,7 +97,9 @@ def _compile(path: Path, body: str) -> Any:
         bodies = {one.name: one for one in spec.bodies if one.name and one.name != "world"}
         if body not in bodies:
             ends = ", ".join(name for name, one in bodies.items() if not one.bodies)
-            allowed = f"{nearest(body, bodies)}; the last of each branch: {ends}"
+            allowed = f"the last of each branch: {ends}; all bodies: {nearest(body, bodies)}"
+            if not body:
+                allowed = f"the last body of the arm; {allowed}"
             raise InputError(str(path), "--body", body or Absent("no body is named"), allowed)
         named_joints(bodies[body])
         return spec.compile()
