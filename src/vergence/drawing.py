@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # Okabe and Ito's palette, yellow left out: distinguished by colour-blind readers, seen on white.
@@ -78,6 +79,17 @@ def legend(axes: "Axes") -> None:
             frameon=False,
             fontsize=8.5,
         )
+
+
+def logarithmic(axes: "Axes", name: str) -> None:
+    """Make an axis, "x" or "y", logarithmic, with ticks at 1, 2 and 5 times the powers of ten."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set(**{f"{name}scale": "log"})
+    axis: Axis = getattr(axes, f"{name}axis")
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter("{x:g}")
 
 
 def save(drawn: "Figure", path: Any) -> None:

@@ -26,7 +26,7 @@ from vergence.app.figures import (
 from vergence.app.figures.arm import normalized
 from vergence.app.figures.axis import range_of, thinned, ticks
 from vergence.app.figures.chart_svg import LEFT, RIGHT, WIDTH
-from vergence.drawing import COLORS, DARK, LIMIT, figure, legend, svg
+from vergence.drawing import COLORS, DARK, LIMIT, figure, legend, logarithmic, svg
 from vergence.geometry import se3_exp
 from vergence.runtime import ArmInfo
 from vergence.runtime.recording import Recording
@@ -287,3 +287,16 @@ def test_every_colour_of_a_figure_has_a_counterpart_on_a_dark_system() -> None:
     assert used <= set(DARK)
     for light in used:
         assert f'[style*="fill: {light}"]{{fill:{DARK[light]}!important}}' in drawing
+
+
+@pytest.mark.parametrize("span", [(0.4, 3.0), (11.0, 47.0), (1e-3, 90.0)])
+def test_a_logarithmic_axis_names_more_than_one_of_its_values(span: tuple[float, float]) -> None:
+    drawn, (axes,) = figure(7.0, 2.0)
+    logarithmic(axes, "x")
+    axes.plot(span, (0.0, 1.0))
+    drawn.draw_without_rendering()
+    low, high = axes.get_xlim()
+    ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+    named = [label.get_text() for place, label in ticks if low <= place <= high]
+    assert len(named) > 1
+    assert all(named)

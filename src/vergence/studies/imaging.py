@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vergence.drawing import COLORS, figure, legend
+from vergence.drawing import COLORS, figure, legend, logarithmic
 from vergence.experiments.workers import Workers
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
@@ -137,9 +137,7 @@ def _drawing(rows: Sequence[Row]) -> Any:
         )  # fmt: skip
     axes.set_yticks(range(len(rows)), names)
     axes.invert_yaxis()
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter("")
+    logarithmic(axes, "x")
     axes.set_xlabel("final error")
     axes.grid(visible=False, axis="y")
     legend(axes)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vergence.drawing import COLORS, curve, figure, legend
+from vergence.drawing import COLORS, curve, figure, legend, logarithmic
 from vergence.signals import OutcomeKind
 from vergence.studies.photograph_methods import Method
 from vergence.studies.photograph_trials import SCENES, TrialResult
@@ -54,8 +54,7 @@ def errors(results: Sequence[TrialResult]) -> Any:
         end = [1e3 * r.final_m for r in reached]
         axes.plot(start, end, "o", color=curve(index)["color"], markersize=4, label=scene)
     axes.axhline(1e3 * TOLERANCE_M, color="#888", linestyle="--")
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
+    logarithmic(axes, "y")
     axes.set_xlabel("distance at the start (mm)")
     axes.set_ylabel("distance at the end (mm)")
     legend(axes)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.drawing import COLORS, figure, legend
+from vergence.drawing import COLORS, figure, legend, logarithmic
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting, Step
 from vergence.estimation.unseen_turns import pose_error
 from vergence.experiments.workers import Workers
@@ -144,7 +144,7 @@ def checks_of(images: Sequence[Followed]) -> tuple[Check, ...]:
             "of the turns that show",
         ),
         Check(
-            "region.seen_share", f"seen in at least {_LEAST_SEEN:.0%} of the images", share, "",
+            "region.seen_share", f"seen in at least {_LEAST_SEEN:g} of the images", share, "",
             within(share, _LEAST_SEEN), note,
         ),
         Check(
@@ -210,9 +210,7 @@ def _errors(images: Sequence[Followed]) -> Any:
                 markevery=[0], markersize=4, label=label,
             )  # fmt: skip
     axes.set_yticks(range(len(names)), names)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter("")
+    logarithmic(axes, "x")
     axes.set_xlabel("error of the position (mm)")
     axes.grid(visible=False, axis="y")
     legend(axes)
