@@ -1,5 +1,6 @@
 """The directive ``command-line``: every command with its options, from the program itself."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -34,7 +35,7 @@ def _group(group: Any, name: str) -> Iterator[str]:
 
 
 def _command(command: Any, name: str) -> Iterator[str]:
-    yield from (f"## {name}", "", *(command.help or "").split("\n"), "")
+    yield from (f"## {name}", "", *_meaning(command.help or "").split("\n"), "")
     arguments = [p for p in command.params if not p.opts[0].startswith("-")]
     usage = "".join(
         f" {p.name.upper()}" if p.required else f" [{p.name.upper()}]" for p in arguments
@@ -45,7 +46,7 @@ def _command(command: Any, name: str) -> Iterator[str]:
         yield from (f"{word}: `{example}`", "")
     yield from ("| | meaning | default |", "|---|---|---|")
     for parameter in command.params:
-        cells = (_name(parameter), parameter.help or "", _default(parameter))
+        cells = (_name(parameter), _meaning(parameter.help or ""), _default(parameter))
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
     yield ""
 
@@ -56,6 +57,11 @@ def _name(parameter: Any) -> str:
     names = "`, `".join([*parameter.opts, *parameter.secondary_opts])
     value = "" if parameter.is_flag else f" {parameter.metavar or _kind(parameter)}"
     return f"`{names}{value}`"
+
+
+def _meaning(text: str) -> str:
+    """Return a help text with its options as code: elsewhere two hyphens become a dash."""
+    return re.sub(r"(?<![\w`-])--[a-z][a-z-]*", r"`\g<0>`", text)
 
 
 def _kind(parameter: Any) -> str:

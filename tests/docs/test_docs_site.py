@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from cell_file import reference
+from command_line import reference as commands
 from gallery import gallery
 
 import vergence
@@ -58,6 +59,13 @@ def test_every_table_of_a_cell_file_has_a_section_with_its_keys():
         if name.endswith("Table") and name not in made_of:
             keys = set(getattr(schema, name).model_fields)
             assert keys - {"kind"} in shown, name
+
+
+def test_options_that_a_command_mentions_are_code():
+    """Text in which two hyphens are typeset as a dash cannot be copied."""
+    text = re.sub(r"```.*?```|`[^`]*`", "", "\n".join(commands()), flags=re.DOTALL)
+    assert "Instead of" in text
+    assert [line for line in text.splitlines() if re.search(r"--[a-z]", line)] == []
 
 
 def test_the_gallery_has_every_cell_with_its_image():
