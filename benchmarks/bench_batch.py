@@ -1,4 +1,4 @@
-"""Closed-loop runs of the first paper's tracker: in the batch kernel, and in the loop beside it."""
+"""Closed-loop runs of several laws: in the batch kernel, and in the loop beside it."""
 
 import time
 from collections import deque
@@ -13,13 +13,15 @@ from vergence.assembly import Parts, assemble_parts
 from vergence.cell import load_cell
 from vergence.experiments import CellSource, Executor, Sampling, run_trials, start_trials
 from vergence.experiments.batch import KinematicRun, run_batch
-from vergence.experiments.batch.closed_loop import closed_loops
-from vergence.experiments.batch.run_batch import empty_records, pack
+from vergence.experiments.batch.closed_loop import closed_loop
+from vergence.experiments.batch.run_batch import empty_record, pack
+from vergence.experiments.kinematic import KinematicRuns
 from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 
 RUN_S, RUNS = 25.0, 500
 SHARED = 200  # runs of 5 s that two workers share
-TICKS = 750  # of a run, at 30 Hz
+RATE_HZ = 30.0  # of images
+LAWS = ("image_based", "constrained")
 
 
 def first_papers_run() -> KinematicRun:
@@ -41,6 +43,14 @@ def first_papers_run() -> KinematicRun:
         latency_frames=cell.cameras[camera].latency_frames,
     )
     return KinematicRun(ideal, parts.law, desired, RUN_S)
+
+
+def preset_run(law: str) -> KinematicRun:
+    """A UR5 that follows a board that wanders and tilts, for 5 s."""
+    source = CellSource.changed("ur5", {"duration_s": 5.0})
+    cell = source.load()
+    trial = start_trials(cell, [law], 1, 0, Sampling(("starts",)))[0]
+    return KinematicRuns().run_of(cell.replace(**trial.changes))
 
 
 def runs_a_second(run: KinematicRun) -> float:
@@ -74,31 +84,41 @@ def sooner_by_two_workers() -> float:
     return took[0] / took[1]
 
 
-def block(whole_run: Callable[[], object]) -> Block:
+def block(whole_run: Callable[[], object], ticks: int) -> Block:
     """A block whose calls are ticks, by the time this thread was at work."""
 
     def seconds(count: int) -> float:
-        runs = ceil(count / TICKS)
+        runs = ceil(count / ticks)
         start = time.thread_time()
         for _ in range(runs):
             whole_run()
-        return (time.thread_time() - start) / (runs * TICKS)
+        return (time.thread_time() - start) / (runs * ticks)
 
     return seconds
 
 
+def ticks_of(run: KinematicRun) -> tuple[Block, Peer]:
+    """Ticks of a run in the kernel, and in the loop."""
+    inputs, ticks = pack(run), int(run.duration_s * RATE_HZ)
+    record = empty_record(inputs)
+    return (
+        block(lambda: closed_loop(inputs, record), ticks),
+        Peer("the loop in Python", block(run.in_loop, ticks)),
+    )
+
+
 def run() -> list[dict[str, Any]]:
     one = first_papers_run()
-    inputs = pack([one])
-    records = empty_records(inputs)
-    kernel = block(lambda: closed_loops(inputs, records))
-    loop = Peer("the loop in Python", block(one.in_loop))
     return [
-        row("batch: closed-loop tick, CPU time", kernel, loop, value_aim=2.5),
+        row("batch: closed-loop tick, CPU time", *ticks_of(one), value_aim=2.5),
+        *(
+            row(f"batch: closed-loop tick, {law} law, CPU time", *ticks_of(preset_run(law)))
+            for law in LAWS
+        ),
         measured("batch: runs of 25 s on all cores", runs_a_second(one), "runs/s"),
         *(
             measured(f"campaign: runs of 5 s, {law} law, a core", runs_a_cpu_second(law), "runs/s")
-            for law in ("image_based", "constrained")
+            for law in LAWS
         ),
         measured(
             "campaign: two workers, by the wall", sooner_by_two_workers(), "× one", at_least=1.8

@@ -95,8 +95,22 @@ def test_an_installed_package_offers_parts_by_entry_points(monkeypatch) -> None:
     point = EntryPoint("objective.straight", "vergence.control:PointPose", registry.ENTRY_POINTS)
     monkeypatch.setattr(registry, "entry_points", lambda group: [point])
     assert "straight" in registry.kinds("objective")
+    assert "straight" not in registry.kinds("solver")
     settings = ServoSettings.from_table({"kind": "straight"}, Place("cell.toml", "law", None))
     assert type(settings.objective).__name__ == "PointPose"
+
+
+def test_the_entry_points_are_read_once(monkeypatch) -> None:
+    reads: list[str] = []
+
+    def read(group: str) -> list[EntryPoint]:
+        reads.append(group)
+        return []
+
+    monkeypatch.setattr(registry, "entry_points", read)
+    for role in ("objective", "solver", "objective"):
+        registry.kinds(role)
+    assert reads == [registry.ENTRY_POINTS]
 
 
 @pytest.mark.parametrize("role", [role for role, parts in registry.BUILT_IN.items() if parts])

@@ -6,9 +6,10 @@ Nothing is imported before it is asked for.
 import importlib
 import importlib.util
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from hashlib import sha256
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
@@ -192,9 +193,15 @@ def _installed(role: str) -> dict[str, str]:
     begin = f"{role}."
     return {
         point.name.removeprefix(begin): point.value
-        for point in entry_points(group=ENTRY_POINTS)
+        for point in _entry_points(entry_points)
         if point.name.startswith(begin)
     }
+
+
+@cache
+def _entry_points(read: Callable[..., Iterable[EntryPoint]]) -> tuple[EntryPoint, ...]:
+    """Return the entry points of installed packages; reading them takes as long as a short run."""
+    return tuple(read(group=ENTRY_POINTS))
 
 
 def _own_module(name: str, *folders: Path | None) -> Any:

@@ -1,13 +1,16 @@
 """The guard brakes an arm before its bodies touch, whatever rates it is asked for."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
 from vergence.cell import load_cell
 from vergence.control import ClearBraking, Guard
-from vergence.control.limits import braked, braking_rows, collision_rows
+from vergence.control.limits import CollisionLimit, braked, braking_rows, collision_rows
 from vergence.experiments.stays_clear import stays_clear
 from vergence.robot import NearPairs
+from vergence.signals import Setpoint
 from vergence.simulation.cell_model import CellModel
 from vergence.simulation.clearance import CellClearance
 
@@ -63,6 +66,27 @@ def test_an_arm_at_rest_stops_where_it_is(model):
         np.testing.assert_allclose(ours, plain, atol=1e-12)
 
 
+def test_the_limit_is_idle_where_its_rows_hold_and_nowhere_else(model):
+    cell, arm = model.cell, model.arms["panda"]
+    clearance = CellClearance(model, "panda", cell.collision.avoid, cell.collision.margin_m)
+    limit = CollisionLimit(clearance, 2.0, arm.acceleration_max, 1 / 30)
+    q, rng, found = model.joint_position("panda"), np.random.default_rng(9), [0, 0]
+    for k in range(300):
+        size = arm.rate_max * 0.02 ** (k % 3)
+        velocity, rates = size * rng.uniform(-1.0, 1.0, (2, 4, arm.joint_count))
+        q = q + 0.02 * rng.uniform(-1.0, 1.0, arm.joint_count)
+        way = q + np.cumsum(0.01 * rng.uniform(-1.0, 1.0, (4, arm.joint_count)), axis=0)
+        rows = [
+            (C @ after, d)
+            for at, before, after in zip(way, velocity, rates, strict=True)
+            for C, d in limit.rows(clearance.near(at), at, before)
+        ]
+        holds = all((value >= d - 1e-10).all() for value, d in rows)
+        assert limit.is_idle(way, velocity, rates) is holds
+        found[holds] += 1
+    assert min(found) > 20
+
+
 def test_a_run_stays_clear_where_the_guard_would_not_brake_and_nowhere_else(model):
     cell, arm = model.cell, model.arms["panda"]
     q0, rng, per_image = model.joint_position("panda"), np.random.default_rng(82), 4
@@ -70,15 +94,17 @@ def test_a_run_stays_clear_where_the_guard_would_not_brake_and_nowhere_else(mode
     dt, hindered, clear = 1 / 30 / per_image, 0, 0
     for speed in np.linspace(0.02, 1.0, 12):
         checked = Guard(arm, q0, dt, ClearBraking(arm, clearance, dt))
-        asked = []
+        asked, reached = [], []
         way = speed * rng.uniform(-1.0, 1.0, arm.joint_count)
         for _ in range(45):
             rates = arm.rate_max * (way + 0.02 * rng.normal(size=arm.joint_count))
+            reached.append(checked.setpoint)
             for _ in range(per_image):
                 checked.step(rates)
             asked.append(rates)
         ticks = np.full(len(asked), per_image)
-        found = stays_clear(clearance, arm, q0, dt, np.array(asked), ticks)
+        setpoints = Setpoint(*map(np.array, zip(*map(astuple, reached), strict=True)))
+        found = stays_clear(clearance, arm, dt, setpoints, np.array(asked), ticks)
         assert found is not bool(checked.hindrance)
         hindered += bool(checked.hindrance)
         clear += found

@@ -8,14 +8,13 @@ import pytest
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control import (
-    ImageBased,
     MotionSettings,
     OptimalTracking,
     PseudoInverse,
     Servo,
     Situation,
 )
-from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
+from vergence.experiments.batch import BatchTrace, KinematicRun, run_batch
 from vergence.geometry import se3, so3_exp
 from vergence.runtime import Run
 from vergence.signals import OutcomeKind
@@ -89,6 +88,7 @@ def check_same(trace: BatchTrace, run: Run) -> None:
     camera = run.cameras[CAMERA_NAME]
     looped = {
         "position": run.arms["arm"].position,
+        "velocity": run.arms["arm"].setpoint_rate,
         "times": camera.time,
         "points_px": camera.true_px,
         "camera_m": camera.T_world_camera[:, :3, 3],
@@ -129,13 +129,3 @@ def test_one_core_and_all_of_them_find_the_same(traces) -> None:
     for alone, together in zip(run_batch(RUNS[:20], threads=1), traces, strict=False):
         assert alone.outcome == together.outcome
         np.testing.assert_array_equal(alone.position, together.position)
-
-
-def test_a_law_that_the_kernel_does_not_know_is_left_to_the_loop() -> None:
-    run = RUNS[0]
-    plain = Servo(
-        run.cell.arm, CAMERA, ImageBased(), solver=PseudoInverse(), depth_m=1.0,
-        situation=Situation(motion=MotionSettings(False, False)),
-    )  # fmt: skip
-    assert covers(run)
-    assert not covers(KinematicRun(run.cell, plain, run.desired_px, 1.0))

@@ -100,12 +100,36 @@ def test_a_batch_of_trials_comes_to_what_each_of_them_comes_to_in_the_loop(
     made_in = [result.made_in for result in in_batch]
     assert made_in.count("kernel") > 0.8 * len(in_batch), made_in
     monkeypatch.setattr(sys.modules[RUN_TRIAL], "covers", lambda _: False)
-    for one, other in zip(in_batch, run_trials(tracking, quick_trials, 2.0), strict=True):
+    check_same(in_batch, run_trials(tracking, quick_trials, 2.0))
+    assert {result.ending for result in in_batch} >= {Ending.CONVERGED, Ending.OUT_OF_VIEW}
+
+
+def check_same(results, looped):
+    for one, other in zip(results, looped, strict=True):
         assert (one.key, one.ending, one.reason) == (other.key, other.ending, other.reason)
+        assert other.made_in == "loop"
         for name, value in one.as_json().items():
             if isinstance(value, float | tuple):
                 assert value == pytest.approx(getattr(other, name), rel=1e-9, abs=1e-9), name
-    assert {result.ending for result in in_batch} >= {Ending.CONVERGED, Ending.OUT_OF_VIEW}
+
+
+@pytest.mark.parametrize(
+    ("name", "laws"),
+    [
+        ("ur5", ("image_based", "constrained", "optimal_tracking")),
+        ("puma560", ("image_based", "constrained")),
+    ],
+)
+def test_laws_of_shipped_cells_come_in_the_kernel_to_what_they_come_to_in_the_loop(
+    name, laws, monkeypatch
+):
+    source = CellSource.of(name, {"duration_s": "2.0"}, None)
+    trials = start_trials(source.load(), laws, 3, seed=3, sampling=Sampling(spread=0.2))
+    results = run_trials(source, trials, 2.0)
+    made_in = [(trial.labels["law"], r.made_in) for trial, r in zip(trials, results, strict=True)]
+    assert {(law, "kernel") for law in laws} <= set(made_in)
+    monkeypatch.setattr(sys.modules[RUN_TRIAL], "covers", lambda _: False)
+    check_same(results, run_trials(source, trials, 2.0))
 
 
 def test_physics_ends_the_runs_alike(tracking, quick_trials, quick_results):
@@ -187,6 +211,7 @@ def test_a_run_that_the_user_stops_is_no_result(source, trials, monkeypatch):
     stopped = Run(RunInfo("puma560"), {}, {}, None, (), outcome, {}, {})
     module = sys.modules[RUN_TRIAL]
     monkeypatch.setattr(module, "run_cell", lambda *_, **__: stopped)
+    monkeypatch.setattr(module, "covers", lambda _: False)
     monkeypatch.setattr(KinematicRun, "in_loop", lambda *_: stopped)
     for physics in (True, False):
         with pytest.raises(KeyboardInterrupt):

@@ -40,7 +40,7 @@ class TrackingTickLaw:
         feeds_forward: bool,
     ) -> None:
         self._arm, self._camera, self._objective = arm, camera, objective
-        self._period_s, self._singular_below = period_s, singular_below
+        self._period_s, self.singular_below = period_s, singular_below
         self._columns = 7 if feeds_forward else 5
         self._count = -1
         self._packed = pack_setup(self.setup(1))
@@ -52,7 +52,7 @@ class TrackingTickLaw:
             self._camera.focal_px,
             float(self._objective.penalty_k),
             self._objective.penalty == "per_joint",
-            self._singular_below,
+            self.singular_below,
             self._arm.q_min,
             self._arm.q_max,
             self._arm.rate_max,
@@ -69,6 +69,6 @@ class TrackingTickLaw:
         columns = np.ascontiguousarray(features[:, : self._columns])
         optimal_tracking_tick(*self._packed, q, columns, result)
         tick = unpack_tick(result)
-        fault = singular_fault(tick.sigma, self._singular_below)
+        fault = singular_fault(tick.sigma, self.singular_below)
         active = ("joint rates",) if tick.scale < 1.0 else ()
         return JointCommand(tick.rates, tick.v_camera, tick.w, tick.penalty, active, fault)

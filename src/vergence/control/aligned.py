@@ -1,11 +1,13 @@
 """Points in space from an image, and the pose that best aligns known points with them."""
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.geometry import nearest_rotation, se3
 
 
+@njit(cache=True, error_model="numpy")
 def lifted(image: FloatArray, depth_m: FloatArray) -> FloatArray:
     """Return points in the camera frame, (M, 3), m.
 
@@ -13,12 +15,27 @@ def lifted(image: FloatArray, depth_m: FloatArray) -> FloatArray:
         image: normalized coordinates, (M, 2).
         depth_m: (M,).
     """
-    return np.column_stack((image * depth_m[:, None], depth_m))
+    points = np.empty((len(image), 3))
+    for j in range(len(image)):
+        points[j, 0], points[j, 1] = image[j, 0] * depth_m[j], image[j, 1] * depth_m[j]
+        points[j, 2] = depth_m[j]
+    return points
 
 
+@njit(cache=True, error_model="numpy")
 def aligned(points: FloatArray, seen: FloatArray) -> FloatArray:
     """Return the pose (4, 4) that best aligns points (M, 3) with measured ones, (M, 3)."""
-    M = (seen - seen.mean(axis=0)).T @ (points - points.mean(axis=0))
-    R = nearest_rotation(np.ascontiguousarray(M))
-    T: FloatArray = se3(R, seen.mean(axis=0) - R @ points.mean(axis=0))
-    return T
+    middle, seen_middle, M = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    for j in range(len(points)):
+        middle += points[j] / len(points)
+        seen_middle += seen[j] / len(points)
+    for j in range(len(points)):
+        for a in range(3):
+            for b in range(3):
+                M[a, b] += (seen[j, a] - seen_middle[a]) * (points[j, b] - middle[b])
+    R = nearest_rotation(M)
+    t = seen_middle
+    for a in range(3):
+        for b in range(3):
+            t[a] -= R[a, b] * middle[b]
+    return se3(R, t)  # type: ignore[no-any-return]

@@ -58,6 +58,19 @@ class ClearBraking:
         self._q, self._room, self._others = q, self._rooms(q), self._clearance.others()
         return self._known_clear(q, most)
 
+    def clear_periods(self, q: FloatArray, fastest: FloatArray, seconds: FloatArray) -> int:
+        """Return in how many periods, from the first on, nothing can hinder set-points, for sure.
+
+        Args:
+            q: joint positions at the start of each, (K, n).
+            fastest: what no rate exceeds in it, (K, n).
+            seconds: how long it is, (K,).
+        """
+        most = fastest * seconds[:, None] + fastest**2 / (2.0 * self._arm.acceleration_max)
+        changed = (np.abs(q - q[0]) + most) @ self._clearance.reach.T
+        clear = (changed < self._rooms(q[0])).all(axis=1)
+        return len(clear) if clear.all() else int(np.argmin(clear))
+
     def _known_clear(self, q: FloatArray, most: FloatArray) -> bool:
         """Return whether the distances known are large enough for all that the joints may move."""
         if self._q is None or (self._clearance.others() != self._others).any():

@@ -95,10 +95,10 @@ def guarded_steps(
     count: int,
     stuck: BoolArray,
 ) -> None:
-    """Take several guarded steps with the same desired rates, in place.
+    """Take several guarded steps with the same desired rates, in place, exact to the last bit.
 
-    A joint so far from its limits that it could stop anywhere on the way ramps to its rate and
-    keeps it, which has a closed form; only a joint that might have to brake is stepped.
+    A joint so far from its limits that it could stop anywhere on the way only ramps to its rate;
+    one that might have to brake is stepped in full.
 
     Args:
         position: set-points, (n,); updated.
@@ -110,20 +110,16 @@ def guarded_steps(
         stuck: set to which joints a limit held back at every step, (n,).
     """
     for i in range(len(position)):
-        step, v = limits[3, i] * dt, reachable_rate(commanded[i], limits[2, i])
-        change = v - velocity[i]
-        ramp = min(np.floor(abs(change) / step), float(count))
+        v, most = reachable_rate(commanded[i], limits[2, i]), limits[3, i] * dt
         up, down = max(velocity[i], v, 0.0), max(-velocity[i], -v, 0.0)
         least_room = min(
             _room(limits[1, i] - position[i] - count * dt * up, up, limits[3, i], dt),
             _room(position[i] - limits[0, i] - count * dt * down, down, limits[3, i], dt),
         )
         if least_room > _SPARE:
-            gained = np.copysign(step, change) * ramp
-            position[i] += dt * (
-                ramp * velocity[i] + 0.5 * (ramp + 1.0) * gained + (count - ramp) * v
-            )
-            velocity[i] = v if ramp < count else velocity[i] + gained
+            for _ in range(count):
+                velocity[i] = min(max(v, velocity[i] - most), velocity[i] + most)
+                position[i] += velocity[i] * dt
             stuck[i] = False
             continue
         stuck[i] = True
@@ -132,36 +128,6 @@ def guarded_steps(
                 position[i], velocity[i], commanded[i], limits[:, i], dt
             )
             stuck[i] &= at_limit
-
-
-@njit(cache=True, error_model="numpy")
-def same_steps(
-    position: FloatArray,
-    velocity: FloatArray,
-    commanded: FloatArray,
-    limits: FloatArray,
-    dt: float,
-    count: int,
-) -> GuardedStep:
-    """Return the result of repeated `guarded_step`, exact to the last bit.
-
-    Args:
-        position: as for `guarded_step`, like the following ones.
-        velocity: (n,).
-        commanded: (n,).
-        limits: (4, n).
-        dt: inner period, s.
-        count: number of steps, at least one.
-
-    Returns:
-        The last step; `at_limit` is true for joints held back at every step.
-    """
-    step = guarded_step(position, velocity, commanded, limits, dt)
-    at_limit = step.at_limit
-    for _ in range(count - 1):
-        step = guarded_step(step.position, step.velocity, commanded, limits, dt)
-        at_limit &= step.at_limit
-    return GuardedStep(step.position, step.velocity, at_limit)
 
 
 @njit(cache=True, error_model="numpy")
@@ -296,9 +262,10 @@ class Guard:
         self._desired[:] = as_floats(rates, (self.joint_count,), "rates")
         if self.hindrance or not self._stays_clear(count):
             return None
-        self._position, self._velocity, self.at_limit = same_steps(
-            self._position, self._velocity, self._desired, self._limits, self._dt, count
-        )
+        position, velocity = self._position.copy(), self._velocity.copy()
+        at_limit = np.empty(self.joint_count, dtype=np.bool_)
+        guarded_steps(position, velocity, self._desired, self._limits, self._dt, count, at_limit)
+        self._position, self._velocity, self.at_limit = position, velocity, at_limit
         return self.setpoint
 
     def _stays_clear(self, count: int) -> bool:

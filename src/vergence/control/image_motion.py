@@ -1,6 +1,5 @@
 """Compensates latency and target motion: predicts features to the present, estimates their flow."""
 
-from collections import deque
 from functools import partial
 from typing import NamedTuple
 
@@ -11,7 +10,8 @@ from vergence.arrays import FloatArray
 from vergence.control.depth import Depth, Depths, HeldDepth, MeasuredPoints
 from vergence.control.depth.depth import in_front
 from vergence.control.mounting import CameraMounting
-from vergence.control.target_flow import TargetFlow
+from vergence.control.past_joints import no_joints, past_position, remember
+from vergence.control.target_flow import FlowState, TargetFlow, flow_at
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.robot import Arm, forward_kinematics
 from vergence.signals import ImagePoints, JointState, TargetState
@@ -57,13 +57,14 @@ class MotionSettings(NamedTuple):
         return not (self.feeds_forward or self.prediction) and isinstance(self.depth, HeldDepth)
 
 
-class _Exposure(NamedTuple):
-    """The last measured image."""
+class ExposedFeatures(NamedTuple):
+    """The features in the last measured image."""
 
-    time: float  # s
+    time: float  # s, of its exposure
     T_camera_scene: FloatArray  # (4, 4)
     points: FloatArray  # (M, 2) normalized coordinates
-    depths: Depths
+    depth_m: FloatArray  # (M,)
+    share: float  # largest relative deviation of the depth; NaN if unknown
 
 
 class ImageMotion:
@@ -78,7 +79,6 @@ class ImageMotion:
         arm: up to its tip.
         mounting: of the camera.
         settings: the assumptions.
-        memory_s: time for which joints are stored; must exceed the latency.
         features: in the target's frame, (M, 3), m; None if unknown.
 
     Raises:
@@ -90,18 +90,17 @@ class ImageMotion:
         arm: Arm,
         mounting: CameraMounting,
         settings: MotionSettings | None = None,
-        memory_s: float = 2.0,
         features: FloatArray | None = None,
     ) -> None:
         settings = settings or MotionSettings()
-        self._arm, self._mounting, self._memory_s = arm, mounting, memory_s
+        self._arm, self._mounting = arm, mounting
         self._flow = TargetFlow(settings.flow_smoothing_s if settings.feeds_forward else np.inf)
         self._prediction = settings.prediction
         self._held = isinstance(settings.depth, HeldDepth)
         self._bind = partial(settings.depth.bind, features)
         self._depth_source = self._bind()
-        self._history: deque[tuple[float, FloatArray]] = deque()
-        self._last: _Exposure | None = None
+        self._joints = no_joints(arm.joint_count)
+        self._last: ExposedFeatures | None = None
 
     def update(
         self,
@@ -118,7 +117,8 @@ class ImageMotion:
             joints: now.
             target: from a filter, if one runs.
         """
-        self._remember(joints)
+        remember(self._joints, joints.time, joints.position)
+        depth = np.array(depth)  # writeable and contiguous, as the kernels expect
         points = self._mounting.camera.normalize(view.points_px)
         if self._last is not None and len(points) != len(self._last.points):
             self._last = None  # the features have changed
@@ -127,19 +127,14 @@ class ImageMotion:
         if self._last is None or view.time > self._last.time:
             self._expose(view, points, depth, target)
         assert self._last is not None
-        exposed = self._last.depths
+        exposed = self._last._replace(points=points)
         if self._held:
-            exposed = Depths(depth)
+            exposed = exposed._replace(depth_m=depth)
         if not self._prediction:
-            return FeatureState(points, self._flow.at(0.0), *exposed)
-        q_exposed = self._joints_at(view.time)
-        there, here = self._T_camera_scene(q_exposed), self._T_camera_scene(joints.position)
-        now = reproject(se3_compose(here, se3_inverse(there)), points, exposed.depth_m)
-        elapsed = joints.time - view.time
-        ahead = now[:, :2] + self._flow.moved(elapsed)
-        moved = np.where(np.isfinite(now[:, 2]), now[:, 2], exposed.depth_m)
-        depth_now = depth if self._held else in_front(moved, depth)
-        return FeatureState(ahead, self._flow.at(elapsed), depth_now, exposed.share)
+            return FeatureState(points, self._flow.at(0.0), exposed.depth_m, exposed.share)
+        here, elapsed = self._T_camera_scene(joints.position), joints.time - view.time
+        now: FeatureState = predicted_features(exposed, self._flow.state, here, depth, elapsed)
+        return now._replace(depth=depth) if self._held else now
 
     def _expose(
         self,
@@ -149,7 +144,7 @@ class ImageMotion:
         target: TargetState | None,
     ) -> None:
         """Process a new image: its depths, and the flow that the last one leaves unexplained."""
-        T_camera_scene = self._T_camera_scene(self._joints_at(view.time))
+        T_camera_scene = self._T_camera_scene(past_position(self._joints, view.time))
         measured = MeasuredPoints(
             view.time,
             points,
@@ -161,36 +156,63 @@ class ImageMotion:
             view.depth_m,
             view.depth_deviation_m,
         )
-        depths = self._depth_source.update(measured)
+        depths: Depths = self._depth_source.update(measured)
         if self._last is None:
             self._flow.start(len(points))
         else:
             last, elapsed = self._last, view.time - self._last.time
-            before = depth if self._held else last.depths.depth_m
-            T_now_last = se3_compose(T_camera_scene, se3_inverse(last.T_camera_scene))
-            stationary = reproject(T_now_last, last.points, before)
-            flow = (points - stationary[:, :2]) / elapsed
+            before = last._replace(depth_m=depth) if self._held else last
+            flow = unexplained_flow(before, T_camera_scene, points, elapsed)
             self._flow.measure(flow, view.found, elapsed)
-        self._last = _Exposure(view.time, T_camera_scene, points, depths)
+        self._last = ExposedFeatures(view.time, T_camera_scene, points, *depths)
 
     def _T_camera_scene(self, q: FloatArray) -> FloatArray:
         return self._mounting.T_camera_scene(forward_kinematics(self._arm.chain, q))
 
-    def _remember(self, joints: JointState) -> None:
-        self._history.append((joints.time, joints.position))
-        while self._history[0][0] < joints.time - self._memory_s:
-            self._history.popleft()
 
-    def _joints_at(self, time: float) -> FloatArray:
-        """Return joint positions at a past time, (n,), interpolated between the stored ones."""
-        later = self._history[-1]
-        for earlier in reversed(self._history):
-            if earlier[0] <= time:
-                span = later[0] - earlier[0]
-                share = (time - earlier[0]) / span if span > 0 else 0.0
-                return earlier[1] + min(share, 1.0) * (later[1] - earlier[1])
-            later = earlier
-        return later[1]
+@njit(cache=True, error_model="numpy")
+def unexplained_flow(
+    last: ExposedFeatures, T_camera_scene: FloatArray, points: FloatArray, elapsed_s: float
+) -> FloatArray:
+    """Return the image motion (M, 2), 1/s, that the camera's own motion does not explain.
+
+    Args:
+        last: the image before.
+        T_camera_scene: at this image, (4, 4).
+        points: in it, normalized coordinates, (M, 2).
+        elapsed_s: between the two.
+    """
+    T_now_last = se3_compose(T_camera_scene, se3_inverse(last.T_camera_scene))
+    stationary = reproject(T_now_last, last.points, last.depth_m)
+    return (points - stationary[:, :2]) / elapsed_s
+
+
+@njit(cache=True, error_model="numpy")
+def predicted_features(
+    exposed: ExposedFeatures,
+    flow: FlowState,
+    T_camera_scene: FloatArray,
+    believed_m: FloatArray,
+    elapsed_s: float,
+) -> FeatureState:
+    """Return features at the present time.
+
+    Args:
+        exposed: the newest image.
+        flow: of the target's own motion.
+        T_camera_scene: now, (4, 4).
+        believed_m: depth at the start, (M,), which bounds the depth from below.
+        elapsed_s: since the exposure.
+    """
+    T_now_exposed = se3_compose(T_camera_scene, se3_inverse(exposed.T_camera_scene))
+    now = reproject(T_now_exposed, exposed.points, exposed.depth_m)
+    ahead = now[:, :2] + elapsed_s * flow_at(flow, 0.5 * elapsed_s)
+    depth_m = exposed.depth_m.copy()
+    for j in range(len(now)):
+        if np.isfinite(now[j, 2]):
+            depth_m[j] = now[j, 2]
+    depth_m = in_front(depth_m, believed_m)
+    return FeatureState(ahead, flow_at(flow, elapsed_s), depth_m, exposed.share)
 
 
 @njit(cache=True, error_model="numpy")

@@ -16,7 +16,7 @@ from vergence.control.solvers import (
     Solver,
     describe,
 )
-from vergence.control.solvers.solver import NO_JOINTS
+from vergence.control.solvers.solver import NO_FACES, NO_JOINTS
 from vergence.estimation.feature_faces import FeatureFaces
 from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
@@ -139,7 +139,8 @@ class PoseServo:
             self._null_space_rates(joints.position),
             *NO_JOINTS,
             self._twist_map(joints.position),
-            faces=faces,
+            faces=NO_FACES if faces is None else faces,
+            surface_known=faces is not None,
         )
         solution = self._solver.solve(problem)
         self._active = np.maximum(self._active, solution.active)

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, frozen
 from vergence.control._tracking_tick import TrackingTickLaw
+from vergence.control.compile_law import CompiledLaw, compile_law
 from vergence.control.image_motion import MotionSettings
-from vergence.control.limits import Limits, pack_features
+from vergence.control.limits import CollisionLimit, Limits, pack_features
 from vergence.control.mounting import CameraMounting
 from vergence.control.objectives import (
     CameraState,
@@ -35,7 +36,8 @@ from vergence.control.solvers import (
     Solver,
     describe,
 )
-from vergence.control.solvers.solver import NO_JOINTS, Solution
+from vergence.control.solvers.quadratic_program import BoundProgram
+from vergence.control.solvers.solver import NO_FACES, NO_JOINTS, Solution
 from vergence.control.term import Term
 from vergence.errors import Absent, InputError, nearest
 from vergence.estimation.feature_faces import FeatureFaces
@@ -49,9 +51,11 @@ from vergence.signals import (
     Reference,
 )
 
+# The fault of an objective without a meaningful quadratic.
+NOT_FINITE = OutcomeKind.INFEASIBLE, "an objective returned numbers that are not finite"
 _PLAN_WEIGHT = 1e-3  # of a plan's joint rates: they decide where the image determines little
 AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
-NO_FEATURES = pack_features(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
+NO_FEATURES = np.empty((0, 7))  # from `pack_features`
 
 
 class Situation(NamedTuple):
@@ -153,15 +157,29 @@ class Servo:
             return None
         return self._kernel.setup(len(self._main.depth_m))
 
+    def compiled(self, desired_px: FloatArray, covariance_px: FloatArray) -> CompiledLaw | None:
+        """Return the servo as one kernel computes it; None if it has parts that need Python.
+
+        Args:
+            desired_px: constant, (M, 2).
+            covariance_px: of every point in every image, (2, 2); a multiple of the unit matrix.
+        """
+        if not len(self._terms) == len(self._cameras) == 1 or self._terms[0].weight != 1.0:
+            return None
+        objective = self._terms[0].objective
+        return compile_law(
+            self._arm, self._main, objective, self._solver, self._kernel, desired_px, covariance_px
+        )
+
+    @property
+    def collision_limit(self) -> CollisionLimit | None:
+        """The limit on distances between bodies, if the solver enforces it."""
+        return self._solver.collision if isinstance(self._solver, BoundProgram) else None
+
     def believed_depth(self, count: int, camera: str | None = None) -> FloatArray:
         """Return the believed depth of a camera's features, (count,), m; the first's by default."""
         chosen = self._main if camera is None else self._cameras[camera]
         return chosen.believed_depth(count)
-
-    @property
-    def feeds_forward(self) -> bool:
-        """Whether features or depth are predicted, or the target's motion is fed forward."""
-        return self._main.feeds_forward
 
     def take_over(self, previous: object) -> bool:
         """Continue with another servo's estimates of the target's image motion and the depth.
@@ -238,7 +256,7 @@ class Servo:
             objective,
             self._situation.period_s,
             solver.singular_below,
-            feeds_forward=self.feeds_forward,
+            feeds_forward=self._main.feeds_forward,
         )
 
     def _reference(self, camera: str, reference: Reference) -> Reference:
@@ -293,6 +311,7 @@ class Servo:
         A = AT_TIP if first is None or first.A is None else first.A
         if not H.any():  # no camera sees any feature
             return JointCommand(self._rest, np.zeros(6))
+        faces = None if first is None else first.faces
         problem = Problem(
             joints.position,
             joints.velocity,
@@ -308,7 +327,8 @@ class Servo:
             _PLAN_WEIGHT if rates is not None and rates.any() else 0.0,
             float("nan") if first is None else first.depth_share,
             variance,
-            None if first is None else first.faces,
+            NO_FACES if faces is None else faces,
+            faces is not None,
         )
         return command_of(self._solver.solve(problem), A, self._solver.names)
 
@@ -329,9 +349,7 @@ def command_of(solution: Solution, A: FloatArray, names: tuple[str, ...]) -> Joi
 
 
 def _nonsense(*parts: FloatArray) -> tuple[OutcomeKind, str] | None:
-    if all(np.isfinite(values).all() for values in parts):
-        return None
-    return OutcomeKind.INFEASIBLE, "an objective returned numbers that are not finite"
+    return None if all(np.isfinite(values).all() for values in parts) else NOT_FINITE
 
 
 def _terms(

@@ -54,9 +54,8 @@ class ServoCamera:
     ) -> None:
         self.mounting = mounting
         self.view = NOTHING_SEEN  # the last measurement
-        self._arm, self._depth_m, self._period_s = arm, depth_m, period_s
-        self._features, self._faces = features, faces
-        self._predicts = motion.prediction
+        self._arm, self._depth_m, self.period_s = arm, depth_m, period_s
+        self.features, self.faces, self.motion = features, faces, motion
         self._motion: ImageMotion | None = None
         if not motion.as_it_is:
             self._motion = ImageMotion(arm, mounting, motion, features=features)
@@ -105,7 +104,7 @@ class ServoCamera:
         else:
             moved = self._motion.update(view, depth, joints, observation.target)
             points, flow, depth, share = moved
-            if self._predicts:
+            if self.motion.prediction:
                 reference = reference.at(joints.time)
         found = view.found
         desired = velocity = None
@@ -130,7 +129,7 @@ class ServoCamera:
             velocity,
             None if at_goal is None else at_goal[found],
             count=len(found),
-            period_s=self._period_s,
+            period_s=self.period_s,
             target=observation.target,
             T_camera_target=reference.T_camera_target,
             time=joints.time,
@@ -150,7 +149,7 @@ class ServoCamera:
             q: joint positions, (n,).
         """
         known = state_of(features, desired)
-        own = {"mounting": self.mounting, "period_s": self._period_s, **self._pose(q)}
+        own = {"mounting": self.mounting, "period_s": self.period_s, **self._pose(q)}
         return replace(known, **own)
 
     def _shown(
@@ -164,9 +163,9 @@ class ServoCamera:
             desired: normalized coordinates, (K, 2).
             reference: with their desired depth, if known.
         """
-        if self._faces is None or self._features is None:
+        if self.faces is None or self.features is None:
             return None
-        features = self._features[found]
+        features = self.features[found]
         if len(features) < _FEWEST_TURNED:
             return np.empty((0, 6))
         there = reference.desired_depth_m if reference.depth_m is None else reference.depth_m
@@ -174,7 +173,7 @@ class ServoCamera:
         if desired is not None and there is not None:
             eyes = se3_inverse(aligned(features, lifted(desired, there[found])))[None, :3, 3].copy()
         shown: FloatArray = faces_in_view(
-            aligned(features, now), self._faces.planes, self._faces.holds[found], eyes
+            aligned(features, now), self.faces.planes, self.faces.holds[found], eyes
         )
         return shown
 

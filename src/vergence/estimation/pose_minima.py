@@ -24,6 +24,14 @@ APART_RAD = 0.05  # rotations closer than this are the same minimum
 APART = 0.05  # and positions, relative to the distance from the camera
 
 
+class PoseMinima(NamedTuple):
+    """Poses, each of which explains the points better than all poses near it; the best first."""
+
+    pose: FloatArray  # (K, 4, 4) T_world_target
+    information: FloatArray  # (K, 6, 6) of (δp, δθ), world axes
+    square: FloatArray  # (K,) χ² of the points under this pose
+
+
 class PoseMinimum(NamedTuple):
     """A pose that explains the points better than all poses near it."""
 
@@ -40,30 +48,65 @@ def pose_minima(seen: Seen, known: FloatArray) -> list[PoseMinimum]:
         known: one of the minima, T_world_target (4, 4); the initial rotations are relative to it.
     """
     arguments = seen.poses, seen.points, seen.measured, seen.covariance
-    starts = [known, *_mirrored(known, seen)]
-    for R in _spread_rotations():
-        T = with_linear_translation(np.ascontiguousarray(known[:3, :3] @ R), *arguments[:3])
-        if np.isfinite(T).all():
-            starts.append(T)
-    minima: list[PoseMinimum] = []
-    for start in starts:
-        minimum = PoseMinimum(*descend(start, *arguments, STEPS))
-        if np.isfinite(minimum.square):
-            minima.append(minimum)
-    minima.sort(key=lambda minimum: minimum.square)
-    distinct: list[PoseMinimum] = []
-    for minimum in minima:
-        if all(is_apart(minimum.pose, other.pose, seen.poses[0]) for other in distinct):
-            distinct.append(minimum)
-    return distinct
+    minima = local_minima(known, spread_rotations(), *arguments)
+    return [PoseMinimum(*minimum) for minimum in zip(*minima, strict=True)]
 
 
+@njit(cache=True)
+def local_minima(
+    known: FloatArray,
+    rotations: FloatArray,
+    poses: FloatArray,
+    points: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+) -> PoseMinima:
+    """Return what `pose_minima` does.
+
+    Args:
+        known: one of the minima, T_world_target (4, 4).
+        rotations: from `spread_rotations`, (R, 3, 3).
+        poses: T_camera_world of each point's camera, (M, 4, 4).
+        points: in the target's frame, (M, 3), m.
+        measured: normalized coordinates, (M, 2).
+        covariance: of `measured`, (M, 2, 2).
+    """
+    mirrored = _mirrored(known, poses, points)
+    most = 1 + len(mirrored) + len(rotations)
+    found = PoseMinima(np.empty((most, 4, 4)), np.empty((most, 6, 6)), np.full(most, np.inf))
+    start, R_known = known, np.ascontiguousarray(known[:3, :3])
+    for i in range(most):
+        if 0 < i <= len(mirrored):
+            start = mirrored[i - 1]
+        elif i > len(mirrored):
+            R = R_known @ rotations[i - len(mirrored) - 1]
+            start = with_linear_translation(R, poses, points, measured)
+        if np.isfinite(start).all():
+            pose, information, square = descend(start, poses, points, measured, covariance, STEPS)
+            if np.isfinite(square):
+                found.pose[i], found.information[i], found.square[i] = pose, information, square
+    kept, count = np.empty(most, dtype=np.int64), 0
+    for i in np.argsort(found.square, kind="mergesort"):
+        apart = np.isfinite(found.square[i])
+        for k in range(count):
+            apart = apart and is_apart(found.pose[i], found.pose[kept[k]], poses[0])
+        if apart:
+            kept[count] = i
+            count += 1
+    chosen = kept[:count]
+    return PoseMinima(found.pose[chosen], found.information[chosen], found.square[chosen])
+
+
+@njit(cache=True)
 def is_apart(T_a: FloatArray, T_b: FloatArray, T_camera_world: FloatArray) -> bool:
     """Return whether two poses T_world_target differ by more than rounding and step size."""
     between = se3_compose(se3_inverse(T_a), T_b)
-    depth = abs(float(T_camera_world[2, :3] @ T_a[:3, 3] + T_camera_world[2, 3]))
-    turned = float(np.linalg.norm(so3_log(np.ascontiguousarray(between[:3, :3]))))
-    return turned > APART_RAD or float(np.linalg.norm(between[:3, 3])) > APART * depth
+    depth, distance = T_camera_world[2, 3], 0.0
+    for i in range(3):
+        depth += T_camera_world[2, i] * T_a[i, 3]
+        distance += between[i, 3] ** 2
+    turned = np.sqrt(np.sum(so3_log(np.ascontiguousarray(between[:3, :3])) ** 2))
+    return bool(turned > APART_RAD or np.sqrt(distance) > APART * abs(depth))
 
 
 @njit(cache=True)
@@ -136,31 +179,42 @@ def descend(
     return T, H.T @ H, square
 
 
-def _mirrored(T_world_target: FloatArray, seen: Seen) -> list[FloatArray]:
-    """Return the target mirrored in depth in each image, with its flattest axis reversed.
+@njit(cache=True)
+def _mirrored(T_world_target: FloatArray, poses: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the target mirrored in depth in each image, flattest axis reversed, (I, 4, 4).
 
     Weak perspective cannot distinguish depths from their negatives. S = I - 2 c cᵀ along the line
     of sight c mirrors the depths; I - 2 n nᵀ along the direction n of least extent makes the result
     a rotation again, and leaves a flat target unchanged.
     """
-    centre = seen.points.mean(axis=0)
-    n = np.linalg.svd(seen.points - centre)[2][2]
-    flip = np.eye(3) - 2.0 * np.outer(n, n)
-    place = T_world_target[:3, :3] @ centre + T_world_target[:3, 3]
-    mirrored = []
-    for T_camera_world in np.unique(seen.poses, axis=0):
-        R_cw = T_camera_world[:3, :3]
-        sight = R_cw @ place + T_camera_world[:3, 3]
-        c = R_cw.T @ (sight / np.linalg.norm(sight))
-        R = (np.eye(3) - 2.0 * np.outer(c, c)) @ T_world_target[:3, :3] @ flip
-        t: FloatArray = place - R @ centre
-        mirrored.append(se3(np.ascontiguousarray(R), t))
-    return mirrored
+    centre = np.zeros(3)
+    for m in range(len(points)):
+        centre += points[m] / len(points)
+    n = np.linalg.svd(points - centre)[2][2]
+    R_target = np.ascontiguousarray(T_world_target[:3, :3])
+    flipped = R_target @ (np.eye(3) - 2.0 * np.outer(n, n))
+    place = R_target @ centre + T_world_target[:3, 3]
+    mirrored, count = np.empty((len(poses), 4, 4)), 0
+    for m in range(len(poses)):
+        if m > 0 and (poses[m] == poses[m - 1]).all():
+            continue  # points of one image follow each other
+        sight, c = np.empty(3), np.zeros(3)
+        for i in range(3):
+            sight[i] = poses[m, i, 3]
+            for k in range(3):
+                sight[i] += poses[m, i, k] * place[k]
+        for i in range(3):
+            for k in range(3):
+                c[i] += poses[m, k, i] * sight[k] / np.sqrt(np.sum(sight * sight))
+        R = (np.eye(3) - 2.0 * np.outer(c, c)) @ flipped
+        mirrored[count] = se3(R, place - R @ centre)
+        count += 1
+    return mirrored[:count]
 
 
 @cache
-def _spread_rotations() -> list[FloatArray]:
-    """Return the 24 rotations that map a cube to itself, except the identity."""
+def spread_rotations() -> FloatArray:
+    """Return the 24 rotations that map a cube to itself, except the identity, (23, 3, 3)."""
     axes = product((-1.0, 0.0, 1.0), repeat=3)
     rotations = []
     for axis in axes:
@@ -170,4 +224,4 @@ def _spread_rotations() -> list[FloatArray]:
         a /= np.linalg.norm(a)
         order = {1: 4, 2: 2, 3: 3}[int(np.count_nonzero(a))]
         rotations += [so3_exp(a * 2.0 * np.pi * k / order) for k in range(1, order)]
-    return rotations
+    return np.array(rotations)

@@ -50,7 +50,7 @@ def renders(cell: Cell) -> bool:
 
 
 def is_quick(cell: Cell) -> bool:
-    """Return whether the batch kernel is likely to know its law."""
+    """Return whether the batch kernel makes its runs sooner than other processes start."""
     law = cell.law
     if not isinstance(law, ServoSettings):
         return False

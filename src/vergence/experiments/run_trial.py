@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from vergence.assembly.run_cell import run_cell
 from vergence.camera import image_tick, image_times
 from vergence.cell import Cell
+from vergence.control import Servo
 from vergence.errors import InputError
 from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
 from vergence.experiments.evaluation import TrueTracks, trial_result
@@ -17,7 +17,7 @@ from vergence.experiments.source import CellSource
 from vergence.experiments.stays_clear import stays_clear
 from vergence.experiments.trial import Ending, Trial, TrialResult
 from vergence.runtime import Run
-from vergence.signals import OutcomeKind
+from vergence.signals import OutcomeKind, Setpoint
 from vergence.simulation.kinematic_driver import CAMERA
 
 
@@ -58,8 +58,8 @@ def as_they_come(
 
     Where the cell is one arm with one camera it follows commands exactly: in the batch kernel
     if that knows the law, else in the loop. The kernel knows neither bodies nor surfaces: a run on
-    which the arm may touch something, or a feature is hidden, is made in the loop as well. Any
-    other cell runs in simulated physics.
+    which the arm may touch something, or would but for the law's limit, or a feature is hidden, is
+    made in the loop as well. Any other cell runs in simulated physics.
 
     Args:
         source: of the cell.
@@ -83,15 +83,15 @@ def as_they_come(
         except InputError as error:
             yield _refused(trial, str(error))
             continue
-        if covers(run):
-            waiting.append((trial, run))
-        else:
+        if not covers(run):
             yield _in_loop(run, trial, tolerance_px)
+        elif threads == 1:
+            yield _in_kernel(run, run_batch([run], 1)[0], trial, tolerance_px)
+        else:
+            waiting.append((trial, run))
     traces = run_batch([run for _, run in waiting], threads)
     for (trial, run), trace in zip(waiting, traces, strict=True):
-        again = _hidden(run, trace) or _touches(run, trace)
-        made = _in_loop if again else partial(_of_batch, trace=trace)
-        yield made(run, trial=trial, tolerance_px=tolerance_px)
+        yield _in_kernel(run, trace, trial, tolerance_px)
 
 
 def run_trial(
@@ -118,9 +118,12 @@ def _result(run: Run, trial: Trial, camera: str, tolerance_px: float) -> TrialRe
     return trial_result(trial, run.outcome, tracks, run.info.cameras[camera], tolerance_px)
 
 
-def _of_batch(
+def _in_kernel(
     run: KinematicRun, trace: BatchTrace, trial: Trial, tolerance_px: float
 ) -> TrialResult:
+    """Return the result of the kernel, of the loop where the kernel does not know enough."""
+    if _hidden(run, trace) or _touches(run, trace):
+        return _in_loop(run, trial, tolerance_px)
     camera, count = run.cell.camera, len(trace.times)
     inside = camera.contains(trace.points_px.reshape(-1, 2))
     tracks = TrueTracks(
@@ -151,13 +154,17 @@ def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
 
 
 def _touches(run: KinematicRun, trace: BatchTrace) -> bool:
-    """Return whether the guard may have stopped the arm before it touched something."""
+    """Return whether law or guard may have kept the arm from touching something."""
     cell = run.cell
     assert run.clearance is not None
+    assert isinstance(run.law, Servo), "the kernel knows only servos"
+    limit = run.law.collision_limit
+    if limit is not None and not limit.is_idle(trace.position, trace.velocity, trace.rates):
+        return True
     assert not cell.dropped, "no command of a campaign's run grows old"
     ticks = [image_tick(k, cell.inner_rate_hz, cell.rate_hz) for k in range(len(trace.rates) + 1)]
-    dt = 1.0 / cell.inner_rate_hz
-    return not stays_clear(run.clearance, cell.arm, cell.start, dt, trace.rates, np.diff(ticks))
+    dt, setpoints = 1.0 / cell.inner_rate_hz, Setpoint(trace.position, trace.velocity)
+    return not stays_clear(run.clearance, cell.arm, dt, setpoints, trace.rates, np.diff(ticks))
 
 
 def _refused(trial: Trial, reason: str) -> TrialResult:

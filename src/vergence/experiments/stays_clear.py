@@ -1,15 +1,18 @@
 """Whether a run of the batch kernel, which knows of no bodies, keeps clear of them."""
 
+import numpy as np
+
 from vergence.arrays import FloatArray, IntArray
-from vergence.control import ClearBraking, Guard
+from vergence.control import ClearBraking, guarded_step
 from vergence.robot import Arm, Clearance
+from vergence.signals import Setpoint
 
 
 def stays_clear(
     clearance: Clearance,
     arm: Arm,
-    start: FloatArray,
     dt: float,
+    setpoints: Setpoint,
     rates: FloatArray,
     ticks: IntArray,
 ) -> bool:
@@ -18,17 +21,30 @@ def stays_clear(
     Args:
         clearance: what is to be kept apart.
         arm: with its limits.
-        start: joint positions, (n,).
         dt: inner period, s.
-        rates: that the law asked for from each image on, (K, n).
+        setpoints: positions and rates at each image, (K, n) each.
+        rates: that the law asked for from there on, (K, n).
         ticks: for how many inner periods, (K,).
     """
-    guard = Guard(arm, start, dt, ClearBraking(arm, clearance, dt))
-    for asked, count in zip(rates, ticks.tolist(), strict=True):
-        if guard.steps(asked, count) is not None:
-            continue
-        for _ in range(count):
-            guard.step(asked)
-            if guard.hindrance:
-                return False
+    braking = ClearBraking(arm, clearance, dt)
+    q, velocity = setpoints.position, setpoints.velocity
+    fastest = np.maximum(np.abs(rates), np.abs(velocity))
+    # A joint outside its range is brought back at a rate of its own.
+    fastest = np.where((q < arm.q_min) | (q > arm.q_max), arm.rate_max, fastest)
+    fastest, limits = np.minimum(fastest, arm.rate_max), _limits(arm)
+    seconds = np.asarray(ticks * dt, dtype=np.float64)
+    k = 0
+    while k < len(rates):
+        clear = braking.clear_periods(q[k:], fastest[k:], seconds[k:])
+        if clear == 0:
+            step = q[k], velocity[k]
+            for _ in range(ticks[k]):
+                step = guarded_step(*step, rates[k], limits, dt)[:2]
+                if braking.hindrance(Setpoint(*step)):
+                    return False
+        k += max(clear, 1)
     return True
+
+
+def _limits(arm: Arm) -> FloatArray:
+    return np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))

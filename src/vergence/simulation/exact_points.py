@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from vergence.arrays import FloatArray
 from vergence.errors import InputError
 from vergence.signals import Frame, ImagePoints, Observation
 
+_LEAST_PX = 1e-3
 OUT_OF_SIGHT = "out of sight"
 
 
@@ -34,7 +36,7 @@ class ExactPoints:
         if truth is None:
             raise no_truth(frame.camera)
         noise = self._rng.normal(0.0, 1.0, truth.points_px.shape) * self._noise_px
-        covariance = np.eye(2) * max(self._noise_px, 1e-3) ** 2
+        covariance = covariance_px(self._noise_px)
         return ImagePoints(
             frame.camera,
             frame.time,
@@ -45,6 +47,11 @@ class ExactPoints:
             depth_m=truth.depth_m,
             depth_deviation_m=np.zeros(len(noise)),
         )
+
+
+def covariance_px(noise_px: float) -> FloatArray:
+    """Return the covariance of a point, (2, 2), px²; without noise, too, it is not zero."""
+    return np.eye(2) * max(noise_px, _LEAST_PX) ** 2
 
 
 def no_truth(camera: str) -> InputError:

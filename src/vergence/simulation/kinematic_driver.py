@@ -5,15 +5,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera, image_tick
-from vergence.geometry import se3_inverse, transform_points
+from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.robot import Arm
 from vergence.signals import Frame, FrameTruth, JointState, Sample, Setpoint
 from vergence.simulation.motions import TargetPoses
 
 ARM, CAMERA = "arm", "camera"
+IN_FRONT_M = 1e-3  # depth from which a feature can be seen
 _POSES = 64  # of the target, computed at once
 
 # From joint positions (n,) and T_world_target (4, 4) to the features that are not occluded, (M,).
@@ -35,6 +37,17 @@ class KinematicCell:
     dropped: float = 0.0  # fraction of the images that never arrive
     seed: int = 0  # for the choice of dropped images
     sees: Sees | None = None  # which features are not occluded; all if None
+
+
+@njit(cache=True, error_model="numpy")
+def in_camera(
+    T_world_camera: FloatArray, T_world_target: FloatArray, features: FloatArray
+) -> FloatArray:
+    """Return the features (M, 3) of a target in the camera frame, (M, 3), m."""
+    points: FloatArray = transform_points(
+        se3_compose(se3_inverse(T_world_camera), T_world_target), features
+    )
+    return points
 
 
 class KinematicDriver:
@@ -133,9 +146,9 @@ class KinematicDriver:
     def _truth(self, T_world_target: FloatArray) -> FrameTruth:
         cell = self._cell
         T_world_camera = cell.arm.forward_kinematics(self._position)
-        points = transform_points(se3_inverse(T_world_camera) @ T_world_target, cell.features)
+        points = in_camera(T_world_camera, T_world_target, cell.features)
         depth = points[:, 2].copy()
-        in_front = depth > 1e-3
+        in_front = depth > IN_FRONT_M
         points_px = np.full((len(points), 2), np.nan)
         points_px[in_front] = cell.camera.project(points[in_front])
         # Far outside the image, only a distorted lens model could fold points back into it.

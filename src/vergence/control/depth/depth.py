@@ -3,6 +3,7 @@
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.signals import TargetState
@@ -58,8 +59,11 @@ class Depth(Protocol):
         ...
 
 
+@njit(cache=True, error_model="numpy")
 def in_front(depth_m: FloatArray, believed_m: FloatArray) -> FloatArray:
     """Return depths (M,) limited from below, to keep them in front of the camera."""
-    least = 0.1 * believed_m
-    kept: FloatArray = np.maximum(np.where(np.isfinite(depth_m), depth_m, least), least)
+    kept = np.empty(len(depth_m))
+    for j in range(len(depth_m)):
+        least = 0.1 * believed_m[j]
+        kept[j] = max(depth_m[j], least) if np.isfinite(depth_m[j]) else least
     return kept

@@ -1,21 +1,22 @@
 """Depth from the image itself: the pose of known features, fitted to each image."""
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.control.aligned import aligned, lifted
 from vergence.control.depth.depth import Depths, MeasuredPoints
-from vergence.control.depth.from_pose import depths_at
+from vergence.control.depth.from_pose import pose_depths
 from vergence.errors import InputError
-from vergence.estimation.pose_minima import descend, pose_minima
-from vergence.estimation.view import View
-from vergence.geometry import se3_inverse
+from vergence.estimation.pose_minima import descend, local_minima, spread_rotations
+from vergence.geometry import se3_compose, se3_inverse
 from vergence.parts import part
 
 _FEWEST = 4  # features; three have up to four poses
 _STEPS = 6  # of Gauss-Newton per image
 _UNLIKELY = 16.0  # χ² per degree of freedom, above which the pose is searched for again
 _LEAST_PX_SHARE = 1e-4  # of the focal length: smallest deviation of a point, about 0.1 px
+_LIKELY, _AS_GOOD = 9.0, 2.0  # χ², and factor of the least χ², up to which a pose is considered
 
 
 @part("depth", "from_features")
@@ -52,69 +53,90 @@ class FeatureSource:
     """
 
     def __init__(self, features: FloatArray) -> None:
-        self._features = np.ascontiguousarray(features)
-        self._pose: FloatArray | None = None  # (4, 4) T_scene_target
+        self._features = np.array(features)
+        self._pose = NO_POSE
 
     def update(self, exposure: MeasuredPoints) -> Depths:
         """Return the depths at the fitted pose; at the last pose if too few features are found."""
-        found = exposure.found
-        if found.sum() < _FEWEST:
-            return self._at_last(exposure)
-        seen = _seen(exposure, self._features, found)
-        start = self._pose
-        if start is None:
-            start = _from_depths(exposure, self._features, found)
-        pose, information, square = _fit(start, seen)
-        if not square <= _UNLIKELY * (2 * found.sum() - 6 + 1) or self._pose is None:
-            minima = [m for m in pose_minima(seen, start) if np.isfinite(m.square)]
-            if minima:
-                limit = max(2.0 * minima[0].square, 9.0)
-                likely = [m for m in minima if m.square <= limit]
-                pose, information, square = min(likely, key=lambda m: self._off(exposure, m.pose))
-        if not np.isfinite(square):
-            return self._at_last(exposure)
-        self._pose = pose
-        covariance: FloatArray = np.linalg.inv(information + 1e-9 * np.eye(6)).astype(np.float64)
-        return depths_at(exposure, pose, covariance, self._features)
-
-    def _off(self, exposure: MeasuredPoints, pose: FloatArray) -> float:
-        """Return the relative difference between the depths at a pose (4, 4) and those believed."""
-        depth = depths_at(exposure, pose, np.zeros((6, 6)), self._features).depth_m
-        return float(np.abs(np.log(depth / exposure.believed_m)).max())
-
-    def _at_last(self, exposure: MeasuredPoints) -> Depths:
-        if self._pose is None:
-            return Depths(exposure.believed_m)
-        return depths_at(exposure, self._pose, np.zeros((6, 6)), self._features)._replace(
-            share=float("nan")
+        self._pose, depth_m, share = fitted_depths(
+            self._pose,
+            exposure.T_camera_scene,
+            exposure.points,
+            exposure.found,
+            exposure.covariance,
+            exposure.believed_m,
+            self._features,
+            spread_rotations(),
         )
+        return Depths(depth_m, share)
 
 
-def _fit(start: FloatArray, seen: View) -> tuple[FloatArray, FloatArray, float]:
-    fitted: tuple[FloatArray, FloatArray, float] = descend(
-        start, seen.poses, seen.points, seen.measured, seen.covariance, _STEPS
-    )
-    return fitted
+NO_POSE = np.full((4, 4), np.nan)  # before the first fit
 
 
-def _seen(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> View:
-    floor = _LEAST_PX_SHARE**2 * np.eye(2)
-    return View(
-        "",
-        exposure.time,
-        exposure.T_camera_scene,
-        np.flatnonzero(found),
-        np.ascontiguousarray(features[found]),
-        np.ascontiguousarray(exposure.points[found]),
-        np.ascontiguousarray(exposure.covariance[found] + floor),
-    )
+@njit(cache=True, error_model="numpy")
+def fitted_depths(
+    last: FloatArray,
+    T_camera_scene: FloatArray,
+    points: FloatArray,
+    found: BoolArray,
+    covariance: FloatArray,
+    believed_m: FloatArray,
+    features: FloatArray,
+    rotations: FloatArray,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Fit the pose of known features to an image.
 
+    Args:
+        last: T_scene_target (4, 4) that was fitted last, or `NO_POSE`.
+        T_camera_scene: at the exposure, (4, 4).
+        points: normalized coordinates, (M, 2).
+        found: (M,).
+        covariance: of the points, (M, 2, 2).
+        believed_m: depth at the start, (M,).
+        features: in the target's frame, (M, 3), m.
+        rotations: from `spread_rotations`.
 
-def _from_depths(exposure: MeasuredPoints, features: FloatArray, found: BoolArray) -> FloatArray:
-    """Return the pose (4, 4) in the scene that best aligns features with the believed depths."""
-    seen = lifted(exposure.points[found], exposure.believed_m[found])
-    pose: FloatArray = se3_inverse(exposure.T_camera_scene) @ aligned(features[found], seen)
-    return np.ascontiguousarray(pose)
+    Returns:
+        The pose (4, 4), the depths of the features (M,), and their largest relative deviation, NaN
+        if unknown.
+    """
+    known = not np.isnan(last[0, 0])
+    count = int(np.sum(found))
+    if count >= _FEWEST:
+        poses, spread = np.empty((count, 4, 4)), covariance[found]
+        for j in range(count):
+            poses[j] = T_camera_scene
+            for a in range(2):
+                spread[j, a, a] += _LEAST_PX_SHARE**2
+        seen, measured = features[found], points[found]
+        start = last
+        if not known:
+            T_camera_target = aligned(seen, lifted(measured, believed_m[found]))
+            start = se3_compose(se3_inverse(T_camera_scene), T_camera_target)
+        pose, information, square = descend(start, poses, seen, measured, spread, _STEPS)
+        if not (known and square <= _UNLIKELY * (2 * count - 6 + 1)):
+            minima = local_minima(start, rotations, poses, seen, measured, spread)
+            least, nearest = np.inf, np.inf
+            for k in range(len(minima.square)):
+                least = min(least, minima.square[k])
+            for k in range(len(minima.square)):
+                if minima.square[k] <= max(_AS_GOOD * least, _LIKELY):
+                    depth_m, _ = pose_depths(
+                        T_camera_scene, minima.pose[k], np.zeros((6, 6)), features, believed_m
+                    )
+                    off = np.max(np.abs(np.log(depth_m / believed_m)))
+                    if off < nearest:
+                        nearest, pose, square = off, minima.pose[k], minima.square[k]
+                        information = minima.information[k]
+        if np.isfinite(square):
+            deviation = np.linalg.inv(information + 1e-9 * np.eye(6)).astype(np.float64)
+            depth_m, share = pose_depths(T_camera_scene, pose, deviation, features, believed_m)
+            return pose, depth_m, share
+    if not known:
+        return last, believed_m, np.nan
+    depth_m, _ = pose_depths(T_camera_scene, last, np.zeros((6, 6)), features, believed_m)
+    return last, depth_m, np.nan
 
 
 def fixes_pose(features: FloatArray) -> bool:

@@ -64,25 +64,30 @@ def depths_at(
         covariance: of its position and rotation in scene axes, (6, 6).
         features: in the target's frame, (M, 3), m.
     """
-    depth, deviation = _depths_at(exposure.T_camera_scene, T_scene_target, covariance, features)
-    depth = in_front(depth, exposure.believed_m)
-    return Depths(depth, float((deviation / depth).max(initial=0.0)))
+    depth_m, share = pose_depths(
+        exposure.T_camera_scene, T_scene_target, covariance, features, exposure.believed_m
+    )
+    return Depths(depth_m, share)
 
 
 @njit(cache=True, error_model="numpy")
-def _depths_at(
-    T_camera_scene: FloatArray, T_scene_target: FloatArray, covariance: FloatArray, P: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the depths (M,) of features P (M, 3) and their deviations (M,)."""
-    depth, deviation = np.empty(len(P)), np.empty(len(P))
+def pose_depths(
+    T_camera_scene: FloatArray,
+    T_scene_target: FloatArray,
+    covariance: FloatArray,
+    P: FloatArray,
+    believed_m: FloatArray,
+) -> tuple[FloatArray, float]:
+    """Return the depths (M,) of features P (M, 3), and their largest relative deviation."""
+    depth_m, deviation_m = np.empty(len(P)), np.empty(len(P))
     r, a, row = T_camera_scene[2], np.empty(3), np.empty(6)
     for j in range(len(P)):
-        depth[j] = r[3]
+        depth_m[j] = r[3]
         for i in range(3):
             a[i] = 0.0
             for k in range(3):
                 a[i] += T_scene_target[i, k] * P[j, k]
-            depth[j] += r[i] * (a[i] + T_scene_target[i, 3])
+            depth_m[j] += r[i] * (a[i] + T_scene_target[i, 3])
             row[i] = r[i]
         row[3] = a[1] * r[2] - a[2] * r[1]
         row[4] = a[2] * r[0] - a[0] * r[2]
@@ -91,5 +96,8 @@ def _depths_at(
         for i in range(6):
             for k in range(6):
                 variance += row[i] * covariance[i, k] * row[k]
-        deviation[j] = np.sqrt(max(variance, 0.0))
-    return depth, deviation
+        deviation_m[j] = np.sqrt(max(variance, 0.0))
+    depth_m, share = in_front(depth_m, believed_m), 0.0
+    for j in range(len(P)):
+        share = max(share, deviation_m[j] / depth_m[j])
+    return depth_m, share

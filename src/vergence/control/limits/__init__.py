@@ -9,7 +9,7 @@ from vergence.control.limits._rows import (
     ConstraintSettings,
     pack_features,
 )
-from vergence.control.limits.collision import braked, braking_rows, collision_rows
+from vergence.control.limits.collision import CollisionLimit, braked, braking_rows, collision_rows
 from vergence.control.limits.facing import facing_rows, flat_face
 from vergence.control.limits.limits import Limit, Limits
 from vergence.control.limits.occlusion import AXES, COLUMNS, HALF, MIDDLE, NO_SOLIDS, RADIUS
@@ -19,6 +19,7 @@ __all__ = [
     "AXES",
     "COLLISION",
     "COLUMNS",
+    "CollisionLimit",
     "ConstraintSettings",
     "HALF",
     "KIND_NAMES",

@@ -33,6 +33,7 @@ class ConstraintSettings(NamedTuple):
     priority: IntArray  # (K,) by kind: 0 for a hard limit, then 1, 2, …, the last relaxed first
 
 
+@njit(cache=True, error_model="numpy")
 def pack_features(
     points: FloatArray, flow: FloatArray, depth: FloatArray, spread: FloatArray | None = None
 ) -> FloatArray:
@@ -44,8 +45,12 @@ def pack_features(
         depth: (M,), m.
         spread: possible error of the points, normalized, (M, 2); none if None.
     """
-    off = np.zeros_like(points) if spread is None else spread
-    return np.column_stack((points, flow, depth, off))
+    features = np.zeros((len(points), 7))
+    features[:, :X_FLOW], features[:, X_FLOW:DEPTH] = points, flow
+    features[:, DEPTH] = depth
+    if spread is not None:
+        features[:, X_SPREAD:] = spread
+    return features
 
 
 class ConstraintRows(NamedTuple):

@@ -1,11 +1,11 @@
 """The gain of an objective: one number, or one that falls with the size of the error."""
 
-import math
 from collections.abc import Mapping
 from numbers import Real
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from numba import njit
 from pydantic import BeforeValidator, Field
 
 from vergence.arrays import FloatArray
@@ -36,11 +36,16 @@ class AdaptiveGain:
 
     def at(self, error: FloatArray) -> float:
         """Return λ, 1/s, for an error of any shape."""
-        if self.near == self.far or not error.size:
-            return self.near
-        range_ = self.near - self.far
-        x = float(np.abs(error).max())
-        return range_ * math.exp(-self.slope * x / range_) + self.far
+        return float(falling_gain(self.near, self.far, self.slope, np.abs(error).max(initial=0.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def falling_gain(near: float, far: float, slope: float, x: float) -> float:
+    """Return λ of `AdaptiveGain` for the largest component x of the error."""
+    if near == far:
+        return near
+    gain: float = (near - far) * np.exp(-slope * x / (near - far)) + far
+    return gain
 
 
 def _number_or_table(given: Any) -> Any:

@@ -1,15 +1,16 @@
 """Image-based visual servoing as an objective."""
 
-from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.control.objectives.gain import Gain, gain_at
+from vergence.control.objectives.gain import AdaptiveGain, Gain, falling_gain, gain_at
 from vergence.control.objectives.objective import (
     CameraState,
     Quadratic,
+    least_squares,
     least_squares_kernel,
     state_of,
 )
@@ -17,6 +18,18 @@ from vergence.features import Feature, Points, interaction_matrix_points
 from vergence.parts import knob, part, slot
 
 InteractionModel = Literal["current", "desired", "mean"]
+_CURRENT, _DESIRED, _MEAN = range(len(get_args(InteractionModel)))
+_ALL_ONE = np.empty((0, 2, 2))
+
+
+class PointDecay(NamedTuple):
+    """The numbers of the objective for image points."""
+
+    near: float  # 1/s, see `AdaptiveGain`
+    far: float
+    slope: float
+    interaction: int  # where L is evaluated: at the present points, the desired ones, or both
+    damping: float
 
 
 @part("objective", "image_based")
@@ -41,35 +54,33 @@ class ImageBased:
         assert desired is not None
         desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
         if self.feature is Points:
-            error = state.points - desired
-            gain = gain_at(self.gain, error)
-            change = -gain * error - state.flow
-            if state.desired_velocity is not None:
-                change = change + state.desired_velocity
-            L = self._interaction(
-                lambda: interaction_matrix_points(state.points, state.depth_m),
-                lambda: interaction_matrix_points(desired, desired_depth),
+            velocity, weights = state.desired_velocity, state.weights
+            result: Quadratic = point_quadratic(
+                self.numbers,
+                state.points,
+                state.depth_m,
+                desired,
+                desired_depth,
+                state.flow if velocity is None else state.flow - velocity,
+                _ALL_ONE if weights is None else weights,
+                state.variance,
             )
-            rows = change.ravel()
-            if state.weights is not None:
-                rows = (state.weights @ change[:, :, None]).ravel()
-                L = (state.weights @ L.reshape(-1, 2, 6)).reshape(-1, 6)
-        else:
-            now = self.feature(state.points, state.depth_m)
-            goal = self.feature(desired, desired_depth)
-            error = now.error(goal)
-            gain = gain_at(self.gain, error)
-            rows = -gain * error - now.drift(state.flow)
-            if state.desired_velocity is not None:
-                rows = rows + goal.drift(state.desired_velocity)
-            L = np.ascontiguousarray(
-                self._interaction(now.interaction, goal.interaction), dtype=np.float64
-            )
-        damping = np.full(6, self.damping)
-        result: Quadratic = least_squares_kernel(L, rows, np.ones(len(L)), damping)
-        if self.feature is Points:
-            return result._replace(variance=gain**2 * state.variance)
-        return result
+            return result
+        now, goal = self.feature(state.points, state.depth_m), self.feature(desired, desired_depth)
+        error = now.error(goal)
+        rows = -gain_at(self.gain, error) * error - now.drift(state.flow)
+        if state.desired_velocity is not None:
+            rows = rows + goal.drift(state.desired_velocity)
+        return least_squares(self._interaction(now, goal), rows, damping=self.damping)
+
+    @property
+    def numbers(self) -> PointDecay:
+        """The objective's numbers, for kernels."""
+        gain = self.gain
+        if not isinstance(gain, AdaptiveGain):
+            gain = AdaptiveGain(gain, gain, 1.0)
+        where = get_args(InteractionModel).index(self.interaction)
+        return PointDecay(gain.near, gain.far, gain.slope, where, self.damping)
 
     def twist(self, features: Points, desired: Points) -> FloatArray:
         """Return v_camera (6,) of this objective alone, for a stationary target.
@@ -82,13 +93,50 @@ class ImageBased:
         v_camera: FloatArray = np.linalg.solve(quadratic.H, quadratic.g).astype(np.float64)
         return v_camera
 
-    def _interaction(
-        self, now: Callable[[], FloatArray], desired: Callable[[], FloatArray]
-    ) -> FloatArray:
+    def _interaction(self, now: Feature, desired: Feature) -> FloatArray:
         if self.interaction == "current":
-            L: FloatArray = now()
-        elif self.interaction == "desired":
-            L = desired()
-        else:
-            L = 0.5 * (now() + desired())
-        return L
+            return now.interaction()
+        if self.interaction == "desired":
+            return desired.interaction()
+        return 0.5 * (now.interaction() + desired.interaction())
+
+
+@njit(cache=True, error_model="numpy")
+def point_quadratic(
+    decay: PointDecay,
+    points: FloatArray,
+    depth_m: FloatArray,
+    desired: FloatArray,
+    desired_depth_m: FloatArray,
+    drift: FloatArray,
+    weights: FloatArray,
+    variance: float,
+) -> Quadratic:
+    """Return the quadratic of `ImageBased` for image points.
+
+    Args:
+        decay: the objective's numbers.
+        points: present ones, normalized coordinates, (M, 2).
+        depth_m: of them, (M,).
+        desired: s_star, (M, 2).
+        desired_depth_m: (M,).
+        drift: ∂s/∂t - ∂s_star/∂t, (M, 2), 1/s.
+        weights: roots of the weights of each point, (M, 2, 2); (0, 2, 2) if all are 1.
+        variance: of a point's weighted row.
+    """
+    error = points - desired
+    largest = np.max(np.abs(error)) if len(error) else 0.0
+    gain = falling_gain(decay.near, decay.far, decay.slope, largest)
+    change = -gain * error - drift
+    if decay.interaction == _CURRENT:
+        L = interaction_matrix_points(points, depth_m)
+    else:
+        L = interaction_matrix_points(desired, desired_depth_m)
+        if decay.interaction == _MEAN:
+            L = 0.5 * (interaction_matrix_points(points, depth_m) + L)
+    for j in range(len(weights)):
+        change[j] = weights[j] @ change[j]
+        L[2 * j : 2 * j + 2] = weights[j] @ L[2 * j : 2 * j + 2]
+    rows = change.reshape(len(L))
+    quadratic = least_squares_kernel(L, rows, np.ones(len(L)), np.full(6, decay.damping))
+    return Quadratic(quadratic.H, quadratic.g, gain * gain * variance)

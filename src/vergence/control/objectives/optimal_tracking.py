@@ -161,7 +161,7 @@ def tracking_quadratic(
     factor_spd(A)
     solve_factored(A, along)
     T = gains.period
-    return Quadratic(T * T * H, T * times_six(H, u + along))
+    return Quadratic(T * T * H, T * times_six(H, u + along), 0.0)
 
 
 def axis_mask(axes: tuple[str, ...]) -> BoolArray:

@@ -1,6 +1,9 @@
 """Joint rates by the pseudo-inverse of the Jacobian, as in textbooks, without limits."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control._rates import resolve_twist
@@ -16,9 +19,11 @@ from vergence.control.solvers.solver import (
 from vergence.errors import InputError
 from vergence.parts import knob, part
 from vergence.robot import Arm, manipulability_measure
+from vergence.robot.chain import Chain, jacobian
 from vergence.signals import OutcomeKind
 
 _RATES = KIND_NAMES.index("joint rates")
+_ROUNDING = 1e-15  # singular values below this fraction of the largest count as zero
 
 
 def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, str] | None:
@@ -49,33 +54,72 @@ class PseudoInverse:
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm."""
         _require_no_limits(setting, "pseudo_inverse")
-        return _BoundPseudoInverse(self, setting.arm)
+        return BoundPseudoInverse(self, setting.arm)
 
 
-class _BoundPseudoInverse:
+class BoundPseudoInverse:
+    """The pseudo-inverse for one arm."""
+
     names: tuple[str, ...] = KIND_NAMES
     keeps_limits = False
     view = UNBOUNDED
 
     def __init__(self, numbers: PseudoInverse, arm: Arm) -> None:
-        self._numbers, self._arm = numbers, arm
+        self.singular_below, self._arm = numbers.singular_below, arm
 
     def solve(self, problem: Problem) -> Solution:
         """Return the joint rates for one tick."""
-        twist = np.linalg.solve(problem.H, problem.g).astype(np.float64)
-        J = self._arm.jacobian(problem.q)
-        smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
-        J_inverse = np.linalg.pinv(J).astype(np.float64)
-        rates, scale = resolve_twist(J_inverse, twist, self._arm.rate_max)
-        secondary = secondary_rates(problem)
-        if secondary.any():
-            rates = rates + secondary - J_inverse @ (J @ secondary)
-        active = np.zeros(len(KIND_NAMES))
-        active[_RATES] = scale < 1.0
-        fault = singular_fault(smallest, self._numbers.singular_below)
-        measure = manipulability_measure(J) ** 2
-        none = np.zeros(len(KIND_NAMES))
-        return Solution(rates, scale * twist, measure, np.nan, active, none, True, fault)
+        arm = self._arm
+        tick = pseudo_inverse_rates(
+            arm.chain, problem.q, arm.rate_max, problem.H, problem.g, secondary_rates(problem)
+        )
+        active, none = np.zeros(len(KIND_NAMES)), np.zeros(len(KIND_NAMES))
+        active[_RATES] = tick.scale < 1.0
+        fault = singular_fault(tick.sigma, self.singular_below)
+        measure = manipulability_measure(arm.jacobian(problem.q)) ** 2
+        return Solution(tick.rates, tick.v_tip, measure, np.nan, active, none, True, fault)
+
+
+class PseudoInverseTick(NamedTuple):
+    """Joint rates by the pseudo-inverse."""
+
+    rates: FloatArray  # (n,) rad/s or m/s
+    v_tip: FloatArray  # (6,) m/s and rad/s
+    scale: float  # in (0, 1], of the twist, to satisfy the rate limits
+    sigma: float  # smallest singular value of J
+
+
+@njit(cache=True, error_model="numpy")
+def pseudo_inverse_rates(
+    chain: Chain,
+    q: FloatArray,
+    rate_max: FloatArray,
+    H: FloatArray,
+    g: FloatArray,
+    secondary: FloatArray,
+) -> PseudoInverseTick:
+    """Return q̇ = J⁺ H⁻¹ g, scaled, plus other joint rates (n,) projected into the null space.
+
+    Args:
+        chain: up to the tip.
+        q: joint positions, (n,).
+        rate_max: (n,).
+        H: of the twist of the tip, (6, 6).
+        g: (6,).
+        secondary: the other joint rates, which the limits do not scale.
+    """
+    J, twist = jacobian(chain, q), np.linalg.solve(H, g).astype(np.float64)
+    U, sigma, Vt = np.linalg.svd(J, False)
+    J_inverse = np.zeros((len(q), 6))
+    for k in range(len(sigma)):
+        if sigma[k] > _ROUNDING * sigma[0]:
+            for i in range(len(q)):
+                for r in range(6):
+                    J_inverse[i, r] += Vt[k, i] * U[r, k] / sigma[k]
+    rates, scale = resolve_twist(J_inverse, twist, rate_max)
+    if secondary.any():
+        rates += secondary - J_inverse @ (J @ secondary)
+    return PseudoInverseTick(rates, scale * twist, scale, sigma[-1])
 
 
 @part("solver", "damped_pseudo_inverse")

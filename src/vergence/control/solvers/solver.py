@@ -16,6 +16,9 @@ from vergence.signals import OutcomeKind
 Obstacles: TypeAlias = Callable[[], FloatArray]  # what may occlude the features now, (K, 16)
 
 
+NO_FACES = np.empty((0, 6))
+
+
 class Problem(NamedTuple):
     """The input of one tick."""
 
@@ -31,9 +34,9 @@ class Problem(NamedTuple):
     null_space_weight: float = 0.0  # lower bound on μ of ‖q̇ - q̇_null‖²
     depth_share: float = float("nan")  # largest relative deviation of a depth; NaN if unknown
     variance: float = 0.0  # variance of the rows of which H and g are made, caused by noise
-    # Faces that show the features, their centres and outward normals in the camera frame, (F, 6);
-    # None if no surface is known, in which case coplanar features are assumed to have one.
-    faces: FloatArray | None = None
+    # Faces that show the features, their centres and outward normals in the camera frame, (F, 6).
+    faces: FloatArray = NO_FACES
+    surface_known: bool = False  # if not, coplanar features are assumed to have a face
 
 
 class Solution(NamedTuple):

@@ -1,0 +1,133 @@
+"""A servo on image points as numbers, for the kernel of its tick."""
+
+from typing import NamedTuple
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.control.depth.carried import CarriedPoints
+from vergence.control.image_motion import ExposedFeatures, FeatureState
+from vergence.control.objectives import Quadratic
+from vergence.control.objectives._tracking import PackedSetup, TrackingGains
+from vergence.control.objectives.image_based import PointDecay
+from vergence.control.past_joints import PastJoints
+from vergence.control.solvers._program import ProgramSettings, ProgramState
+from vergence.control.target_flow import FlowState
+from vergence.robot.chain import Chain
+
+FINE, SINGULAR, NONSENSE = range(3)  # how a tick ends
+HELD, CARRIED, FROM_FEATURES = range(3)  # kinds of depth
+
+
+class SeenPoints(NamedTuple):
+    """An image's features, found or not."""
+
+    time: float  # s, of exposure
+    points: FloatArray  # (M, 2) normalized coordinates; NaN where not found
+    found: BoolArray  # (M,)
+
+
+class Moment(NamedTuple):
+    """The input of a tick."""
+
+    chain: Chain  # of the arm, up to the camera
+    image: SeenPoints  # a new one, in which a feature was found
+    q: FloatArray  # (n,) joint positions
+    velocity: FloatArray  # (n,) joint rates
+    time: float  # s
+
+
+class AsMeasured(NamedTuple):
+    """Features are used as measured, at the depth believed at the start."""
+
+    believed_m: FloatArray  # (M,)
+
+
+class PredictedMotion(NamedTuple):
+    """Features are predicted, or the target's motion fed forward: see `ImageMotion`."""
+
+    believed_m: FloatArray  # (M,)
+    depth: int  # HELD, CARRIED or FROM_FEATURES
+    features: FloatArray  # (M, 3) in the target's frame, m
+    rotations: FloatArray  # from `spread_rotations`
+    covariance: FloatArray  # (M, 2, 2) of the points, normalized
+    smoothing_s: float  # of the target's flow; infinite if it is not fed forward
+    prediction: bool
+
+
+class PointGoal(NamedTuple):
+    """The objective of `ImageBased`."""
+
+    decay: PointDecay
+    desired: FloatArray  # (M, 2) normalized coordinates
+    variance: float  # of a point's row
+
+
+class TrackingGoal(NamedTuple):
+    """The objective of `OptimalTracking` without avoidance."""
+
+    gains: TrackingGains
+    desired: FloatArray  # (M, 2) normalized coordinates
+    focal_px: FloatArray  # (2,)
+
+
+class InverseSolver(NamedTuple):
+    """The solver `PseudoInverse`."""
+
+    rate_max: FloatArray  # (n,)
+    singular_below: float
+
+
+class ProgramSolver(NamedTuple):
+    """The solver `QuadraticProgram`, without limits that are not made in kernels."""
+
+    settings: ProgramSettings
+    solids: FloatArray  # (K, 16) that may occlude features
+    surface_known: bool  # whether the faces around the features are
+    features: FloatArray  # (M, 3) in the target's frame, m
+    planes: FloatArray  # (F, 6) of `FeatureFaces`
+    holds: BoolArray  # (M, F) of `FeatureFaces`
+
+
+class PointLaw(NamedTuple):
+    """A law by an objective and a solver."""
+
+    chain: Chain  # up to the camera
+    motion: PredictedMotion
+    goal: PointGoal | TrackingGoal
+    solver: InverseSolver | ProgramSolver
+
+
+class TrackingLaw(NamedTuple):
+    """Optimal tracking by the inverse of the Jacobian, see `TrackingTickLaw`."""
+
+    chain: Chain
+    motion: AsMeasured | PredictedMotion
+    setup: PackedSetup
+    desired: FloatArray  # (M, 2) normalized coordinates
+    singular_below: float
+
+
+class LawMemory(NamedTuple):
+    """What a law remembers from tick to tick."""
+
+    joints: PastJoints
+    exposed: ExposedFeatures  # at a time of minus infinity before the first image
+    flow: FlowState
+    carried: CarriedPoints
+    pose: FloatArray  # (4, 4) T_scene_target fitted last, or `NO_POSE`
+    program: ProgramState
+
+
+class Wish(NamedTuple):
+    """What an objective wants of a solver."""
+
+    now: Moment
+    features: FeatureState  # those found
+    quadratic: Quadratic
+
+
+class LawTick(NamedTuple):
+    """The result of a tick."""
+
+    rates: FloatArray  # (n,) rad/s or m/s
+    end: int  # FINE, or why the law cannot continue
+    sigma: float  # smallest singular value of J, if the solver gives up below one

@@ -1,0 +1,263 @@
+"""The tick of a servo on image points as one kernel.
+
+It is `Servo.command` for one camera at the arm's tip, one objective and a constant reference, by
+the same kernels in the same order. Parts are told apart by their types, so that only what a law
+uses is compiled.
+"""
+
+from collections.abc import Callable, Mapping
+from inspect import signature
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.control.aligned import aligned, lifted
+from vergence.control.depth.carried import carried_depths
+from vergence.control.depth.from_features import fitted_depths
+from vergence.control.image_motion import (
+    ExposedFeatures,
+    FeatureState,
+    predicted_features,
+    unexplained_flow,
+)
+from vergence.control.limits import pack_features
+from vergence.control.objectives import Quadratic, optimal_tracking_tick
+from vergence.control.objectives.image_based import point_quadratic
+from vergence.control.objectives.optimal_tracking import tracking_quadratic
+from vergence.control.past_joints import past_position, remember
+from vergence.control.point_law import (
+    CARRIED,
+    FINE,
+    FROM_FEATURES,
+    HELD,
+    NONSENSE,
+    SINGULAR,
+    AsMeasured,
+    InverseSolver,
+    LawMemory,
+    LawTick,
+    Moment,
+    PointGoal,
+    PointLaw,
+    PredictedMotion,
+    ProgramSolver,
+    TrackingGoal,
+    TrackingLaw,
+    Wish,
+)
+from vergence.control.solvers._program import FurtherRows, program_tick
+from vergence.control.solvers.pseudo_inverse import pseudo_inverse_rates
+from vergence.control.solvers.solver import Problem
+from vergence.control.target_flow import flow_at, measured_flow
+from vergence.estimation.feature_faces import faces_in_view
+from vergence.geometry import se3_inverse
+from vergence.robot.chain import forward_kinematics
+
+_FEWEST_TURNED = 3  # features that determine the orientation of the target
+
+
+def by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator of a function that is, in kernels, the one for its first argument.
+
+    The functions become part of the kernel that calls them: compiled by themselves as well, each
+    would cost its time again.
+
+    Args:
+        functions: by the type of their first argument; their parameters have the same names.
+    """
+    bare = {part: FunctionType(f.__code__, f.__globals__) for part, f in functions.items()}
+
+    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+        def choose(part: Any, *_others: Any) -> Callable[..., Any]:
+            return bare[part.instance_class]
+
+        choose.__signature__ = signature(next(iter(bare.values())))  # type: ignore[attr-defined]
+        overload(function, jit_options={"error_model": "numpy"})(choose)
+        return function
+
+    return declare
+
+
+def measured_now(
+    motion: AsMeasured, memory: LawMemory, now: Moment
+) -> tuple[LawMemory, FeatureState]:
+    """Return features as they were measured."""
+    points = now.image.points
+    return memory, FeatureState(points, np.zeros_like(points), motion.believed_m, np.nan)
+
+
+def predicted_now(
+    motion: PredictedMotion, memory: LawMemory, now: Moment
+) -> tuple[LawMemory, FeatureState]:
+    """Process an image and return the features now, as `ImageMotion.update` does.
+
+    Args:
+        motion: the assumptions.
+        memory: of the law.
+        now: the input of the tick.
+    """
+    image, chain = now.image, now.chain
+    remember(memory.joints, now.time, now.q)
+    q_exposed = past_position(memory.joints, image.time)
+    T_camera_scene = se3_inverse(forward_kinematics(chain, q_exposed))
+    pose, carried, depth_m, share = memory.pose, memory.carried, motion.believed_m, np.nan
+    if motion.depth == FROM_FEATURES:
+        pose, depth_m, share = fitted_depths(
+            pose, T_camera_scene, image.points, image.found, motion.covariance, depth_m,
+            motion.features, motion.rotations,
+        )  # fmt: skip
+    elif motion.depth == CARRIED:
+        unknown = np.full(len(depth_m), np.nan)
+        depth_m, carried = carried_depths(
+            carried, T_camera_scene, image.points, image.found, depth_m, unknown
+        )
+    flow = memory.flow
+    if memory.exposed.time > -np.inf:
+        elapsed_s = image.time - memory.exposed.time
+        seen = unexplained_flow(memory.exposed, T_camera_scene, image.points, elapsed_s)
+        flow = measured_flow(flow, seen, image.found, elapsed_s, motion.smoothing_s)
+    exposed = ExposedFeatures(image.time, T_camera_scene, image.points, depth_m, share)
+    after = LawMemory(memory.joints, exposed, flow, carried, pose, memory.program)
+    if not motion.prediction:
+        return after, FeatureState(image.points, flow_at(flow, 0.0), depth_m, share)
+    here, late_s = se3_inverse(forward_kinematics(chain, now.q)), now.time - image.time
+    moved = predicted_features(exposed, flow, here, motion.believed_m, late_s)
+    if motion.depth == HELD:
+        moved = FeatureState(moved.points, moved.flow, motion.believed_m, moved.depth_share)
+    return after, moved
+
+
+@by_type({AsMeasured: measured_now, PredictedMotion: predicted_now})
+def features_now(motion: Any, memory: LawMemory, now: Moment) -> tuple[LawMemory, FeatureState]:
+    """Return the features now, and the memory after this image."""
+    raise NotImplementedError
+
+
+def _point_goal(goal: PointGoal, now: FeatureState, found: BoolArray) -> Quadratic:
+    desired, no_weights = goal.desired[found], np.empty((0, 2, 2))
+    return point_quadratic(
+        goal.decay, now.points, now.depth, desired, now.depth, now.flow, no_weights, goal.variance
+    )
+
+
+def _tracking_goal(goal: TrackingGoal, now: FeatureState, found: BoolArray) -> Quadratic:
+    columns = np.empty((len(now.points), 7))
+    columns[:, :2], columns[:, 2:4], columns[:, 5:] = now.points, goal.desired[found], now.flow
+    columns[:, 4] = now.depth
+    return tracking_quadratic(columns, goal.focal_px, goal.gains, 1.0, np.zeros(6))
+
+
+@by_type({PointGoal: _point_goal, TrackingGoal: _tracking_goal})
+def quadratic_of(goal: Any, now: FeatureState, found: BoolArray) -> Quadratic:
+    """Return the quadratic of an objective for the features found."""
+    raise NotImplementedError
+
+
+def _with_flow(_motion: PredictedMotion, now: FeatureState, desired: FloatArray) -> FloatArray:
+    columns = np.empty((len(desired), 7))
+    columns[:, :2], columns[:, 2:4], columns[:, 5:] = now.points, desired, now.flow
+    columns[:, 4] = now.depth
+    return columns
+
+
+def _without_flow(_motion: AsMeasured, now: FeatureState, desired: FloatArray) -> FloatArray:
+    columns = np.empty((len(desired), 5))
+    columns[:, :2], columns[:, 2:4], columns[:, 4] = now.points, desired, now.depth
+    return columns
+
+
+@by_type({AsMeasured: _without_flow, PredictedMotion: _with_flow})
+def tracking_columns(_motion: Any, now: FeatureState, desired: FloatArray) -> FloatArray:
+    """Return features as `optimal_tracking_tick` takes them, (M, 5), or (M, 7) with flow."""
+    raise NotImplementedError
+
+
+def _by_inverse(solver: InverseSolver, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
+    now, H, g = wish.now, wish.quadratic.H, wish.quadratic.g
+    tick = pseudo_inverse_rates(now.chain, now.q, solver.rate_max, H, g, np.zeros(len(now.q)))
+    end = SINGULAR if tick.sigma < solver.singular_below else FINE
+    return memory, LawTick(tick.rates, end, tick.sigma)
+
+
+def _by_program(solver: ProgramSolver, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
+    now, features, found = wish.now, wish.features, wish.now.image.found
+    n, faces, none = len(now.q), np.empty((0, 6)), np.empty(0)
+    if solver.surface_known and len(features.points) >= _FEWEST_TURNED:
+        pose = aligned(solver.features[found], lifted(features.points, features.depth))
+        faces = faces_in_view(pose, solver.planes, solver.holds[found], np.empty((0, 3)))
+    problem = Problem(
+        now.q,
+        now.velocity,
+        wish.quadratic.H,
+        wish.quadratic.g,
+        pack_features(features.points, features.flow, features.depth, None),
+        np.zeros(n),
+        np.empty((0, 0)),
+        none,
+        np.empty((0, 0)),
+        0.0,
+        features.depth_share,
+        wish.quadratic.variance,
+        faces,
+        solver.surface_known,
+    )
+    further = FurtherRows(np.empty((0, n)), none, np.empty(0, dtype=np.int64))
+    answer, state = program_tick(
+        now.chain, solver.settings, memory.program, problem, solver.solids, further
+    )
+    after = LawMemory(
+        memory.joints, memory.exposed, memory.flow, memory.carried, memory.pose, state
+    )
+    return after, LawTick(answer.rates, FINE, np.nan)
+
+
+@by_type({InverseSolver: _by_inverse, ProgramSolver: _by_program})
+def solved_by(solver: Any, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
+    """Return the joint rates that serve an objective best, and the memory after this tick."""
+    raise NotImplementedError
+
+
+def _point_law_tick(law: PointLaw, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTick]:
+    memory, features = features_now(law.motion, memory, now)
+    features = _found(features, now.image.found)
+    quadratic = quadratic_of(law.goal, features, now.image.found)
+    if not (np.isfinite(quadratic.H).all() and np.isfinite(quadratic.g).all()):
+        return memory, LawTick(np.zeros(len(now.q)), NONSENSE, np.nan)
+    memory, tick = solved_by(law.solver, memory, Wish(now, features, quadratic))
+    return memory, tick
+
+
+def _tracking_law_tick(
+    law: TrackingLaw, memory: LawMemory, now: Moment
+) -> tuple[LawMemory, LawTick]:
+    memory, features = features_now(law.motion, memory, now)
+    features, desired = _found(features, now.image.found), law.desired[now.image.found]
+    columns = tracking_columns(law.motion, features, desired)
+    answer, n = np.empty(len(now.q) + 10), len(now.q)
+    optimal_tracking_tick(law.setup.weights, law.setup.joints, now.q, columns, answer)
+    sigma = answer[n + 9]
+    return memory, LawTick(answer[:n], SINGULAR if sigma < law.singular_below else FINE, sigma)
+
+
+@by_type({PointLaw: _point_law_tick, TrackingLaw: _tracking_law_tick})
+def law_tick(law: Any, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTick]:
+    """Return the joint rates for a moment, and the memory after it.
+
+    Args:
+        law: its numbers.
+        memory: from the tick before.
+        now: the input of the tick.
+    """
+    raise NotImplementedError
+
+
+@njit(cache=True, error_model="numpy")
+def _found(features: FeatureState, found: BoolArray) -> FeatureState:
+    """Return the features that were found."""
+    return FeatureState(
+        features.points[found], features.flow[found], features.depth[found], features.depth_share
+    )
