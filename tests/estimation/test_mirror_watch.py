@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.cell.schema import TagTable
 from vergence.estimation import (
@@ -39,7 +40,7 @@ class Film:
         R = so3_exp(np.array([np.pi, 0.0, 0.0])) @ so3_exp(turn)
         return se3(R, np.array([0.05 * np.sin(t), 0.03 * np.cos(t), 0.7]))
 
-    def corners(self, frame: Frame) -> ImagePoints:
+    def corners(self, frame: Frame, _T: FloatArray | None = None) -> ImagePoints:
         rng = np.random.default_rng([self._seed, round(frame.time * RATE_HZ)])
         true = CAMERA.project(transform_points(self.pose(frame.time), CORNERS))
         spread = np.tile(np.eye(2) * self._noise**2, (4, 1, 1))

@@ -222,7 +222,7 @@ def test_target_that_jumped_away_is_found_over_the_whole_image():
 
     cell = Cell(motion=jumping)
 
-    def find(frame):
+    def find(frame, T_camera_target):
         places = cell.truth_px(frame)
         count = len(places)
         return ImagePoints(

@@ -15,7 +15,7 @@ from vergence.vision.known_object import ObjectModel, SilhouetteTracker, as_foll
 
 def test_a_mug_is_followed_and_found_again_where_it_was_seen_last() -> None:
     blind = {"wrist": {"blind_s": [[0.4, 0.9]]}}
-    run = vg.run("mug", duration_s=1.5, cameras=blind, target={"motion": {"kind": "stationary"}})
+    run = vg.run("mug", duration_s=2.5, cameras=blind, target={"motion": {"kind": "stationary"}})
     assert run.outcome.succeeded
     names = [event.name for event in run.events]
     assert names == ["target out of sight", "target in sight"]

@@ -20,6 +20,7 @@ from vergence.estimation import (
     Blocked,
     CameraPose,
     CameraRig,
+    Find,
     FollowedPose,
     HeldTarget,
     IndexSelection,
@@ -94,12 +95,21 @@ def _followed(
     rig = CameraRig.of({name: cameras[name] for name in cell.watched}, expected)
     surroundings = _surroundings(context)
     finder = TagFinder(cell.target.tag) if images and cell.target.tag is not None else None
+    measure = _measure(context, model, images, finder)
+    find: Find | None = None
+    if finder is not None:
+        find = finder.find
+    elif images:
+        from vergence.assembly.lost_object import ObjectFinder
+
+        watched = {name: cameras[name] for name in cell.watched}
+        find = ObjectFinder(model, watched, measure)
     parts: dict[str, Any] = {
         "selection": IndexSelection() if table.selection == "indexes" else InformationSelection(),
         "settings": PerceptionSettings(
             budget=table.budget, margin_px=table.border_px, apart_px=table.feature_distance_px
         ),
-        "find": finder.find if finder is not None else None,
+        "find": find,
         "blocked_at": surroundings.blocked_at if table.occlusion else None,
     }
     if by_outline(model):  # no image: points inside it, which it does not hide, represent it
@@ -115,16 +125,16 @@ def _followed(
         rig,
         shape,
         surroundings.camera_pose,
-        _measure(context, model, images, finder),
+        measure,
         target_filter,
         start,
         **parts,
     )
-    watched: PosePerception[Any] | MirrorWatch = perception
+    follower: PosePerception[Any] | MirrorWatch = perception
     if cell.target.tag is not None:
-        watched = MirrorWatch(perception, rig, surroundings.camera_pose, shape.points)
+        follower = MirrorWatch(perception, rig, surroundings.camera_pose, shape.points)
     tip_pose = surroundings.tip_pose
-    return watched if tip_pose is None else HeldTarget(watched, tip_pose)
+    return follower if tip_pose is None else HeldTarget(follower, tip_pose)
 
 
 def by_outline(model: "ObjectModel") -> bool:

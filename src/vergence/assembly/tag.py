@@ -89,8 +89,8 @@ class TagFinder:
             ("",) * len(features),
         )
 
-    def find(self, frame: Frame) -> ImagePoints | None:
-        """Return all corners wherever they are in an image, or None."""
+    def find(self, frame: Frame, _T_camera_target: FloatArray | None = None) -> ImagePoints | None:
+        """Return all corners wherever they are in an image, or None; see `Find`."""
         tag = self.tag(frame)
         if isinstance(tag, str):
             return None

@@ -9,26 +9,42 @@ from vergence.camera import Camera
 from vergence.estimation.object_follower import (
     FollowRule,
     ObjectFollower,
-    ObjectTracker,
     Sighting,
     Step,
 )
-from vergence.estimation.object_rivals import DECIDED, Evidence, Rival, compare_poses
-from vergence.estimation.object_search import search_object
+from vergence.estimation.object_rivals import (
+    DECIDED,
+    Chosen,
+    Evidence,
+    Rival,
+    choose_pose,
+    compare_poses,
+    covered,
+    is_new_view,
+)
+from vergence.estimation.object_search import AT_ONCE, ObjectSearch, SearchPace
+from vergence.estimation.object_tracker import ObjectTracker
+from vergence.geometry import se3_compose
 from vergence.vision.known_object import EdgeTracker
-from vergence.vision.known_object.look_alikes import Turn, between, symmetries
+from vergence.vision.known_object.look_alikes import Turn, apart_rad, between
 
-_LEAST_FOUND = 0.75  # fraction of a lost object that must be found
 _MISSED = 2  # consecutive images without the object, after which it is searched for elsewhere
+_MOST_RIVALS = 3  # that are tracked in parallel
+# While an object is hidden it turns by this angle and at this rate, rad/s, at most.
+_TURN_RAD, _TURN_RATE = 0.3, 3.0
+_STALE_RAD = 0.1  # turn of the camera after which a search begins again
 
 
 class HypothesisFollower:
     """Tracks an object from one or several initial poses.
 
-    When there is no memory of an object with edges, at the start and after a loss, rotated poses
-    are tried as well. One that fits clearly better replaces the given one; one that fits equally
-    well is tracked in parallel until the images decide, and until then the object is ambiguous. A
-    lost object is searched for around its last position, in every image.
+    At the start, rotated poses of an object with edges are tried as well. One that fits clearly
+    better replaces the given one; one that fits equally well is tracked in parallel until the
+    images decide, and until then the object is ambiguous.
+
+    A lost object is searched for in whole images, at all places and many rotations. It counts as
+    found when these have been compared, wherever it is; what the images do not distinguish is
+    ambiguous.
 
     Args:
         tracker: finds the object's edges, or its outline.
@@ -38,6 +54,8 @@ class HypothesisFollower:
         time: of the first image, s.
         period: between images, s.
         rule: when an image is accepted.
+        known: standard deviation of the first pose, m and rad; at least that of `jolt_px`.
+        pace: how much of a search is done for each image.
     """
 
     def __init__(
@@ -48,18 +66,26 @@ class HypothesisFollower:
         time: float,
         period: float,
         rule: FollowRule | None = None,
+        known: tuple[float, float] = (0.0, 0.0),
+        pace: SearchPace = AT_ONCE,
     ) -> None:
         self._tracker, self._camera, self._period = tracker, camera, period
-        self._rule = rule or FollowRule()
-        self._main = self._begin(starts[0], time, tracker.blank())
+        self._rule, self._pace = rule or FollowRule(), pace
+        self._main = self._begin(starts[0], time, tracker.blank(), known)
         self._others = tuple(starts[1:])
         self._by_edges = isinstance(tracker, EdgeTracker)
-        self._turns = symmetries(tracker.model) if self._by_edges else []
+        self._turns = tracker.symmetries()
         self._rivals: list[Rival] = []
         self._evidence = Evidence()
+        self._compared_at: FloatArray | None = None  # pose in the last image that gave evidence
         self._last: FloatArray | None = None  # its last position
+        self._last_time = self._hidden_until = time  # s, when it was seen last and then appeared
         self._missed = 0
-        self._compared = False
+        self._lost = False  # until rotated poses have been compared
+        self._search = ObjectSearch(tracker, camera, pace, self._rule.found_again)
+        self._searching = False
+        self._undecided = ""  # what the last round of the search left open
+        self._compared = not self._by_edges
         self.note = ""  # which pose replaced the given one
 
     @property
@@ -82,27 +108,38 @@ class HypothesisFollower:
         """Whether the object has ever been found; if not, it is not searched for."""
         return self._last is not None
 
+    def carry(self, T_now_before: FloatArray) -> None:
+        """Account for a motion of the camera: its previous pose (4, 4) in its present frame."""
+        for follower in (self._main, *(rival.follower for rival in self._rivals)):
+            follower.carry(T_now_before)
+        if self._last is not None:
+            self._last = se3_compose(T_now_before, self._last)
+
     def follow(self, image: ImageArray, time: float) -> Step:
         """Process the next image.
 
         Raises:
             InputError: if the image does not have the camera's size.
         """
-        if self._by_edges and not self._compared:
+        if not self._compared:
             self._compare(image, time)
-        step = self._main.follow(image, time)
-        if step.sighting is not Sighting.SEEN and self._last is not None:
+        step = self._main.skip(time) if self._lost else self._main.follow(image, time)
+        if self.was_seen and step.sighting is not Sighting.SEEN:
+            self._lost = self._lost or step.sighting is Sighting.LOST
             step = self._sought(image, time, step)
         step = self._beside_rivals(image, time, step)
-        if step.sighting is Sighting.SEEN:
-            self._last, self._missed = step.T_camera_target, 0
+        if step.sighting in (Sighting.SEEN, Sighting.AMBIGUOUS):
+            self._last, self._last_time = step.T_camera_target, time
+            self._missed, self._lost, self._searching = 0, False, False
         else:
             self._missed += 1
         return step
 
-    def _begin(self, T: FloatArray, time: float, memory: Any) -> ObjectFollower:
+    def _begin(
+        self, T: FloatArray, time: float, memory: Any, known: tuple[float, float] = (0.0, 0.0)
+    ) -> ObjectFollower:
         return ObjectFollower(
-            self._tracker, self._camera, T, time, self._period, self._rule, memory
+            self._tracker, self._camera, T, time, self._period, self._rule, memory, known
         )
 
     def _compare(self, image: ImageArray, time: float) -> None:
@@ -119,33 +156,60 @@ class HypothesisFollower:
         self._evidence, self._compared, self._others = Evidence(), True, ()
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
-        """Search for a lost object elsewhere; return the step unchanged if it is not found."""
-        missed = self._missed + 1
-        if missed < _MISSED or self._last is None:
+        """Search for the object; return the step that says it is not seen if it is not found."""
+        assert self._last is not None
+        search = self._search
+        if self._missed + 1 < _MISSED:
             return step
-        place = search_object(
-            self._tracker, image, self._camera, self._last, self._main.start_covariance,
-            self._main.memory, missed, max(self._rule.surprising_share, _LEAST_FOUND),
-        )  # fmt: skip
-        if place is None:
+        if not self._searching or apart_rad(search.T_last, self._last) > _STALE_RAD:
+            search.begin(self._last, self._main.memory)
+            self._searching, self._undecided = True, ""
+        if not search.promising:
+            self._hidden_until = time
+        fits = search.look(image)
+        if fits is None:
+            return replace(step, reason=self._undecided or step.reason)
+        self._undecided = ""
+        if fits[0].share < self._rule.found_again:
             return step
-        again = self._begin(place, time, self._main.memory)
-        found = again.follow(image, time)
+        most_rad = _TURN_RAD + _TURN_RATE * (self._hidden_until - self._last_time)
+        chosen = choose_pose(fits, self._last, self._turns, search.free_axes, most_rad)
+        return step if chosen is None else self._found(image, time, step, chosen)
+
+    def _found(self, image: ImageArray, time: float, step: Step, chosen: Chosen) -> Step:
+        """Track an object from where it was found, beside the poses that fit equally well."""
+        memory = self._tracker.elsewhere(self._main.memory)
+        deviation = self._search.deviation
+        main = self._begin(chosen.T_camera_target, time, memory, deviation)
+        found = main.follow(image, time)
         if found.sighting is not Sighting.SEEN:
             return step
-        self._main, self._rivals, self._compared = again, [], False
+        rivals = [T for T in chosen.rivals if not covered(found, T)]
+        if len(rivals) > _MOST_RIVALS:
+            self._undecided = f"{len(rivals) + 1} poses explain the image equally well"
+            return replace(step, reason=self._undecided)
+        self._main, self._lost, self._evidence = main, False, Evidence()
+        self._compared_at = None
+        self._rivals = [Rival(self._begin(T, time, memory, deviation), Evidence()) for T in rivals]
         return found
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
         """Track the rotated poses too; drop worse ones, adopt one that explains more."""
         if not self._rivals:
             return step
-        self._evidence = self._evidence.and_seen(step.share, len(step.samples_found))
+        new = is_new_view(step.T_camera_target, self._compared_at)
+        if new:
+            self._compared_at = step.T_camera_target
+            self._evidence = self._evidence.and_seen(step.share, len(step.samples_found))
         kept: list[tuple[Rival, Step]] = []
         for rival in self._rivals:
             seen = rival.follower.follow(image, time)
-            evidence = rival.evidence.and_seen(seen.share, len(seen.samples_found))
-            if seen.sighting is not Sighting.LOST and self._evidence.over(evidence) < DECIDED:
+            evidence = rival.evidence
+            if new:
+                evidence = evidence.and_seen(seen.share, len(seen.samples_found))
+            same = step.sighting is Sighting.SEEN and covered(step, seen.T_camera_target)
+            gone = same or seen.sighting is Sighting.LOST
+            if not gone and self._evidence.over(evidence) < DECIDED:
                 kept.append((Rival(rival.follower, evidence), seen))
         better = [each for each in kept if each[0].evidence.over(self._evidence) > DECIDED]
         if better:

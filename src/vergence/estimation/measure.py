@@ -16,8 +16,8 @@ from vergence.signals import Frame, ImagePoints, SearchWindows
 Joints: TypeAlias = Mapping[str, FloatArray]  # arm name to joint positions, rad or m
 # camera_pose(camera, joints at the exposure) -> T_world_camera (4, 4)
 CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
-# find(frame) -> all features of the target, wherever they are in the image, or None
-Find: TypeAlias = Callable[[Frame], ImagePoints | None]
+# find(frame, last T_camera_target) -> all features of the target, wherever they are, or None
+Find: TypeAlias = Callable[[Frame, FloatArray], ImagePoints | None]
 
 _NO_POINTS, _NO_COVARIANCE = np.empty((0, 2)), np.empty((0, 2, 2))
 UNSEEN = (  # the reason for each `ViewStatus`

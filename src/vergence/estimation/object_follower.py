@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,89 +19,14 @@ from vergence.estimation import (
     with_unseen,
     without_unseen,
 )
+from vergence.estimation.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import se3_compose, so3_log
 from vergence.signals import ImagePoints
-from vergence.vision.known_object import ObjectModel
 
 CAMERA = "camera"
 LEAST_SHARE = 0.2  # below this fraction, an object cannot be distinguished from its background
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
-
-
-class Measurement(Protocol):
-    """The measurement of an object in an image, as points for a filter."""
-
-    points: FloatArray  # (M, 3) object's frame, m
-    points_px: FloatArray  # (M, 2)
-    covariance_px: FloatArray  # (M, 2, 2) px²
-    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
-    expected: int  # number of places that should be visible
-    usual: float  # fraction found, each place weighted by how often it was found recently
-    samples_px: FloatArray  # (N, 2) the places examined
-    samples_found: np.typing.NDArray[np.bool_]  # (N,)
-
-    @property
-    def unseen(self) -> FloatArray:
-        """Motions (δp, δθ) that are not observable, (6, K), along camera axes, m and rad."""
-        ...
-
-    @property
-    def shared(self) -> FloatArray:
-        """Covariance (6, 6) of the pose error common to all images."""
-        ...
-
-    @property
-    def astray(self) -> FloatArray:
-        """Covariance (6, 6) of the additional error while a rotation is unknown."""
-        ...
-
-    @property
-    def share(self) -> float:
-        """Fraction of what should be visible that was found, 0 … 1."""
-        ...
-
-
-class ObjectTracker(Protocol):
-    """Measures an object near its predicted pose: `EdgeTracker`, `SilhouetteTracker`."""
-
-    @property
-    def model(self) -> ObjectModel:
-        """The object."""
-        ...
-
-    @property
-    def free(self) -> str:
-        """Which rotations no image can show; empty if there are none."""
-        ...
-
-    def free_motions(self, T_camera_target: FloatArray) -> FloatArray:
-        """Return the motions (δp, δθ) that no image can show, (6, K), along camera axes."""
-        ...
-
-    @property
-    def sought(self) -> str:
-        """What it searches for, for messages."""
-        ...
-
-    def blank(self) -> Any:
-        """Return the memory before the first image."""
-        ...
-
-    def measure(
-        self,
-        image: ImageArray,
-        camera: Camera,
-        T_camera_target: FloatArray,
-        pose_covariance: FloatArray,
-        memory: Any,
-    ) -> Any:
-        """Return the `Measurement` of an image."""
-        ...
-
-    def remember(self, memory: Any, seen: Any) -> Any:
-        """Return the memory after an accepted image."""
-        ...
 
 
 class Sighting(StrEnum):
@@ -141,6 +66,7 @@ class FollowRule:
     least_of_all: float = 0.5  # of all that should be visible
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
     least_points: int = 6  # measured, to accept an image; an edge has two
+    found_again: float = 0.85  # of all, and of what is usually found, to find a lost object
     missed_max: int = 12  # consecutive images without the object, after which it is lost
     # Standard deviation of the rotation beyond which the pose is unknown.
     turn_max_rad: float = 0.25
@@ -153,12 +79,13 @@ class FollowRule:
             least_of_all=share,
             least_share=min(self.least_share, share + 0.07),
             surprising_share=max(self.surprising_share, share),
+            found_again=max(self.found_again, share),
         )
 
 
 # Lines across an outline are found independently, and half of it may be occluded.
 OUTLINE_RULE = FollowRule(
-    least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25
+    least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25, found_again=0.7
 )
 
 
@@ -211,7 +138,12 @@ class ObjectFollower:
         self._start = np.diag(start**2)
         self.start_covariance = self._start[:6, :6]  # of (δp, δθ) at the start
         self._memory = tracker.blank() if memory is None else memory
-        self.restart(T_camera_target, time)
+        self._unseen = tracker.free_motions(T_camera_target)
+        self._belief: Belief = self._filter.start(
+            time, T_camera_target, covariance=with_unknown(self._start, self._unseen)
+        )
+        self._shared = np.zeros((6, 6))
+        self._missed, self._reason = 0, ""
 
     @property
     def tracker(self) -> ObjectTracker:
@@ -232,17 +164,6 @@ class ObjectFollower:
     def in_color(self) -> bool:
         """Whether images must be in colour, (height, width, 3); else grey, (height, width)."""
         return getattr(self._tracker, "channels", 1) == 3
-
-    def restart(self, T_camera_target: FloatArray, time: float) -> None:
-        """Search for the object around a pose (4, 4) again; its appearance is kept."""
-        self._unseen = self._tracker.free_motions(T_camera_target)
-        self._belief: Belief = self._filter.start(
-            time,
-            T_camera_target,
-            covariance=with_unknown(self._start, self._unseen),
-        )
-        self._shared = np.zeros((6, 6))
-        self._missed = 0
 
     def carry(self, T_now_before: FloatArray) -> None:
         """Account for a motion of the camera: its previous pose (4, 4) in its present frame.
@@ -288,19 +209,37 @@ class ObjectFollower:
         else:
             self._missed += 1
             sighting = Sighting.LOST if self._missed > self._rule.missed_max else Sighting.PREDICTED
+        return self._step(time, sighting, reason, seen, doubt.share_decided)
+
+    def skip(self, time: float) -> Step:
+        """Account for an image that is not examined, because the object is lost."""
+        self._belief = self._filter.predict(self._belief, time)
+        self._missed += 1
+        return self._step(time, Sighting.LOST, self._reason, None, share_decided=False)
+
+    def _step(
+        self,
+        time: float,
+        sighting: Sighting,
+        reason: str,
+        seen: Measurement | None,
+        share_decided: bool,
+    ) -> Step:
+        belief, self._reason = self._belief, reason
+        astray = np.zeros((6, 6)) if seen is None else seen.astray
         return Step(
             time,
             sighting,
             reason,
             belief.T_world_target,
             belief.velocity,
-            told_covariance(belief, self._unseen, self._shared, seen.astray),
+            told_covariance(belief, self._unseen, self._shared, astray),
             self._deviation(),
-            seen.unseen,
-            seen.share,
-            seen.samples_px,
-            seen.samples_found,
-            share_decided=doubt.share_decided,
+            self._unseen,
+            0.0 if seen is None else seen.share,
+            np.zeros((0, 2)) if seen is None else seen.samples_px,
+            np.zeros(0, dtype=np.bool_) if seen is None else seen.samples_found,
+            share_decided=share_decided,
         )
 
     def _look(

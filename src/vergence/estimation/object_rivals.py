@@ -12,14 +12,27 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.object_follower import ObjectFollower, ObjectTracker
-from vergence.vision.known_object.look_alikes import Turn, apart_rad, between, turns_of
+from vergence.estimation.object_follower import ObjectFollower, Step
+from vergence.estimation.object_search import Fit
+from vergence.estimation.object_tracker import ObjectTracker
+from vergence.estimation.unseen_turns import pose_error
+from vergence.geometry import se3_compose
+from vergence.vision.known_object.look_alikes import (
+    Turn,
+    apart_rad,
+    axes_apart_rad,
+    between,
+    turns_of,
+)
 
 DECIDED = 3.0  # standard deviations between two fractions
 _ALIKE = 4.0  # neighbouring places that are found or missed together
 _IMAGES_ALIKE = 5.0  # and consecutive images
+_NEW_VIEW_RAD, _NEW_VIEW = 0.03, 0.02  # turn and motion, relative to the distance, of a new view
 _SAME_RAD = 0.1
 _SAME = 0.05  # relative to the distance
+_OF_BEST = 0.85  # fraction of the best share below which a pose is no rival
+_COVERED = 16.8  # χ² with six degrees of freedom: 99 of 100
 
 
 class Evidence(NamedTuple):
@@ -56,6 +69,78 @@ class Candidate(NamedTuple):
     T_camera_target: FloatArray  # (4, 4)
     share: float  # fraction of what should be visible that was found
     evidence: Evidence
+
+
+class Chosen(NamedTuple):
+    """The pose that fits an image best, and those that fit it equally well."""
+
+    T_camera_target: FloatArray  # (4, 4)
+    rivals: list[FloatArray]  # (4, 4) each
+
+
+def choose_pose(
+    fits: Sequence[Fit],
+    T_last: FloatArray,
+    symmetries: Sequence[Turn],
+    free: FloatArray,
+    most_rad: float = np.inf,
+) -> Chosen | None:
+    """Choose among the poses at which a lost object was found.
+
+    Poses after which no image differs are one pose: the one turned least since it was seen counts,
+    and another is a rival if it is turned less than twice as far.
+
+    Args:
+        fits: the poses, at least one, best first.
+        T_last: last pose, (4, 4).
+        symmetries: rotations that map the object onto itself.
+        free: axes of the object about which its rotation is not observable, (K, 3).
+        most_rad: how far it may have turned since.
+
+    Returns:
+        None if it has turned farther at the pose that fits clearly best.
+    """
+
+    def twins(T: FloatArray, near: FloatArray) -> list[tuple[float, FloatArray]]:
+        alike = [T, *(se3_compose(T, turn.T_target_turned) for turn in symmetries)]
+        turns = axes_apart_rad(near[:3, :3], np.array(alike)[:, :3, :3], free)
+        return sorted(zip(turns.tolist(), alike, strict=True), key=lambda each: each[0])
+
+    def same(T: FloatArray, other: FloatArray) -> bool:
+        turned = axes_apart_rad(T[:3, :3], other[None, :3, :3], free)[0]
+        return bool(turned < _SAME_RAD) and _near(T, other)
+
+    best = Evidence().and_seen(fits[0].share, fits[0].expected)
+    fits = [fit for fit in fits if twins(fit.T_camera_target, T_last)[0][0] <= most_rad]
+    fits = [fit for fit in fits if fit.share >= _OF_BEST * fits[0].share]
+    evidences = [Evidence().and_seen(fit.share, fit.expected) for fit in fits]
+    if not fits or best.over(evidences[0]) > DECIDED:
+        return None
+    (turned, chosen), *others = twins(fits[0].T_camera_target, T_last)
+    rivals = [T for angle, T in others if angle < min(2.0 * turned, most_rad)]
+    for fit, evidence in zip(fits[1:], evidences[1:], strict=True):
+        T = twins(fit.T_camera_target, chosen)[0][1]
+        alike = any(same(T, other) for other in (chosen, *rivals))
+        if evidences[0].over(evidence) < DECIDED and not alike:
+            rivals.append(T)
+    return Chosen(chosen, rivals)
+
+
+def is_new_view(T: FloatArray, T_before: FloatArray | None) -> bool:
+    """Return whether an object is seen differently than at a pose before: both (4, 4).
+
+    What speaks for a wrong pose in one image does so in every image of the same view.
+    """
+    if T_before is None:
+        return True
+    moved = float(np.linalg.norm(T[:3, 3] - T_before[:3, 3]))
+    return apart_rad(T, T_before) > _NEW_VIEW_RAD or moved > _NEW_VIEW * abs(float(T[2, 3]))
+
+
+def covered(step: Step, T: FloatArray) -> bool:
+    """Return whether the covariance that is stated with a pose covers another pose (4, 4)."""
+    error = pose_error(T, step.T_camera_target)
+    return float(error @ np.linalg.solve(step.covariance[:6, :6], error)) < _COVERED
 
 
 def compare_poses(
@@ -119,5 +204,9 @@ def _distinct(
 
 
 def _same(T: FloatArray, T_other: FloatArray) -> bool:
+    return apart_rad(T, T_other) < _SAME_RAD and _near(T, T_other)
+
+
+def _near(T: FloatArray, T_other: FloatArray) -> bool:
     away = float(np.linalg.norm(T[:3, 3] - T_other[:3, 3]))
-    return apart_rad(T, T_other) < _SAME_RAD and away < _SAME * abs(float(T[2, 3]))
+    return away < _SAME * abs(float(T[2, 3]))

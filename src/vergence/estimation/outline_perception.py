@@ -6,14 +6,11 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
+from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.measure import CameraPose
-from vergence.estimation.object_follower import (
-    OUTLINE_RULE,
-    ObjectFollower,
-    ObjectTracker,
-    Sighting,
-    Step,
-)
+from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
+from vergence.estimation.object_search import IN_A_LOOP
+from vergence.estimation.object_tracker import ObjectTracker
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, ImagePoints, Observation, TargetState
 
@@ -24,7 +21,8 @@ class OutlinePerception:
     """Tracks one target with one camera by its outline; a stage of the loop.
 
     The filter works in the camera frame; the camera's own motion, known from the joints, is applied
-    to its state. A lost target is searched for at its last position.
+    to its state. A lost target is searched for in whole images, a part of the search for each, and
+    found when the poses that explain the images equally well have been excluded.
 
     Args:
         name: of the camera; images of other cameras are ignored.
@@ -53,7 +51,7 @@ class OutlinePerception:
         self._name, self._camera, self._tracker = name, camera, tracker
         self._camera_pose, self._points = camera_pose, points
         self._start, self._known, self._begin, self._period = T_world_target, known, begin, period
-        self._follower: ObjectFollower | None = None
+        self._follower: HypothesisFollower | None = None
         self._T_world_camera = np.eye(4)  # at the last image
         self._last_seen = T_world_target
         self._lost = ""
@@ -84,24 +82,23 @@ class OutlinePerception:
         T_world_camera = self._camera_pose(self._name, frame.joints)
         T_camera_world = se3_inverse(T_world_camera)
         if self._follower is None:
-            self._follower = ObjectFollower(
+            self._follower = HypothesisFollower(
                 self._tracker,
                 self._camera,
-                se3_compose(T_camera_world, self._start),
+                [se3_compose(T_camera_world, self._start)],
                 self._begin,
                 self._period,
                 OUTLINE_RULE,
                 known=self._known,
+                pace=IN_A_LOOP,
             )
         else:
             self._follower.carry(se3_compose(T_camera_world, self._T_world_camera))
-            if self._lost:
-                self._follower.restart(se3_compose(T_camera_world, self._last_seen), frame.time)
         self._T_world_camera = T_world_camera
         step = self._follower.follow(frame.image, frame.time)
         if step.sighting is Sighting.SEEN:
             self._last_seen, self._lost = se3_compose(T_world_camera, step.T_camera_target), ""
-        elif step.sighting is Sighting.LOST:
+        elif step.sighting is not Sighting.PREDICTED:
             self._lost = step.reason
         return step
 

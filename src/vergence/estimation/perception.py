@@ -296,11 +296,12 @@ class PosePerception(Generic[B]):
 
     def _found(self, frame: Frame) -> View | None:
         assert self._find is not None
-        points = self._find(frame)
+        T_world_camera = self._camera_pose(frame.camera, frame.joints)
+        T_camera_target = se3_compose(se3_inverse(T_world_camera), self._last_seen.T_world_target)
+        points = self._find(frame, T_camera_target)
         if points is None:
             return None
         camera = self._rig.cameras[self._rig.numbers[frame.camera]]
-        T_world_camera = self._camera_pose(frame.camera, frame.joints)
         return view_of(points, camera, T_world_camera, self._shape.points)
 
 

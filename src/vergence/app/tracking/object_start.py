@@ -17,8 +17,8 @@ from vergence.estimation.object_follower import (
     LEAST_SHARE,
     OUTLINE_RULE,
     FollowRule,
-    ObjectTracker,
 )
+from vergence.estimation.object_tracker import ObjectTracker
 from vergence.vision.known_object import (
     EdgeTracker,
     ObjectModel,

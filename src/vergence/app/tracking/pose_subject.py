@@ -103,7 +103,7 @@ class PoseSubject:
         table, detail = self._files.table, self._files.lines.name
         lines.append(f"poses    {table}  (with covariances: {detail})")
         if alike:
-            lines.append(f"symmetric: its edges look the same turned by {_listed(alike)}")
+            lines.append(f"symmetric: it looks the same turned by {_listed(alike)}")
         if follower.note:
             lines.append(follower.note)
         return Result(_outcome(steps), answer, tuple(lines))

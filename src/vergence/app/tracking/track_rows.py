@@ -76,7 +76,7 @@ def remark_rows(record: TrackRecord) -> list[Row]:
         note = f"{free}; the standard deviation is that of an unknown angle, 104°"
         rows.append(Row("unobservable rotations", "some", "", note))
     if alike := answer.get("symmetries"):
-        note = "its edges look the same turned by " + ", ".join(map(str, alike))
+        note = "it looks the same turned by " + ", ".join(map(str, alike))
         rows.append(Row("symmetries", str(len(alike)), "", note))
     if changed := answer.get("note"):
         rows.append(Row("start", "changed", "", str(changed)))

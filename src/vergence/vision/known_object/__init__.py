@@ -10,10 +10,8 @@ from vergence.vision.known_object.edge_tracker import EdgeTracker
 from vergence.vision.known_object.loading import load_object_model, object_model_of, surface_of
 from vergence.vision.known_object.modality import as_followed, has_corners, shown_by_edges
 from vergence.vision.known_object.object_model import ObjectModel
-from vergence.vision.known_object.silhouette_tracker import (
-    SilhouetteMeasurement,
-    SilhouetteTracker,
-)
+from vergence.vision.known_object.silhouette_measurement import SilhouetteMeasurement
+from vergence.vision.known_object.silhouette_tracker import SilhouetteTracker
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes
 
 __all__ = [

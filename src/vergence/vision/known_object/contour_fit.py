@@ -5,7 +5,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.robot.positive_definite import factor_spd, solve_factored
-from vergence.vision.known_object.contour_lines import ContourLines
+from vergence.vision.known_object.contour_lines import REACH, ContourLines
 from vergence.vision.known_object.pose_fit import moved_pose, pose_difference
 from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.silhouette import Outline
@@ -15,6 +15,9 @@ _BESIDE, _BESIDE_PX = 6, 40.0  # lines to either side that make a run, and how f
 _RUN_PX = 0.6  # mean residual of a run at which it counts a quarter
 _CLIPPED_PX = 4.0  # residual that no line of a run exceeds
 SLIDING_PX = 100.0  # standard deviation along the contour
+DEEP_ODDS = 0.5  # mean log odds of the object's pixels on a line that counts
+_MOST_SCALE = 5  # pixels in a segment; odd
+_LEAST_SLOPE = 1e-9  # relative, of a motion that moves the outline at all
 
 
 @njit(cache=True)
@@ -163,3 +166,34 @@ def contour_points(
         covariances[n, 1, 1] = across * nv * nv + SLIDING_PX**2 * nu * nu
         covariances[n, 0, 1] = covariances[n, 1, 0] = (across - SLIDING_PX**2) * nu * nv
     return points, measured, covariances
+
+
+def line_weights(lines: ContourLines) -> FloatArray:
+    """Return how far each line is believed: not where something else is before the object."""
+    return np.where(lines.usable, np.clip(lines.deep_odds - DEEP_ODDS, 0.0, 1.0), 0.0)
+
+
+def segment_scales(
+    T: FloatArray, lens: FloatArray, outline: Outline, covariance: FloatArray
+) -> list[int]:
+    """Return pixels in a segment, step by step: at first as three standard deviations need."""
+    widest, rows = 0.0, np.empty((2, 6))
+    for n in range(0, len(outline.points), 10):
+        pixel_rows(T, lens, outline.points[n], rows)
+        across = outline.normals[n] @ rows
+        widest = max(widest, float(across @ covariance @ across))
+    needed = 3.0 * np.sqrt(widest) / REACH
+    first = int(np.clip(2 * np.ceil(0.5 * (needed - 1.0)) + 1, 1, _MOST_SCALE))
+    return [*range(first, 1, -2), 1, 1]
+
+
+def shared_error(slopes: FloatArray, bias_px: float) -> FloatArray:
+    """Return what a bias of the outline does to the pose, (6, 6): images do not average it out."""
+    if len(slopes) < 6:
+        return np.zeros((6, 6))
+    size = np.sqrt(np.mean(slopes**2, axis=0))
+    shown = size > _LEAST_SLOPE * size.max()  # the others are free, and are counted as such
+    scale = np.where(shown, 1.0 / np.maximum(size, 1e-12), 0.0)
+    scaled = slopes * scale
+    inverse = np.linalg.inv(scaled.T @ scaled / len(slopes) + 1e-4 * np.eye(6))
+    return np.asarray(bias_px**2 * inverse * np.outer(scale, scale))

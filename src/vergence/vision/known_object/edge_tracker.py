@@ -10,6 +10,8 @@ from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
 from vergence.errors import Absent, InputError
 from vergence.vision.brightness import brightened
+from vergence.vision.known_object.contour_maps import Maps, edge_maps
+from vergence.vision.known_object.contour_vote import Contour, contour_of
 from vergence.vision.known_object.corner_extractor import require_image
 from vergence.vision.known_object.edge_kernel import learn_edges, measure_edges
 from vergence.vision.known_object.edge_measurement import (
@@ -18,7 +20,8 @@ from vergence.vision.known_object.edge_measurement import (
     EdgeMemory,
     EdgeRule,
 )
-from vergence.vision.known_object.edge_samples import TEMPLATE
+from vergence.vision.known_object.edge_samples import TEMPLATE, sample_edges
+from vergence.vision.known_object.look_alikes import Turn, symmetries
 from vergence.vision.known_object.object_model import ObjectModel
 
 _MOST_SAMPLES = 400  # over all edges
@@ -114,6 +117,31 @@ class EdgeTracker:
             wider = (_FEW / seen.share) ** _WIDER
             seen = seen._replace(covariance_px=wider * seen.covariance_px)
         return seen
+
+    def elsewhere(self, _memory: EdgeMemory) -> EdgeMemory:
+        """Return the memory at another place: none, since edges look like their backgrounds."""
+        return self.blank()
+
+    def contour(self, T_camera_target: FloatArray, camera: Camera) -> Contour:
+        """Return places on the edges that are visible at a pose (4, 4)."""
+        geometry = self.geometry
+        samples = sample_edges(
+            np.ascontiguousarray(T_camera_target), pack_lens(camera),
+            geometry.edges, geometry.normals, geometry.surface, geometry.places,
+        )  # fmt: skip
+        return contour_of(samples.points_px, samples.normals)
+
+    def maps(self, image: ImageArray, shape: tuple[int, int], _memory: EdgeMemory) -> Maps:
+        """Return how strongly each of (rows, columns) cells of a grey image shows an edge."""
+        import cv2
+
+        coarse = cv2.resize(brightened(image), shape[::-1], interpolation=cv2.INTER_AREA)
+        maps: Maps = edge_maps(np.asarray(coarse, np.uint8))
+        return maps
+
+    def symmetries(self) -> list[Turn]:
+        """Return the rotations that leave the edges unchanged."""
+        return symmetries(self.model)
 
     def remember(self, memory: EdgeMemory, seen: EdgeMeasurement) -> EdgeMemory:
         """Return the memory after an accepted image.

@@ -1,4 +1,4 @@
-"""Rotations after which an object looks the same, exactly or approximately from one viewpoint.
+"""Rotations of an object that a search tries, and those after which it looks the same.
 
 A box rotated by half a turn is the same box. A wedge seen from its high end, like many machined
 parts, is nearly the same, and its edges are then confused.
@@ -17,6 +17,8 @@ _FOLDS = (2, 3, 4, 6)  # of common symmetries
 _SAME = 0.01  # relative to the object's size: edges closer than this coincide
 _PLACES = 9  # compared along an edge
 _APART_RAD = 0.05
+_STEP_RAD, _NEAR_RAD = np.deg2rad(18.0), np.deg2rad(50.0)  # of nearby rotations that are tried
+_AXES_APART_RAD = 0.5 * _STEP_RAD  # of an object that rotates unseen about an axis
 
 
 class Turn(NamedTuple):
@@ -37,7 +39,7 @@ def turns_of(model: ObjectModel) -> list[Turn]:
     Halves, thirds, quarters and sixths of a turn about the axes of its frame and about its
     principal axes, and those that map a cube to itself.
     """
-    middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
+    middle = centre_of(model)
     turns: list[Turn] = []
     for axis, folds in _axes(model):
         for fold in folds:
@@ -50,6 +52,31 @@ def turns_of(model: ObjectModel) -> list[Turn]:
                 ):
                     turns.append(turn)
     return turns
+
+
+def tried_turns(model: ObjectModel, free: FloatArray) -> list[FloatArray]:
+    """Return the rotations T_target_turned (4, 4) that a search tries, the smallest first.
+
+    All rotations within 50°, 18° apart, and those of `turns_of`.
+
+    Args:
+        model: the object.
+        free: axes about which its rotation is not observable, (K, 3); rotations about them are
+            left out.
+    """
+    middle = centre_of(model)
+    count = int(_NEAR_RAD // _STEP_RAD)
+    steps = _STEP_RAD * np.arange(-count, count + 1)
+    vectors = np.array(np.meshgrid(steps, steps, steps)).reshape(3, -1).T
+    angles = np.linalg.norm(vectors, axis=1)
+    order = [k for k in np.argsort(angles, kind="stable") if angles[k] <= _NEAR_RAD]
+    near = [so3_exp(np.ascontiguousarray(vectors[k])) for k in order]
+    far = [turn.T_target_turned[:3, :3] for turn in turns_of(model)]
+    tried: list[FloatArray] = []
+    for R in near + far:
+        if not tried or axes_apart_rad(R, np.array(tried), free).min() > _AXES_APART_RAD:
+            tried.append(np.ascontiguousarray(R))
+    return [se3(R, middle - R @ middle) for R in tried]
 
 
 def symmetries(model: ObjectModel) -> list[Turn]:
@@ -68,6 +95,30 @@ def between(T: FloatArray, T_other: FloatArray) -> Turn:
     w = so3_log(np.ascontiguousarray(change[:3, :3]))
     angle = float(np.linalg.norm(w))
     return Turn(change, w / max(angle, 1e-12), float(np.rad2deg(angle)))
+
+
+def centre_of(model: ObjectModel) -> FloatArray:
+    """Return the centre (3,) of an object's bounding box."""
+    centre: FloatArray = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
+    return centre
+
+
+def axes_apart_rad(R: FloatArray, others: FloatArray, free: FloatArray) -> FloatArray:
+    """Return the angles between an orientation and N others, as far as they show, (N,).
+
+    Args:
+        R: (3, 3).
+        others: (N, 3, 3).
+        free: axes of the object about which its rotation is not observable, (K, 3).
+    """
+    if len(free) > 1:
+        return np.zeros(len(others))
+    if len(free):
+        cosines = (others @ free[0]) @ (R @ free[0])
+    else:
+        cosines = 0.5 * (np.einsum("nij,ij->n", others, R) - 1.0)
+    angles: FloatArray = np.arccos(np.clip(cosines, -1.0, 1.0))
+    return angles
 
 
 def apart_rad(T: FloatArray, T_other: FloatArray) -> float:

@@ -18,26 +18,35 @@ from vergence.vision.known_object.color_model import (
     mixed_colors,
 )
 from vergence.vision.known_object.contour_fit import (
+    DEEP_ODDS,
     contour_points,
     fit_contour,
+    line_weights,
     means_of_runs,
     outline_motion,
+    segment_scales,
+    shared_error,
 )
 from vergence.vision.known_object.contour_lines import (
-    REACH,
     ContourLines,
     count_colors,
     read_lines,
 )
+from vergence.vision.known_object.contour_maps import Maps, outline_maps
+from vergence.vision.known_object.contour_vote import MOST_PLACES, Contour, contour_of
+from vergence.vision.known_object.look_alikes import Turn, turns_of
 from vergence.vision.known_object.object_model import ObjectModel
-from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.silhouette import Outline, outline_of
-from vergence.vision.known_object.symmetry import FreeAxes, free_axes
+from vergence.vision.known_object.silhouette_measurement import (
+    SilhouetteMeasurement,
+    SilhouetteMemory,
+    nothing_found,
+)
+from vergence.vision.known_object.symmetry import FreeAxes, free_axes, symmetric_turns
 from vergence.vision.known_object.weak_turns import USUAL, least_shown_of, weak_turns
 
 _MOST_TRIANGLES = 20_000  # of the mesh that is drawn: half a millisecond
 _INDEPENDENT = 60  # lines that err apart: neighbours share pixels
-_MOST_SCALE = 5  # pixels in a segment; odd
 _FINE = (1, 1)  # scales one after the other, for a pose that is known to some pixels
 _TOLERANCE_PX = 1.5  # residual at which a line counts a quarter, at one pixel a segment
 _STEPS = 3  # of Newton for one outline
@@ -51,39 +60,8 @@ _ASIDE, _FARTHER = 0.04, 0.2
 _FORGOTTEN = 0.2  # of the share found, by one image
 _AS_USUAL = 0.85  # of it, with which a narrow search is content
 _BETTER = 1.2  # times as many lines a wide search has to find
-_DEEP_ODDS = 0.5  # mean log odds of the object's pixels on a line that counts
 _LEARNED_ODDS = 1.0  # and on one whose colours are learned
 _CLEAR = 1.0 / 3.0**2  # information of a line that tells where the contour is, 1/px²
-
-
-class SilhouetteMeasurement(NamedTuple):
-    """What an image says about the outline, in the form of points that a filter takes."""
-
-    points: FloatArray  # (M, 3) object's frame, m
-    points_px: FloatArray  # (M, 2)
-    covariance_px: FloatArray  # (M, 2, 2) small across the outline, large along it, px²
-    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
-    expected: int  # lines across the outline that can be read
-    found: int  # of them, where the colours change at the fitted outline
-    usual: float  # the same as a share
-    samples_px: FloatArray  # (N, 2) the places on the outline
-    samples_found: BoolArray  # (N,)
-    colors: ColorModel  # of this image, along the lines found
-    unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
-    shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
-    astray: FloatArray  # (6, 6) and of what more is wrong while a turn is unknown
-
-    @property
-    def share(self) -> float:
-        """How much of what should be seen was found, 0 … 1."""
-        return self.found / self.expected if self.expected else 0.0
-
-
-class SilhouetteMemory(NamedTuple):
-    """What an object looked like."""
-
-    colors: ColorModel
-    share: float  # of its outline that was found recently, 0 … 1
 
 
 class _Prior(NamedTuple):
@@ -173,6 +151,33 @@ class SilhouetteTracker:
             T = seen.T_camera_target
         return seen
 
+    def elsewhere(self, memory: SilhouetteMemory) -> SilhouetteMemory:
+        """Return the memory at another place: an object keeps its colours."""
+        return memory
+
+    def contour(self, T_camera_target: FloatArray, camera: Camera) -> Contour:
+        """Return places on the outline at a pose (4, 4)."""
+        shape, T = self.shape, np.ascontiguousarray(T_camera_target)
+        outline = outline_of(
+            T, pack_lens(camera), shape.vertices, shape.triangles, self.closed, MOST_PLACES
+        )
+        if outline is None:
+            return Contour(np.zeros((0, 2)), np.zeros((0, 2)))
+        return contour_of(outline.points_px, outline.normals)
+
+    def maps(self, image: ImageArray, shape: tuple[int, int], memory: SilhouetteMemory) -> Maps:
+        """Return how strongly each of (rows, columns) cells of an image shows the outline."""
+        import cv2
+
+        coarse = cv2.resize(image, shape[::-1], interpolation=cv2.INTER_AREA)
+        pixels = np.asarray(coarse, np.uint8).reshape(*shape, self.channels)
+        maps: Maps = outline_maps(pixels, memory.colors.odds)
+        return maps
+
+    def symmetries(self) -> list[Turn]:
+        """Return the rotations that leave the outline unchanged, other than about a free axis."""
+        return symmetric_turns(self.shape, self.axes, turns_of(self.shape))
+
     def remember(self, memory: SilhouetteMemory, seen: SilhouetteMeasurement) -> SilhouetteMemory:
         """Return the memory after an image that was accepted."""
         if not memory.colors.known:
@@ -220,7 +225,7 @@ class SilhouetteTracker:
         outline = self._outline(T, lens)
         scales = list(schedule or ())
         while outline is not None:
-            scales = scales or _scales(T, lens, outline, prior.covariance)
+            scales = scales or segment_scales(T, lens, outline, prior.covariance)
             scale = scales.pop(0)
             lines = read_lines(pixels, outline, colors.odds, scale)
             T = fit_contour(
@@ -230,14 +235,14 @@ class SilhouetteTracker:
                 lens,
                 outline,
                 lines,
-                _weights(lines),
+                line_weights(lines),
                 _TOLERANCE_PX * scale,
                 _STEPS,
             )
             if not scales:
                 return self._measured(pixels, lens, T, outline, lines)
             outline = self._outline(T, lens)
-        return _nothing(T, blank_colors(self.channels))
+        return nothing_found(T, blank_colors(self.channels))
 
     def _measured(
         self,
@@ -249,17 +254,17 @@ class SilhouetteTracker:
     ) -> SilhouetteMeasurement:
         moved, slopes = outline_motion(T, lens, outline)
         residuals = lines.offsets_px - moved
-        runs = means_of_runs(residuals, outline, lines, _weights(lines))
+        runs = means_of_runs(residuals, outline, lines, line_weights(lines))
         found = (
             lines.usable
             & (np.abs(residuals) < _FOUND_PX)
             & (lines.information > _CLEAR)
-            & (lines.deep_odds > _DEEP_ODDS)
+            & (lines.deep_odds > DEEP_ODDS)
         )
         slopes = slopes[found]
         learned = found & (lines.deep_odds > _LEARNED_ODDS)
         covered = lines.usable & (lines.deep_odds < -_LEARNED_ODDS)
-        unseen, shared = self._unseen(T, lens, slopes), _shared_error(slopes, self.bias_px)
+        unseen, shared = self._unseen(T, lens, slopes), shared_error(slopes, self.bias_px)
         expected, count = int(lines.usable.sum()), int(found.sum())
         # The less of the outline is found, the likelier some of it is something else's.
         doubt = (expected / max(count, 1)) ** 3
@@ -317,38 +322,3 @@ class SilhouetteTracker:
         count_colors(pixels, outline, learned, covered, gap_px, _LEARNED_DEPTH_PX, inside, outside)
         colors: ColorModel = colors_of(inside, outside)
         return colors
-
-
-def _weights(lines: ContourLines) -> FloatArray:
-    """Return how far each line is believed: not where something else is before the object."""
-    return np.where(lines.usable, np.clip(lines.deep_odds - _DEEP_ODDS, 0.0, 1.0), 0.0)
-
-
-def _scales(T: FloatArray, lens: FloatArray, outline: Outline, covariance: FloatArray) -> list[int]:
-    """Return pixels in a segment, step by step: at first as three standard deviations need."""
-    widest, rows = 0.0, np.empty((2, 6))
-    for n in range(0, len(outline.points), 10):
-        pixel_rows(T, lens, outline.points[n], rows)
-        across = outline.normals[n] @ rows
-        widest = max(widest, float(across @ covariance @ across))
-    needed = 3.0 * np.sqrt(widest) / REACH
-    first = int(np.clip(2 * np.ceil(0.5 * (needed - 1.0)) + 1, 1, _MOST_SCALE))
-    return [*range(first, 1, -2), 1, 1]
-
-
-def _shared_error(slopes: FloatArray, bias_px: float) -> FloatArray:
-    """Return what a bias of the outline does to the pose, (6, 6): images do not average it out."""
-    if len(slopes) < 6:
-        return np.zeros((6, 6))
-    scale = np.sqrt(np.mean(slopes**2, axis=0))
-    scaled = slopes / scale
-    inverse = np.linalg.inv(scaled.T @ scaled / len(slopes) + 1e-4 * np.eye(6))
-    return np.asarray(bias_px**2 * inverse / np.outer(scale, scale))
-
-
-def _nothing(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
-    none = np.zeros((0, 2))
-    return SilhouetteMeasurement(
-        np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, none,
-        np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
-    )  # fmt: skip

@@ -4,12 +4,14 @@ No image of its outline shows such a rotation. The axes are found by trial rathe
 mesh: the outline is rendered at several rotations about each candidate axis.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import se3, se3_compose, so3_exp
+from vergence.vision.known_object.look_alikes import Turn, axes_apart_rad
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import Grid, draw_nearness, project_vertices
 
@@ -17,6 +19,8 @@ _CELLS = 200  # along a side of the mask
 _DISTANCE = 5.0  # of the camera, in multiples of the object's size
 _TURNS_RAD = (0.41, 1.13, 1.83, 2.62, 3.9)
 _SLANTS_RAD = (0.5, 1.2)  # between an axis and the line of sight
+_VIEWS_RAD = ((0.5, 0.3, 0.0), (1.3, 0.2, 0.4), (0.4, 1.2, -0.5), (2.2, 0.5, 0.6))
+_SHOWN_RAD = 0.05  # rotations smaller than this are about a free axis
 
 
 class FreeAxes(NamedTuple):
@@ -60,6 +64,34 @@ def free_axes(model: ObjectModel) -> FreeAxes:
     return FreeAxes(frozen(axes), frozen(centre))
 
 
+def symmetric_turns(model: ObjectModel, axes: FreeAxes, turns: Sequence[Turn]) -> list[Turn]:
+    """Return those of some rotations that leave an object's outline unchanged.
+
+    Args:
+        model: the object.
+        axes: about which its rotation is not observable; rotations about them are left out.
+        turns: the rotations.
+    """
+    closed, known, same = model.closed, [np.eye(3)], []
+    for turn in turns:
+        R = turn.T_target_turned[:3, :3]
+        if axes_apart_rad(R, np.array(known), axes.axes).min() < _SHOWN_RAD:
+            continue
+        if _looks_same(model, closed, axes.centre, turn.T_target_turned):
+            same.append(turn)
+            known.append(R)
+    return same
+
+
+def _looks_same(model: ObjectModel, closed: bool, centre: FloatArray, S: FloatArray) -> bool:
+    for view in _VIEWS_RAD:
+        R = so3_exp(np.array(view))
+        T = se3(R, np.array((0.0, 0.0, _DISTANCE * model.size)) - R @ centre)
+        if _differ(_mask(model, closed, T), _mask(model, closed, se3_compose(T, S))):
+            return False
+    return True
+
+
 def _principal_axes(model: ObjectModel) -> tuple[FloatArray, FloatArray]:
     """Return the centroid (3,) of the surface and its principal axes, columns of (3, 3)."""
     a, b, c = (model.surface[:, k] for k in range(3))
@@ -73,11 +105,13 @@ def _principal_axes(model: ObjectModel) -> tuple[FloatArray, FloatArray]:
 
 def _turns_unseen(model: ObjectModel, closed: bool, centre: FloatArray, axis: FloatArray) -> bool:
     for slant in _SLANTS_RAD:
-        base = _upright(axis, slant)
-        first = _mask(model, closed, base, centre)
-        for turn in _TURNS_RAD:
-            R = base @ so3_exp(np.ascontiguousarray(turn * axis))
-            if _differ(first, _mask(model, closed, np.ascontiguousarray(R), centre)):
+        R = _upright(axis, slant)
+        T = se3(R, np.array((0.0, 0.0, _DISTANCE * model.size)) - R @ centre)
+        first = _mask(model, closed, T)
+        for angle in _TURNS_RAD:
+            turn = so3_exp(np.ascontiguousarray(angle * axis))
+            turned = se3_compose(T, se3(turn, centre - turn @ centre))
+            if _differ(first, _mask(model, closed, turned)):
                 return False
     return True
 
@@ -91,8 +125,7 @@ def _upright(axis: FloatArray, slant: float) -> FloatArray:
     return R
 
 
-def _mask(model: ObjectModel, closed: bool, R: FloatArray, centre: FloatArray) -> BoolArray:
-    T = se3(R, np.array((0.0, 0.0, _DISTANCE * model.size)) - R @ centre)
+def _mask(model: ObjectModel, closed: bool, T: FloatArray) -> BoolArray:
     projected = np.empty((len(model.vertices), 3))
     project_vertices(T, model.vertices, projected, np.empty(4))
     half = 0.7 / _DISTANCE

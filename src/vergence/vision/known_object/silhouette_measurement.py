@@ -1,0 +1,47 @@
+"""What an image says about the outline of an object, and what its outline looked like."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.vision.known_object.color_model import ColorModel
+
+
+class SilhouetteMeasurement(NamedTuple):
+    """What an image says about the outline, in the form of points that a filter takes."""
+
+    points: FloatArray  # (M, 3) object's frame, m
+    points_px: FloatArray  # (M, 2)
+    covariance_px: FloatArray  # (M, 2, 2) small across the outline, large along it, px²
+    T_camera_target: FloatArray  # (4, 4) the pose that fits this image
+    expected: int  # lines across the outline that can be read
+    found: int  # of them, where the colours change at the fitted outline
+    usual: float  # the same as a share
+    samples_px: FloatArray  # (N, 2) the places on the outline
+    samples_found: BoolArray  # (N,)
+    colors: ColorModel  # of this image, along the lines found
+    unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
+    shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
+    astray: FloatArray  # (6, 6) and of what more is wrong while a turn is unknown
+
+    @property
+    def share(self) -> float:
+        """How much of what should be seen was found, 0 … 1."""
+        return self.found / self.expected if self.expected else 0.0
+
+
+class SilhouetteMemory(NamedTuple):
+    """What an object looked like."""
+
+    colors: ColorModel
+    share: float  # of its outline that was found recently, 0 … 1
+
+
+def nothing_found(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
+    """Return the measurement of an image without the object."""
+    none = np.zeros((0, 2))
+    return SilhouetteMeasurement(
+        np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, none,
+        np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
+    )  # fmt: skip
