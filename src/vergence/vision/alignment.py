@@ -20,7 +20,7 @@ FREE, RIGID = 0, 1  # whether the affine matrix may change
 WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
-CONVERGED_PX = 0.06  # length of a step; the error left after it is a tenth
+CONVERGED_PX = 0.06  # length of a step, with the form's; the error left after it is a tenth
 NOISE_GREY = 16.0  # grey levels; only scales the prior on the affine matrix
 FORM_DEVIATION = 0.02  # standard deviation of the affine matrix from the expected one
 FORM_PRIOR = (NOISE_GREY / FORM_DEVIATION) ** 2
@@ -218,7 +218,8 @@ def align(
         move_x, move_y = a11 * dx + a12 * dy, a21 * dx + a22 * dy
         x -= move_x
         y -= move_y
-        if move_x * move_x + move_y * move_y < CONVERGED_PX * CONVERGED_PX:
+        deformed = WEIGHT_PX * WEIGHT_PX * (d11 * d11 + d12 * d12 + d21 * d21 + d22 * d22)
+        if move_x * move_x + move_y * move_y + deformed < CONVERGED_PX * CONVERGED_PX:
             break
     else:
         resample(x, y, A, template, work)

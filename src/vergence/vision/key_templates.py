@@ -6,8 +6,9 @@ from numba import njit
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.alignment import fill_template
 from vergence.vision.pyramid import anchor_of
-from vergence.vision.settled_place import correlation_at, fits, settle
-from vergence.vision.ssd import make_template, template_in
+from vergence.vision.settled_place import fits, settle
+from vergence.vision.ssd import SAME_PX, make_template, template_in
+from vergence.vision.ssd_surface import blot_out, lowest, ssd_around
 from vergence.vision.tracker_state import (
     COLUMNS,
     CORRELATION,
@@ -28,10 +29,10 @@ from vergence.vision.two_by_two import inverse2, product2, stretch
 
 REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or shrunk by this
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
-SAME_PX = 2.0  # closer positions are the same: the alignment converges to the same
 PROMISING = 0.3  # smallest correlation before an alignment that makes it worthwhile
-TWIN_RANGE_PX = 16.0  # within which they are searched for in the first image
-TWIN_STEP_PX = 3.0  # and step of that search: an alignment started this close converges
+TWIN_RANGE_PX = 48  # within which they are searched for: farther than a point moves and is sought
+PERHAPS_TWIN = 0.6  # correlation at whole pixels from which an alignment is worthwhile
+MOST_TWINS = 100  # positions in the first image that are aligned to find twins
 
 
 @njit(cache=True)
@@ -47,23 +48,34 @@ def start_points(image: ImageArray, state: TrackerState) -> None:
 
 @njit(cache=True, inline="always")
 def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
-    """Find the nearest positions in the first image that could be confused with point k."""
-    twins, place = twins_of(state, k), np.empty(COLUMNS + 4)
+    """Find positions in the first image that could be confused with point k.
+
+    They are minima of the SSD at full resolution. Of those that an alignment confirms, the nearest
+    and the likest are kept.
+    """
+    found, place, count = np.empty((MOST_TWINS, 4)), np.empty(COLUMNS + 4), 0
     x, y = state.places[k, 0], state.places[k, 1]
-    distances = np.full(TWINS, np.inf)
-    steps = int(TWIN_RANGE_PX / TWIN_STEP_PX)
-    for i in range(-steps, steps + 1):
-        for j in range(-steps, steps + 1):
-            start_x, start_y = x + TWIN_STEP_PX * i, y + TWIN_STEP_PX * j
-            if correlation_at(image, start_x, start_y, k, state) < PROMISING:
-                continue
-            settle(image, start_x, start_y, k, state, place)
+    template = template_in(state.search[k]).full
+    surface = ssd_around(image, anchor_of(x), anchor_of(y), template, TWIN_RANGE_PX)
+    limit = 2.0 * (1.0 - PERHAPS_TWIN) * template.size * np.var(template)
+    blot_out(surface, TWIN_RANGE_PX, TWIN_RANGE_PX)
+    for _ in range(MOST_TWINS):
+        row, column = lowest(surface, len(surface), len(surface))
+        if surface[row, column] > limit:
+            break
+        blot_out(surface, row, column)
+        settle(image, x + column - TWIN_RANGE_PX, y + row - TWIN_RANGE_PX, k, state, place)
+        if place[VERDICT] == FOUND:
             off_x, off_y = place[0] - x, place[1] - y
-            distance, last = np.hypot(off_x, off_y), np.argmax(distances)
-            if place[VERDICT] != FOUND or not SAME_PX < distance < distances[last]:
-                continue
-            if nearest(twins, off_x, off_y) >= SAME_PX:
-                twins[last, 0], twins[last, 1], distances[last] = off_x, off_y, distance
+            distance = np.hypot(off_x, off_y)
+            if distance > SAME_PX and nearest(found[:count], off_x, off_y) >= SAME_PX:
+                found[count] = off_x, off_y, distance, -place[CORRELATION]
+                count += 1
+    twins = twins_of(state, k)
+    for n in range(min(TWINS, count)):
+        best = int(np.argmin(found[:count, 2 + n % 2]))
+        twins[n] = found[best, :2]
+        found[best, 2:] = np.inf
 
 
 @njit(cache=True, inline="always")

@@ -15,11 +15,17 @@ from vergence.vision.alignment import (
     agreement,
     align,
     make_resampling,
+    product,
     resample,
 )
-from vergence.vision.pyramid import anchor_of, load_window
-from vergence.vision.ssd import RANGE_PX, WORKSPACE_SIZE
+from vergence.vision.pyramid import anchor_of, halve, load_quarter, load_window
+from vergence.vision.ssd import (
+    WORKSPACE_SIZE,
+    template_in,
+)
+from vergence.vision.ssd_surface import RANGE_PX
 from vergence.vision.tracker_state import (
+    ALONE,
     COLUMNS,
     CONTRAST,
     CORRELATION,
@@ -41,6 +47,8 @@ from vergence.vision.tracker_state import (
 from vergence.vision.two_by_two import inverse2, product2, stretch
 
 LOST_CORRELATION = 0.75
+DOUBTFUL = 0.85  # correlation below which a match may be chance, if its surroundings differ
+SURROUNDINGS = 0.5  # smallest correlation of those of a doubtful match
 LOST_SHIFT_PX = 4.0  # search and alignment must agree within this
 LOST_STRETCH = 1.6  # no patch changes form by more between two images
 GAIN_RANGE = (0.25, 4.0)  # contrast against the key template
@@ -79,6 +87,9 @@ def settle(
         out[RESIDUAL], out[CORRELATION], out[DETAIL] = found.residual, found.correlation, detail
         if verdict == FOUND:
             break
+    doubtful = verdict == FOUND and out[CORRELATION] < DOUBTFUL
+    if doubtful and surroundings_agree(image, point_x, point_y, k, state) < SURROUNDINGS:
+        verdict = ALONE
     if not fits(point_x, point_y, width, height):
         verdict = LEFT
     out[VERDICT] = verdict
@@ -100,6 +111,19 @@ def correlation_at(image: ImageArray, x: float, y: float, k: int, state: Tracker
     resample(x - corner_x, y - corner_y, before, template, work)
     correlation, _ = agreement(template, work)
     return correlation
+
+
+@njit(cache=True)
+def surroundings_agree(image: ImageArray, x: float, y: float, k: int, state: TrackerState) -> float:
+    """Correlation of the 64 × 64 px around a position with those of point k last, -1 … 1."""
+    offset_x, offset_y = state.places[k, 6], state.places[k, 7]
+    area, around = np.empty((16, 16), np.float32), np.empty((8, 8), np.float32)
+    load_quarter(image, anchor_of(x - offset_x), anchor_of(y - offset_y), area)
+    halve(area, around)
+    wide = template_in(state.search[k]).wide
+    now, before = (around - np.mean(around)).ravel(), (wide - np.mean(wide)).ravel()
+    squares = max(product(now, now) * product(before, before), np.float32(1e-6))
+    return float(product(now, before) / np.sqrt(squares))
 
 
 @njit(cache=True, inline="always")

@@ -10,29 +10,37 @@ compared there; a far window must match slightly better than a near one.
 Kernels that only kernels call are inlined: numba would compile each again, with all its callees.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from vergence.arrays import ImageArray
 from vergence.vision.pyramid import Patch, halve, load_quarter, load_window
+from vergence.vision.ssd_surface import (
+    RANGE_PX,
+    SIDE,
+    STRUCK_OUT,
+    lowest,
+    ssd_surface_8,
+    ssd_surface_16,
+    strike_out,
+    vertex,
+)
 
-RANGE_PX = 32  # search distance to every side
 COARSE, MIDDLE = 4, 2  # pixels averaged along each axis
-SIDE = 8  # samples along a side of the averaged templates
 POSITIONS = 2 * RANGE_PX // COARSE + 1  # along each axis of the coarse level
 WIDE_POSITIONS = RANGE_PX // COARSE + 1
-MINIMA = 5  # largest number of coarse minima that are followed
+MINIMA = 48  # largest number of coarse minima that are followed: a pattern may have so many
+CANDIDATES = 6  # of these, the best are returned
 MIDDLE_REACH = 3  # search distance around each of them in middle pixels
 FULL_REACH = 2  # search distance around the middle minimum in pixels
 WIDE_SHARE = 1.0  # weight of the surroundings relative to the coarse template
 DISTANCE_COST = 0.6  # at 32 px, in units of the template's variance
+FEW = 5  # minima that are followed, good or not
+GOOD = 0.5  # of the average position's SSD: minima beyond those few that are followed
 WORTH_FOLLOWING = 2.0  # multiples of the lowest: minima that are followed
-STRUCK_OUT = 1e30
-
-SurfaceKernel: TypeAlias = Callable[[Patch, int, Patch, int, Patch, Patch], None]
+SAME_PX = 2.0  # closer positions are the same: the alignment converges to the same
 
 
 class SsdTemplate(NamedTuple):
@@ -71,10 +79,10 @@ class SsdWorkspace(NamedTuple):
     wide_surface: Patch  # (9, 9)
     small: Patch  # (7, 7) SSD of the middle level
     tiny: Patch  # (5, 5) SSD at full resolution
-    candidates: Patch  # (6, 2) displacements x, y of the minima followed
+    candidates: Patch  # (49, 3) of the minima followed: displacement x, y; SSD over all levels
 
 
-WORKSPACE_SIZE = 3436
+WORKSPACE_SIZE = 3571
 
 
 @njit(cache=True, inline="always")
@@ -91,7 +99,7 @@ def make_workspace(memory: Patch) -> SsdWorkspace:
         memory[3269:3350].reshape(9, 9),
         memory[3350:3399].reshape(7, 7),
         memory[3399:3424].reshape(5, 5),
-        memory[3424:3436].reshape(6, 2),
+        memory[3424:3571].reshape(49, 3),
     )
 
 
@@ -105,81 +113,6 @@ def make_template(
     out.coarse[:] = memory[4:12, 4:12]
     load_window(image, anchor_x, anchor_y, out.full)
     halve(out.full, out.middle)
-
-
-def _surface_kernel(side: int) -> SurfaceKernel:
-    """Return the SSD kernel for templates of one size; only fixed lengths are vectorised.
-
-    Indices are unsigned, which avoids numba's negative-index check.
-    """
-    width, count64, blocks = np.uint64(side), np.uint64(side * side), range(0, side, 8)
-    weight = np.float32(1.0 / (side * side))
-    offsets = tuple(np.uint64(block) for block in blocks)
-
-    @njit(cache=True, fastmath=True)
-    def ssd(strip: Patch, start: np.uint64, template: Patch) -> np.float32:
-        squares, total = np.float32(0.0), np.float32(0.0)
-        for k in range(count64):
-            difference = strip[start + k] - template[k]
-            squares += difference * difference
-            total += difference
-        return squares - total * total * weight
-
-    @njit(cache=True, fastmath=True)
-    def surface(
-        area: Patch, corner: int, template: Patch, count: int, strip: Patch, out: Patch
-    ) -> None:
-        positions, start = np.uint64(count), np.uint64(corner)
-        flat = template.reshape(side * side)
-        for x in range(positions):
-            for i in range(width + positions - np.uint64(1)):
-                for block in offsets:
-                    for j in range(np.uint64(8)):
-                        strip[i * width + block + j] = area[start + i, start + x + block + j]
-            for y in range(positions):
-                out[y, x] = ssd(strip, y * width, flat)
-
-    return surface
-
-
-# SSD of a template at count × count positions of an area from (corner, corner) on, with the means
-# of template and window subtracted: Σd² - (Σd)²/n with d = I - T, [Nelson1995] eq. (19). Each
-# column of positions is copied to a strip as wide as the template, in which the windows are stored
-# contiguously one below the other, so that the sums run over flat memory.
-ssd_surface_8 = _surface_kernel(8)
-ssd_surface_16 = _surface_kernel(16)
-
-
-@njit(cache=True, fastmath=True)
-def lowest(surface: Patch, rows: int, columns: int) -> tuple[int, int]:
-    """Return row and column of the smallest element: the row first, as vector code."""
-    best, y, x = surface[0, 0], 0, 0
-    for i in range(rows):
-        row, least = surface[i], surface[i, 0]
-        for j in range(columns):
-            least = min(least, row[j])
-        if least < best:
-            best, y = least, i
-    while x < columns - 1 and surface[y, x] > best:
-        x += 1
-    return y, x
-
-
-@njit(cache=True, inline="always")
-def strike_out(surface: Patch, rows: int, columns: int, y: int, x: int) -> None:
-    """Remove a minimum and its eight neighbours from a surface."""
-    for i in range(max(y - 1, 0), min(y + 2, rows)):
-        for j in range(max(x - 1, 0), min(x + 2, columns)):
-            surface[i, j] = np.float32(STRUCK_OUT)
-
-
-@njit(cache=True, inline="always")
-def vertex(before: float, here: float, after: float) -> float:
-    """Return the position of the minimum of a parabola through three values, ±0.5 at most."""
-    bend = before - 2.0 * here + after
-    if bend <= 0.0:
-        return 0.0
-    return min(max(0.5 * (before - after) / bend, -0.5), 0.5)
 
 
 @njit(cache=True, inline="always")
@@ -219,18 +152,17 @@ def add_surroundings(surface: Patch, wide: Patch, cost: float) -> None:
 @njit(cache=True)
 def search(
     image: ImageArray, anchor_x: int, anchor_y: int, template: SsdTemplate, work: SsdWorkspace
-) -> tuple[int, int]:
+) -> int:
     """Find a template within ±32 px of an anchor.
 
-    Of several candidates the best is the one with the lowest SSD over all levels at its exact
-    position: small marks cannot be compared on the grid of the coarse level.
+    Of several candidates the best are those with the lowest SSD over all levels at their exact
+    positions: small marks cannot be compared on the grid of the coarse level.
 
     Returns:
-        The number of candidates, and the index of the best. work.candidates contains their
-        displacements x and y from the anchor, px, interpolated by a parabola.
+        The number of candidates. work.candidates contains their displacements x and y from the
+        anchor, px, interpolated by a parabola; the best first.
     """
     count = follow_minima(image, anchor_x, anchor_y, template, work)
-    lowest_score, best = np.inf, 0
     for k in range(count):
         found = work.candidates[k]
         x, y = anchor_x + int(found[0]), anchor_y + int(found[1])
@@ -241,9 +173,31 @@ def search(
             x, y = anchor_x + int(np.rint(found[0])), anchor_y + int(np.rint(found[1]))
             score += surroundings(image, x, y, template, work)
             score += distance_cost(template) * (found[0] ** 2 + found[1] ** 2)
-        if score < lowest_score:
-            lowest_score, best = score, k
-    return count, best
+        found[2] = score
+    return best_first(work.candidates[:count], CANDIDATES)
+
+
+@njit(cache=True, inline="always")
+def best_first(candidates: Patch, most: int) -> int:
+    """Move the candidates (N, 3) with the lowest scores to the front; return how many differ.
+
+    Of those that reached the same position only one counts.
+    """
+    count = 0
+    while count < min(len(candidates), most):
+        best = count + int(np.argmin(candidates[count:, 2]))
+        if candidates[best, 2] == np.float32(STRUCK_OUT):
+            break
+        for column in range(3):
+            here = candidates[count, column]
+            candidates[count, column] = candidates[best, column]
+            candidates[best, column] = here
+        chosen = candidates[count]
+        count += 1
+        for other in candidates[count:]:
+            if (other[0] - chosen[0]) ** 2 + (other[1] - chosen[1]) ** 2 < SAME_PX * SAME_PX:
+                other[2] = np.float32(STRUCK_OUT)
+    return count
 
 
 @njit(cache=True, inline="always")
@@ -253,12 +207,14 @@ def follow_minima(
     """Follow the best minima of the coarse level, and that of the surroundings; return how many."""
     coarse_scores(image, anchor_x, anchor_y, template, work)
     around_y, around_x = lowest(work.wide_surface, WIDE_POSITIONS, WIDE_POSITIONS)
-    count, limit = 0, np.inf
+    count, limit, good = 0, np.inf, GOOD * np.mean(work.surface)
     while count < MINIMA:
         row, column = lowest(work.surface, POSITIONS, POSITIONS)
         if work.surface[row, column] > limit:
             break
         limit = min(limit, WORTH_FOLLOWING * work.surface[row, column])
+        if count == FEW:
+            limit = min(limit, good)
         follow(image, anchor_x, anchor_y, row, column, template, work, count)
         count += 1
     if work.surface[2 * around_y, 2 * around_x] <= limit:

@@ -8,9 +8,10 @@ from vergence.signals import SearchWindows
 from vergence.vision.image import grey_image
 from vergence.vision.key_templates import start_points
 from vergence.vision.settled_place import FIT_PX, LOST_CORRELATION, LOST_SHIFT_PX, LOST_STRETCH
-from vergence.vision.ssd import RANGE_PX
+from vergence.vision.ssd_surface import RANGE_PX
 from vergence.vision.track_points import track_points
 from vergence.vision.tracker_state import (
+    ALONE,
     AT_BORDER,
     COLUMNS,
     CONTRAST,
@@ -35,6 +36,7 @@ _REASONS = {
     LEFT: "left the image",
     AT_BORDER: "left the image: no match {:.0f} px from its border",
     NO_MATCH: f"no match: correlation {{:.2f}}, below {LOST_CORRELATION}",
+    ALONE: "no match: correlation {:.2f}, and the surroundings differ",
     DISAGREES: f"no match: alignment {{:.1f}} px from the search, above {LOST_SHIFT_PX}",
     DEFORMED: f"no match: stretched by {{:.2f}} since the last image, above {LOST_STRETCH}",
     CONTRAST: "no match: contrast changed to {:.2f} of the template's",

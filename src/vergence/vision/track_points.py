@@ -4,14 +4,22 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
-from vergence.vision.key_templates import PROMISING, SAME_PX, nearest, take_over
+from vergence.vision.key_templates import PROMISING, nearest, take_over
 from vergence.vision.pyramid import anchor_of
 from vergence.vision.settled_place import correlation_at, settle
-from vergence.vision.ssd import RANGE_PX, WORKSPACE_SIZE, make_workspace, search, template_in
+from vergence.vision.ssd import (
+    SAME_PX,
+    WORKSPACE_SIZE,
+    make_workspace,
+    search,
+    template_in,
+)
+from vergence.vision.ssd_surface import RANGE_PX
 from vergence.vision.tracker_state import (
     AT_BORDER,
     COLUMNS,
     CORRELATION,
+    COVARIANCE,
     DETAIL,
     FOUND,
     LEFT,
@@ -21,13 +29,14 @@ from vergence.vision.tracker_state import (
     TrackerState,
     twins_of,
 )
-from vergence.vision.two_by_two import apply2
+from vergence.vision.two_by_two import apply2, inverse2
 
-MOST_PLACES = 12  # candidate positions of a point: search, expected, neighbours' motion, twins
+MOST_PLACES = 20  # candidate positions of a point: search, expected, neighbours' motion, twins
 ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
 NEIGHBOURS = 5  # points whose motion decides between look-alikes
 AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
 CONSENSUS = 3  # points found that predict where the others may have moved
+DECIDED = 0.5  # of the next one's: distance at which the neighbours' motion decides
 LOOK_AGAIN_PX = 6.0  # if they moved at least this far
 
 
@@ -55,8 +64,10 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
             alike[k] = that_look_alike(places[k], alike[k] + 1)
             off = np.hypot(places[k, : alike[k], 0] - x, places[k, : alike[k], 1] - y)
             chosen = int(np.argmin(off))
-        if alike[k] > 1 and np.sum(sure) < CONSENSUS:
-            widen_for_others(places[k, : alike[k]], chosen)
+            near = off[chosen]
+            off[chosen] = np.inf
+            if np.sum(sure) < CONSENSUS or (alike[k] > 1 and near > DECIDED * off.min()):
+                widen_for_others(places[k, : alike[k]], chosen)
         answers[k] = places[k, chosen, :COLUMNS]
         take_over(image, k, state, places[k, chosen])
     if CONSENSUS <= np.sum(found) < count:
@@ -93,8 +104,10 @@ def look_again(
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
     """Find point k alone, expected at out[PLACE], in an image; return the verdict."""
     places = np.empty((MOST_PLACES, COLUMNS + 4))
-    settle_all(image, k, state, out, places)
+    alike = that_look_alike(places, settle_all(image, k, state, out, places))
     if out[VERDICT] == FOUND:
+        widen_for_others(places[:alike], 0)
+        out[:] = places[0, :COLUMNS]
         take_over(image, k, state, places[0])
     return int(out[VERDICT])
 
@@ -107,14 +120,14 @@ def settle_all(
 
     Marks may look alike, so apart from the search's best position, its other candidates and the
     expected position are aligned if they are promising, as are the present positions of marks near
-    the point that look like it in the first image.
+    the point that look like it in the first image. If the point is not at the search's best, only
+    the expected position is tried, and the reason is that of the search's best.
 
     Args:
         image: grey, (height, width).
         k: index of the point.
         state: of the tracker; not changed.
-        out: set to the result at the search's position; if the point is not there, at the expected
-            one.
+        out: set to the result at the first position where the point is found.
         places: set to that position and then the others, (MOST_PLACES, COLUMNS + 4): columns as in
             out, and the affine matrix from the first image to this one.
     """
@@ -123,33 +136,34 @@ def settle_all(
     out[VERDICT] = LEFT
     if not (-RANGE_PX <= x < width + RANGE_PX and -RANGE_PX <= y < height + RANGE_PX):
         return 0
-    starts = starting_places(image, k, state, x, y)
-    places[0, :COLUMNS] = out
-    settle(image, starts[0, 0], starts[0, 1], k, state, places[0])
-    if places[0, VERDICT] != FOUND:
-        out[:] = places[0, :COLUMNS]
-        settle(image, x, y, k, state, places[0])
-        if places[0, VERDICT] == FOUND:
-            out[:] = places[0, :COLUMNS]
-            return 1
+    starts, count = starting_places(image, k, state, x, y), 0
+    last = len(starts) - 1
+    for n in range(len(starts)):
+        start_x, start_y = starts[n, 0], starts[n, 1]
+        if nearest(starts[:n], start_x, start_y) < SAME_PX:
+            continue
+        if count == 0:
+            promising = n == 0 or n == last
+        else:
+            promising = correlation_at(image, start_x, start_y, k, state) >= PROMISING
+        if promising:
+            settle(image, start_x, start_y, k, state, places[count])
+            if n == 0:
+                out[2:] = places[0, 2:COLUMNS]
+            count += places[count, VERDICT] == FOUND
+    if count == 0:
         border = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
         if border < AT_BORDER_PX:
             out[VERDICT], out[DETAIL] = AT_BORDER, max(border, 0.0)
         return 0
     out[:] = places[0, :COLUMNS]
-    count = 1
-    for n in range(1, len(starts)):
-        start_x, start_y = starts[n, 0], starts[n, 1]
-        if nearest(starts[:n], start_x, start_y) < SAME_PX:
-            continue
-        if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
-            settle(image, start_x, start_y, k, state, places[count])
-            count += places[count, VERDICT] == FOUND
     for twin in twins_of(state, k):  # the position may be the twin's, and the twin's its twin's
         away = apply2(places[0, COLUMNS:].reshape(2, 2), twin)
         for sign in (1.0, -1.0):
             start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
-            if nearest(places[:count, :2], start_x, start_y) >= SAME_PX:
+            if nearest(places[:count, :2], start_x, start_y) < SAME_PX:
+                continue
+            if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
                 settle(image, start_x, start_y, k, state, places[count])
                 count += places[count, VERDICT] == FOUND
     return count
@@ -163,10 +177,9 @@ def starting_places(
     offset_x, offset_y = state.places[k, 6], state.places[k, 7]
     anchor_x, anchor_y = anchor_of(x - offset_x), anchor_of(y - offset_y)
     work = make_workspace(state.memory[:WORKSPACE_SIZE])
-    count, best = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
+    count = search(image, anchor_x, anchor_y, template_in(state.search[k]), work)
     places = np.empty((count + 1, 2))
-    places[:count] = work.candidates[:count]
-    places[0], places[best] = work.candidates[best], work.candidates[0]
+    places[:count] = work.candidates[:count, :2]
     places[:count, 0] += anchor_x - 0.5 + offset_x
     places[:count, 1] += anchor_y - 0.5 + offset_y
     places[count, 0], places[count, 1] = x, y
@@ -204,13 +217,16 @@ def where_neighbours_go(
 
 @njit(cache=True, inline="always")
 def widen_for_others(places: FloatArray, chosen: int) -> None:
-    """Widen the covariance of the chosen position so that the others lie within one deviation.
+    """Widen the covariance of the chosen position so that each other lies within one deviation.
 
-    It is isotropic, since the search follows only some of many marks in rows.
+    It grows along the difference d, C ← C + (1 − 1/dᵀC⁻¹d) d dᵀ, after which dᵀC⁻¹d = 1: positions
+    along an edge leave it narrow across.
     """
-    farthest = 0.0
+    C = places[chosen, COVARIANCE].reshape(2, 2)
     for n in range(len(places)):
-        x, y = places[n, 0] - places[chosen, 0], places[n, 1] - places[chosen, 1]
-        farthest = max(farthest, x * x + y * y)
-    places[chosen, 2] += farthest
-    places[chosen, 5] += farthest
+        d = places[n, :2] - places[chosen, :2]
+        square = np.sum(d * apply2(inverse2(C), d))
+        if square > 1.0:
+            for i in range(2):
+                for j in range(2):
+                    C[i, j] += (1.0 - 1.0 / square) * d[i] * d[j]

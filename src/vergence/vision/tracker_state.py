@@ -20,9 +20,9 @@ from vergence.vision.pyramid import Patch
 from vergence.vision.ssd import TEMPLATE_SIZE, WORKSPACE_SIZE
 
 KEYS = 16  # key templates kept for each point
-TWINS = 2  # nearest look-alikes of a point that are stored
+TWINS = 6  # look-alikes of a point that are stored: half of them the nearest, half the likest
 
-FOUND, LEFT, NO_MATCH, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(8)
+FOUND, LEFT, NO_MATCH, ALONE, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(9)
 # Columns of the kernels' result for each point.
 PLACE, COVARIANCE = slice(0, 2), slice(2, 6)  # px, px²
 RESIDUAL, CORRELATION, DETAIL, VERDICT = 6, 7, 8, 9  # detail: the number behind the verdict
@@ -36,7 +36,7 @@ class TrackerState(NamedTuple):
     parts.
     """
 
-    places: FloatArray  # (M, 12) px where last found; affine 2 × 2 from first image to last; search
+    places: FloatArray  # (M, 20) px where last found; affine 2 × 2 from first image to last; search
     # offset: point less centre of the search template, px; offsets of its twins, first image, px
     search: Patch  # (M, 448) search template
     jacobian: Patch  # (M, K, 8, n) of the key templates
