@@ -34,8 +34,8 @@ from vergence.experiments import (
     scores,
     start_trials,
 )
-from vergence.experiments.batch import KinematicRun
-from vergence.experiments.kinematic import is_ideal
+from vergence.experiments.batch import KinematicRun, run_batch
+from vergence.experiments.kinematic import KinematicRuns, is_ideal
 from vergence.parts import kind_of
 from vergence.runtime import Run, RunInfo
 from vergence.signals import Outcome, OutcomeKind
@@ -125,11 +125,20 @@ def test_laws_of_shipped_cells_come_in_the_kernel_to_what_they_come_to_in_the_lo
 ):
     source = CellSource.of(name, {"duration_s": "2.0"}, None)
     trials = start_trials(source.load(), laws, 3, seed=3, sampling=Sampling(spread=0.2))
+    for trial in {trial.labels["law"]: trial for trial in trials}.values():  # compiled, if need be
+        run_batch([KinematicRuns().run_of(source.load().replace(**trial.changes))])
     results = run_trials(source, trials, 2.0)
     made_in = [(trial.labels["law"], r.made_in) for trial, r in zip(trials, results, strict=True)]
     assert {(law, "kernel") for law in laws} <= set(made_in)
     monkeypatch.setattr(sys.modules[RUN_TRIAL], "covers", lambda _: False)
     check_same(results, run_trials(source, trials, 2.0))
+
+
+def test_a_law_that_the_kernel_is_not_compiled_for_is_run_in_the_loop(monkeypatch):
+    source = CellSource.of("ur5", {"duration_s": "0.2"}, None)
+    trials = start_trials(source.load(), ("image_based",), 1, seed=3)
+    monkeypatch.setattr(sys.modules[RUN_TRIAL], "is_ready", lambda _: False)
+    assert [result.made_in for result in run_trials(source, trials, 2.0)] == ["loop"]
 
 
 def test_physics_ends_the_runs_alike(tracking, quick_trials, quick_results):

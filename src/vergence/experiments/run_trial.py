@@ -10,9 +10,9 @@ from vergence.camera import image_tick, image_times
 from vergence.cell import Cell
 from vergence.control import Servo
 from vergence.errors import InputError
-from vergence.experiments.batch import BatchTrace, KinematicRun, covers, run_batch
+from vergence.experiments.batch import BatchTrace, KinematicRun, covers, is_ready, run_batch
 from vergence.experiments.evaluation import TrueTracks, trial_result
-from vergence.experiments.kinematic import KinematicRuns, is_ideal, renders
+from vergence.experiments.kinematic import KinematicRuns, is_ideal, is_quick, renders
 from vergence.experiments.source import CellSource
 from vergence.experiments.stays_clear import stays_clear
 from vergence.experiments.trial import Ending, Trial, TrialResult
@@ -57,7 +57,7 @@ def as_they_come(
     these are rendered, and the features are tracked in them.
 
     Where the cell is one arm with one camera it follows commands exactly: in the batch kernel
-    if that knows the law, else in the loop. The kernel knows neither bodies nor surfaces: a run on
+    if that knows the law and is compiled for it, else in the loop. The kernel knows neither bodies nor surfaces: a run on
     which the arm may touch something, or would but for the law's limit, or a feature is hidden, is
     made in the loop as well. Any other cell runs in simulated physics.
 
@@ -83,7 +83,8 @@ def as_they_come(
         except InputError as error:
             yield _refused(trial, str(error))
             continue
-        if not covers(run):
+        # The kernel of another law than the first paper's takes a minute to be compiled.
+        if not covers(run) or not (is_quick(changed) or is_ready(run)):
             yield _in_loop(run, trial, tolerance_px)
         elif threads == 1:
             yield _in_kernel(run, run_batch([run], 1)[0], trial, tolerance_px)

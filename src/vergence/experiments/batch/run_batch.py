@@ -9,6 +9,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import image_times
+from vergence.compiled_kernels import is_compiled
 from vergence.control import Servo, singular_fault
 from vergence.control.compile_law import CompiledLaw
 from vergence.control.point_law import ProgramSolver, TrackingLaw
@@ -38,6 +39,12 @@ class BatchTrace:
 def covers(run: KinematicRun) -> bool:
     """Return whether the kernel knows the law of a run and its camera."""
     return _compiled(run) is not None
+
+
+def is_ready(run: KinematicRun) -> bool:
+    """Return whether the kernel is compiled for the law of a run that `covers` knows."""
+    inputs = pack(run)
+    return is_compiled(closed_loop, inputs, empty_record(inputs))
 
 
 def run_batch(runs: Sequence[KinematicRun], threads: int | None = None) -> list[BatchTrace]:

@@ -1,0 +1,23 @@
+"""Whether a kernel has to be compiled before it can be called."""
+
+from typing import Any
+
+
+def is_compiled(kernel: Any, *arguments: object) -> bool:
+    """Return whether a call needs no compilation: it was made in this process, or numba keeps it.
+
+    numba has no public question for this; the answer comes from the index of its cache, as its
+    dispatcher reads it.
+
+    Args:
+        kernel: compiled by `numba.njit(cache=True)`.
+        arguments: of the call.
+    """
+    signature = tuple(kernel.typeof_pyval(argument) for argument in arguments)
+    if signature in kernel.overloads:
+        return True
+    file = getattr(kernel._cache, "_cache_file", None)
+    if file is None:  # nothing is kept: no folder can be written to
+        return False
+    kernel.targetctx.refresh()
+    return kernel._cache._index_key(signature, kernel.targetctx.codegen()) in file._load_index()
