@@ -57,9 +57,9 @@ def as_they_come(
     these are rendered, and the features are tracked in them.
 
     Where the cell is one arm with one camera it follows commands exactly: in the batch kernel
-    if that knows the law and is compiled for it, else in the loop. The kernel knows neither bodies nor surfaces: a run on
-    which the arm may touch something, or would but for the law's limit, or a feature is hidden, is
-    made in the loop as well. Any other cell runs in simulated physics.
+    if that knows the law and is compiled for it, else in the loop. The kernel knows neither bodies
+    nor surfaces: a run on which the arm may touch something, or would but for the law's limit, or a
+    feature is hidden, is made in the loop as well. Any other cell runs in simulated physics.
 
     Args:
         source: of the cell.
