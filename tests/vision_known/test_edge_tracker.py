@@ -7,6 +7,7 @@ from known_scene import CAMERA, box_model, clutter, drawn_image, off, pose, pose
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.vision.known_object import EdgeTracker, ObjectModel
+from vergence.vision.known_object.edge_kernel import measure_edges
 from vergence.vision.known_object.edge_samples import EdgeSamples, Steps, sample_edges
 from vergence.vision.known_object.profiles import find_steps, read_profile
 from vergence.vision.known_object.shift_vote import SUPPORT_PX, vote_shift
@@ -142,3 +143,15 @@ def test_out_of_the_image_nothing_is_expected() -> None:
 def test_a_model_without_edges_cannot_be_followed() -> None:
     with pytest.raises(InputError, match="a model with edges"):
         EdgeTracker(ObjectModel.from_corners("marks", MODEL.corners))
+
+
+def test_arrays_that_cannot_be_written_to_need_no_further_compilation() -> None:
+    image, tracker = drawn_image(pose(), np.random.default_rng(0)), EdgeTracker(MODEL)
+    arguments = [image, pose(), LOOSE.copy()]
+    seen = tracker.measure(image, CAMERA, *arguments[1:], tracker.blank())
+    compiled = len(measure_edges.overloads)
+    for array in arguments:
+        array.flags.writeable = False
+    again = tracker.measure(image, CAMERA, *arguments[1:], tracker.blank())
+    assert len(measure_edges.overloads) == compiled
+    np.testing.assert_array_equal(again.T_camera_target, seen.T_camera_target)

@@ -105,10 +105,10 @@ class EdgeTracker:
             self.bias_px,
         )
         seen: EdgeMeasurement = measure_edges(
-            np.ascontiguousarray(brightened(image)),
+            np.require(brightened(image), requirements=("C", "W")),
             pack_lens(camera),
-            np.ascontiguousarray(T_camera_target),
-            np.ascontiguousarray(pose_covariance),
+            np.array(T_camera_target),
+            np.array(pose_covariance),
             self.geometry,
             rule,
             memory,
