@@ -137,8 +137,8 @@ class SilhouetteTracker:
             InputError: if the image has another size, type or number of channels.
         """
         pixels, lens = self._pixels(image, camera), pack_lens(camera)
-        covariance = np.ascontiguousarray(pose_covariance)
-        prior = _Prior(np.ascontiguousarray(T_camera_target), covariance, invert_spd(covariance)[0])
+        covariance = np.array(pose_covariance)
+        prior = _Prior(np.array(T_camera_target), covariance, invert_spd(covariance)[0])
         if memory.colors.known:
             return self._sought(pixels, lens, prior, memory)
         T, colors = prior.T, memory.colors
@@ -157,7 +157,7 @@ class SilhouetteTracker:
 
     def contour(self, T_camera_target: FloatArray, camera: Camera) -> Contour:
         """Return places on the outline at a pose (4, 4)."""
-        shape, T = self.shape, np.ascontiguousarray(T_camera_target)
+        shape, T = self.shape, np.array(T_camera_target)
         outline = outline_of(
             T, pack_lens(camera), shape.vertices, shape.triangles, self.closed, MOST_PLACES
         )
@@ -205,7 +205,8 @@ class SilhouetteTracker:
         if image.shape != shape or image.dtype != np.uint8:
             given = f"{image.dtype} of shape {image.shape}"
             raise InputError("SilhouetteTracker", "image", given, f"uint8 of shape {shape}")
-        return np.ascontiguousarray(image).reshape(camera.height, camera.width, self.channels)
+        pixels = np.require(image, requirements=("C", "W"))  # one kind of array: one kernel
+        return pixels.reshape(camera.height, camera.width, self.channels)
 
     def _outline(self, T: FloatArray, lens: FloatArray) -> Outline | None:
         return outline_of(
