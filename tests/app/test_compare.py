@@ -73,7 +73,8 @@ def test_laws_are_compared_in_one_table(command: Command, capsys: object) -> Non
     )
     for law in answer["laws"]:
         assert sum(law[name] for name in counts) == law["starts"] == 2
-    assert answer["made_in"] == {"loop": 4}
+    assert sum(answer["made_in"].values()) == 4
+    assert answer["made_in"].keys() <= {"kernel", "loop"}  # by what is compiled
     assert answer["runs_per_cpu_s"] > 0
     rows = rows_of(answer["data"])
     assert [row["law"] for row in rows] == ["image_based"] * 2 + ["constrained"] * 2
