@@ -56,8 +56,7 @@ class Browser:
             self._line = undo.enter_context(connect(address, max_size=None, close_timeout=1))
             for domain in ("Page", "Runtime", "Network"):
                 self.call(f"{domain}.enable")
-            size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-            self.call("Emulation.setDeviceMetricsOverride", **size)
+            self.resize(width, height)
             self._held = undo.pop_all()
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
@@ -70,6 +69,10 @@ class Browser:
                 assert "error" not in answer, answer["error"]
                 return dict(answer["result"])
             self.told.append(answer)
+
+    def resize(self, width: int, height: int = 900) -> None:
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
 
     def open(self, address: str) -> None:
         self.call("Page.navigate", url=address)

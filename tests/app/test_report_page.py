@@ -73,8 +73,7 @@ def test_no_text_of_a_chart_is_cut_off_in_the_browser(browser: Browser) -> None:
 def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itself(
     browser: Browser, scheme: str
 ) -> None:
-    wide = {"width": 1000, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    browser.call("Emulation.setDeviceMetricsOverride", **wide | {"width": 420})
+    browser.resize(420)
     try:
         assert browser.value("document.documentElement.scrollWidth") <= 420
         smallest = browser.value(
@@ -87,7 +86,7 @@ def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itse
         browser.wait("document.querySelector('figure:has(> [data-time])').tabIndex === 0")
         assert accessibility.complaints(browser, scheme) == []
     finally:
-        browser.call("Emulation.setDeviceMetricsOverride", **wide)
+        browser.resize(1000)
 
 
 @pytest.mark.parametrize(("scheme", "bright"), [("light", True), ("dark", False)])

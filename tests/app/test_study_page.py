@@ -54,8 +54,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def test_checks_need_no_scrolling_and_their_words_no_towers(
     browser: Browser, page: Path, width: int
 ) -> None:
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    browser.call("Emulation.setDeviceMetricsOverride", **size)
+    browser.resize(width)
     browser.open(page.as_uri())
     browser.wait("document.readyState === 'complete' && document.querySelector('.checks') !== null")
     assert browser.value("document.documentElement.scrollWidth") <= width

@@ -357,8 +357,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def test_the_page_can_be_read_on_wide_and_narrow_screens_in_light_and_dark(
     browser: Browser, folders: dict[str, Path], name: str, width: int
 ) -> None:
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    browser.call("Emulation.setDeviceMetricsOverride", **size)
+    browser.resize(width)
     browser.open((folders[name] / "report.html").as_uri())
     browser.wait("document.readyState === 'complete' && document.querySelector('.film') !== null")
     assert browser.value("document.documentElement.scrollWidth") <= width

@@ -195,7 +195,7 @@ def test_the_kernel_leaves_what_it_is_given_alone() -> None:
 def test_many_steps_at_once_are_those_steps_one_by_one(seed: int, dt: float) -> None:
     rng = np.random.default_rng(seed)
     arm = drawn_arm(rng)
-    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    limits = arm.limits
     guard = Guard(arm, drawn_start(arm, rng), dt)
     setpoint, stuck = guard.step(np.zeros(6)), np.empty(6, dtype=np.bool_)
     for _ in range(30):

@@ -110,12 +110,17 @@ def test_wrong_shape_of_points_is_an_error(image: NDArray[np.uint8]) -> None:
         SsdTracker(image, [1.0, 2.0, 3.0])
 
 
-def test_of_marks_that_look_alike_the_one_that_moves_as_its_neighbours_is_the_point(
-    image: NDArray[np.uint8],
-) -> None:
+def draw_dots(image: NDArray[np.uint8]) -> None:
+    """Fill the right of an image with marks that look alike, 16 px apart."""
     rows, columns = np.indices((240, 180))
     dots = 128 + 90 * np.sin(2 * np.pi * rows / 16) * np.sin(2 * np.pi * columns / 16)
     image[:, 140:] = np.rint(dots).astype(np.uint8)
+
+
+def test_of_marks_that_look_alike_the_one_that_moves_as_its_neighbours_is_the_point(
+    image: NDArray[np.uint8],
+) -> None:
+    draw_dots(image)
     shift = np.array([8, 0])  # half of the period: four marks lie as near
     points = np.array([[220.0, 120.0], [230.0, 110.0], [40.0, 60.0], [60.0, 120.0], [50.0, 180.0]])
     tracks = SsdTracker(image, points).track(np.roll(image, shift, axis=(1, 0)))
@@ -178,9 +183,7 @@ def test_look_alike_anywhere_within_the_search_is_remembered(image: NDArray[np.u
 def test_neighbours_that_move_between_two_look_alikes_leave_the_point_undecided(
     image: NDArray[np.uint8],
 ) -> None:
-    rows, columns = np.indices((240, 180))
-    dots = 128 + 90 * np.sin(2 * np.pi * rows / 16) * np.sin(2 * np.pi * columns / 16)
-    image[:, 140:] = np.rint(dots).astype(np.uint8)
+    draw_dots(image)
     moved = image.copy()
     moved[:, :130] = np.roll(image[:, :130], 8, axis=1)  # the dots are at rest
     points = np.array([[230.0, 110.0], [40.0, 60.0], [60.0, 120.0], [50.0, 180.0], [80.0, 90.0]])

@@ -210,7 +210,7 @@ class Guard:
         position = as_floats(start, (arm.joint_count,), "start")
         if not np.isfinite(position).all():
             raise InputError("Guard", "start", position, "finite joint positions")
-        self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+        self._limits = arm.limits
         self._dt = period_s
         self._position: FloatArray = position.copy()
         self._velocity: FloatArray = np.zeros(arm.joint_count)

@@ -31,7 +31,7 @@ def stays_clear(
     fastest = np.maximum(np.abs(rates), np.abs(velocity))
     # A joint outside its range is brought back at a rate of its own.
     fastest = np.where((q < arm.q_min) | (q > arm.q_max), arm.rate_max, fastest)
-    fastest, limits = np.minimum(fastest, arm.rate_max), _limits(arm)
+    fastest, limits = np.minimum(fastest, arm.rate_max), arm.limits
     seconds = np.asarray(ticks * dt, dtype=np.float64)
     k = 0
     while k < len(rates):
@@ -44,7 +44,3 @@ def stays_clear(
                     return False
         k += max(clear, 1)
     return True
-
-
-def _limits(arm: Arm) -> FloatArray:
-    return np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))

@@ -45,6 +45,11 @@ class Arm:
             if not (getattr(self, name) > 0).all():
                 raise InputError("arm", name, getattr(self, name), "positive numbers")
 
+    @property
+    def limits(self) -> FloatArray:
+        """Rows q_min, q_max, rate_max, acceleration_max, (4, n), as kernels take them."""
+        return np.vstack((self.q_min, self.q_max, self.rate_max, self.acceleration_max))
+
     @classmethod
     def from_urdf(cls, path: str | Path, tip: str) -> Self:
         """Read the joints that carry a link, with their limits, from a URDF.

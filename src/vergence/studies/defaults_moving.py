@@ -91,7 +91,7 @@ def keep(
         desired_depth = points[:, 2].copy()
     reference = Reference(0.0, scene.goal_px, desired_depth_m=desired_depth)
     planner = FixedReference(reference)
-    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    limits = arm.limits
     rates, stuck = np.zeros(arm.joint_count), np.zeros(arm.joint_count, bool)
     errors = []
     for k in range(int(DURATION_S * RATE_HZ)):

@@ -123,7 +123,7 @@ def drive(
         goal_noise_px: as for `TrueScene`.
     """
     arm, true = scene.arm, TrueScene(scene, goal_noise_px)
-    limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+    limits = arm.limits
     q, rates, stuck = (
         scene.q_start.copy(),
         np.zeros(arm.joint_count),

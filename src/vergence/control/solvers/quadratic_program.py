@@ -68,7 +68,7 @@ class BoundProgram:
         self.names = self._limits.names
         arm, T = setting.arm, setting.mounting.T_tip_camera
         self.settings = ProgramSettings(
-            np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)),
+            arm.limits,
             setting.period_s,
             constraint_settings(setting, self._limits),
             Avoidance(program.S, program.avoidance_rate_max, _PENALTY_K),

@@ -86,7 +86,7 @@ def pack(run: KinematicRun) -> LoopInputs:
     return LoopInputs(
         compiled.law,
         compiled.memory,
-        np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)),
+        arm.limits,
         np.array(cell.start, dtype=np.float64),
         np.array(cell.features, dtype=np.float64),
         np.array((camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)),

@@ -25,7 +25,7 @@ class Watchdog:
 
     def __init__(self, arm: Arm, start: FloatArray, dt: float, timeout_s: float = 0.1) -> None:
         self._guard = Guard(arm, start, dt)
-        self._limits = np.vstack((arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max))
+        self._limits = arm.limits
         self._dt, self._timeout_s = dt, timeout_s
         self._desired: Setpoint | None = None
         self._silent_s = 0.0
