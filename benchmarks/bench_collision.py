@@ -16,9 +16,8 @@ from peer_programs import BUILT, mink_collision, mink_penetrations
 from vergence.arrays import FloatArray
 from vergence.control import CameraMounting, Limits, QuadraticProgram
 from vergence.control.limits import collision_rows
-from vergence.control.servo import AT_TIP, NO_FEATURES
 from vergence.control.solvers import Problem, Setting
-from vergence.control.solvers.solver import NO_JOINTS
+from vergence.control.solvers.solver import AT_TIP, NO_FEATURES, NO_JOINTS
 from vergence.simulation.clearance import NEAR_M
 from vergence.studies.guarantees_collisions import (
     ALONG_S,

@@ -49,8 +49,9 @@ from vergence.control.objectives import (
     unpack_chain,
 )
 from vergence.control.pose_servo import PoseServo
-from vergence.control.servo import Servo, Situation
+from vergence.control.servo import Servo
 from vergence.control.servo_settings import ServoSettings, WeightedObjective
+from vergence.control.situation import Situation
 from vergence.control.solvers import (
     DampedPseudoInverse,
     PseudoInverse,

@@ -19,6 +19,8 @@ from vergence.control.point_law import (
     AsMeasured,
     InverseSolver,
     LawMemory,
+    MotionMemory,
+    NoMemory,
     PointGoal,
     PointLaw,
     PredictedMotion,
@@ -104,15 +106,16 @@ def compile_law(
                 return None
             program = solver.state
     nowhere = np.full((count, 2), np.nan)
-    memory = LawMemory(
+    if isinstance(law.motion, AsMeasured):
+        return CompiledLaw(law, LawMemory(NoMemory(), program))
+    remembered = MotionMemory(
         no_joints(n),
         ExposedFeatures(-np.inf, np.eye(4), nowhere, np.full(count, np.nan), np.nan),
         no_flow(count),
         nothing_carried(count),
         NO_POSE,
-        program,
     )
-    return CompiledLaw(law, memory)
+    return CompiledLaw(law, LawMemory(remembered, program))
 
 
 def _motion(camera: ServoCamera, covariance: FloatArray) -> PredictedMotion | None:

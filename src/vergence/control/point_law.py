@@ -106,14 +106,24 @@ class TrackingLaw(NamedTuple):
     singular_below: float
 
 
-class LawMemory(NamedTuple):
-    """What a law remembers from tick to tick."""
+class NoMemory(NamedTuple):
+    """The memory of features that are used as measured."""
+
+
+class MotionMemory(NamedTuple):
+    """What `PredictedMotion` remembers from image to image."""
 
     joints: PastJoints
     exposed: ExposedFeatures  # at a time of minus infinity before the first image
     flow: FlowState
     carried: CarriedPoints
     pose: FloatArray  # (4, 4) T_scene_target fitted last, or `NO_POSE`
+
+
+class LawMemory(NamedTuple):
+    """What a law remembers from tick to tick."""
+
+    motion: NoMemory | MotionMemory
     program: ProgramState
 
 

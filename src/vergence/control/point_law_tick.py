@@ -41,6 +41,8 @@ from vergence.control.point_law import (
     LawMemory,
     LawTick,
     Moment,
+    MotionMemory,
+    NoMemory,
     PointGoal,
     PointLaw,
     PredictedMotion,
@@ -49,7 +51,7 @@ from vergence.control.point_law import (
     TrackingLaw,
     Wish,
 )
-from vergence.control.solvers._program import FurtherRows, program_tick
+from vergence.control.solvers._program import FurtherRows, ProgramState, program_tick
 from vergence.control.solvers.pseudo_inverse import pseudo_inverse_rates
 from vergence.control.solvers.solver import Problem
 from vergence.control.target_flow import flow_at, measured_flow
@@ -83,21 +85,21 @@ def by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[[Callable[
 
 
 def measured_now(
-    motion: AsMeasured, memory: LawMemory, now: Moment
-) -> tuple[LawMemory, FeatureState]:
+    motion: AsMeasured, memory: NoMemory, now: Moment
+) -> tuple[NoMemory, FeatureState]:
     """Return features as they were measured."""
     points = now.image.points
     return memory, FeatureState(points, np.zeros_like(points), motion.believed_m, np.nan)
 
 
 def predicted_now(
-    motion: PredictedMotion, memory: LawMemory, now: Moment
-) -> tuple[LawMemory, FeatureState]:
+    motion: PredictedMotion, memory: MotionMemory, now: Moment
+) -> tuple[MotionMemory, FeatureState]:
     """Process an image and return the features now, as `ImageMotion.update` does.
 
     Args:
         motion: the assumptions.
-        memory: of the law.
+        memory: of the images before.
         now: the input of the tick.
     """
     image, chain = now.image, now.chain
@@ -121,7 +123,7 @@ def predicted_now(
         seen = unexplained_flow(memory.exposed, T_camera_scene, image.points, elapsed_s)
         flow = measured_flow(flow, seen, image.found, elapsed_s, motion.smoothing_s)
     exposed = ExposedFeatures(image.time, T_camera_scene, image.points, depth_m, share)
-    after = LawMemory(memory.joints, exposed, flow, carried, pose, memory.program)
+    after = MotionMemory(memory.joints, exposed, flow, carried, pose)
     if not motion.prediction:
         return after, FeatureState(image.points, flow_at(flow, 0.0), depth_m, share)
     here, late_s = se3_inverse(forward_kinematics(chain, now.q)), now.time - image.time
@@ -132,7 +134,7 @@ def predicted_now(
 
 
 @by_type({AsMeasured: measured_now, PredictedMotion: predicted_now})
-def features_now(motion: Any, memory: LawMemory, now: Moment) -> tuple[LawMemory, FeatureState]:
+def features_now(motion: Any, memory: Any, now: Moment) -> tuple[Any, FeatureState]:
     """Return the features now, and the memory after this image."""
     raise NotImplementedError
 
@@ -176,14 +178,18 @@ def tracking_columns(_motion: Any, now: FeatureState, desired: FloatArray) -> Fl
     raise NotImplementedError
 
 
-def _by_inverse(solver: InverseSolver, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
+def _by_inverse(
+    solver: InverseSolver, state: ProgramState, wish: Wish
+) -> tuple[ProgramState, LawTick]:
     now, H, g = wish.now, wish.quadratic.H, wish.quadratic.g
     tick = pseudo_inverse_rates(now.chain, now.q, solver.rate_max, H, g, np.zeros(len(now.q)))
     end = SINGULAR if tick.sigma < solver.singular_below else FINE
-    return memory, LawTick(tick.rates, end, tick.sigma)
+    return state, LawTick(tick.rates, end, tick.sigma)
 
 
-def _by_program(solver: ProgramSolver, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
+def _by_program(
+    solver: ProgramSolver, state: ProgramState, wish: Wish
+) -> tuple[ProgramState, LawTick]:
     now, features, found = wish.now, wish.features, wish.now.image.found
     n, faces, none = len(now.q), np.empty((0, 6)), np.empty(0)
     if solver.surface_known and len(features.points) >= _FEWEST_TURNED:
@@ -206,41 +212,38 @@ def _by_program(solver: ProgramSolver, memory: LawMemory, wish: Wish) -> tuple[L
         solver.surface_known,
     )
     further = FurtherRows(np.empty((0, n)), none, np.empty(0, dtype=np.int64))
-    answer, state = program_tick(
-        now.chain, solver.settings, memory.program, problem, solver.solids, further
-    )
-    after = LawMemory(
-        memory.joints, memory.exposed, memory.flow, memory.carried, memory.pose, state
-    )
-    return after, LawTick(answer.rates, FINE, np.nan)
+    answer, state = program_tick(now.chain, solver.settings, state, problem, solver.solids, further)
+    return state, LawTick(answer.rates, FINE, np.nan)
 
 
 @by_type({InverseSolver: _by_inverse, ProgramSolver: _by_program})
-def solved_by(solver: Any, memory: LawMemory, wish: Wish) -> tuple[LawMemory, LawTick]:
-    """Return the joint rates that serve an objective best, and the memory after this tick."""
+def solved_by(solver: Any, state: ProgramState, wish: Wish) -> tuple[ProgramState, LawTick]:
+    """Return the joint rates that serve an objective best, and the solver's state after it."""
     raise NotImplementedError
 
 
 def _point_law_tick(law: PointLaw, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTick]:
-    memory, features = features_now(law.motion, memory, now)
+    motion, features = features_now(law.motion, memory.motion, now)
     features = _found(features, now.image.found)
     quadratic = quadratic_of(law.goal, features, now.image.found)
     if not (np.isfinite(quadratic.H).all() and np.isfinite(quadratic.g).all()):
-        return memory, LawTick(np.zeros(len(now.q)), NONSENSE, np.nan)
-    memory, tick = solved_by(law.solver, memory, Wish(now, features, quadratic))
-    return memory, tick
+        after = LawMemory(motion, memory.program)
+        return after, LawTick(np.zeros(len(now.q)), NONSENSE, np.nan)
+    program, tick = solved_by(law.solver, memory.program, Wish(now, features, quadratic))
+    return LawMemory(motion, program), tick
 
 
 def _tracking_law_tick(
     law: TrackingLaw, memory: LawMemory, now: Moment
 ) -> tuple[LawMemory, LawTick]:
-    memory, features = features_now(law.motion, memory, now)
+    motion, features = features_now(law.motion, memory.motion, now)
     features, desired = _found(features, now.image.found), law.desired[now.image.found]
     columns = tracking_columns(law.motion, features, desired)
     answer, n = np.empty(len(now.q) + 10), len(now.q)
     optimal_tracking_tick(law.setup.weights, law.setup.joints, now.q, columns, answer)
     sigma = answer[n + 9]
-    return memory, LawTick(answer[:n], SINGULAR if sigma < law.singular_below else FINE, sigma)
+    end = SINGULAR if sigma < law.singular_below else FINE
+    return LawMemory(motion, memory.program), LawTick(answer[:n], end, sigma)
 
 
 @by_type({PointLaw: _point_law_tick, TrackingLaw: _tracking_law_tick})
@@ -258,6 +261,8 @@ def law_tick(law: Any, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTi
 @njit(cache=True, error_model="numpy")
 def _found(features: FeatureState, found: BoolArray) -> FeatureState:
     """Return the features that were found."""
+    if found.all():
+        return features
     return FeatureState(
         features.points[found], features.flow[found], features.depth[found], features.depth_share
     )

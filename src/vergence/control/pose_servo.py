@@ -7,7 +7,7 @@ from vergence.control.limits import Limits, TargetView
 from vergence.control.mounting import CameraMounting
 from vergence.control.moving_pose import MovingPose
 from vergence.control.objectives import PoseTrajectory, PositionBased, tip_goal
-from vergence.control.servo import AT_TIP, NO_FEATURES, Situation
+from vergence.control.situation import Situation
 from vergence.control.solvers import (
     Problem,
     QuadraticProgram,
@@ -16,7 +16,7 @@ from vergence.control.solvers import (
     Solver,
     describe,
 )
-from vergence.control.solvers.solver import NO_FACES, NO_JOINTS
+from vergence.control.solvers.solver import AT_TIP, NO_FACES, NO_FEATURES, NO_JOINTS
 from vergence.estimation.feature_faces import FeatureFaces
 from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint

@@ -1,8 +1,6 @@
 """The servo: a sum of objectives under limits, solved for joint rates."""
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,12 +8,9 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, frozen
 from vergence.control._tracking_tick import TrackingTickLaw
 from vergence.control.compile_law import CompiledLaw, compile_law
-from vergence.control.image_motion import MotionSettings
 from vergence.control.limits import CollisionLimit, Limits, pack_features
-from vergence.control.mounting import CameraMounting
 from vergence.control.objectives import (
     CameraState,
-    JointQuadratic,
     Objective,
     OptimalTracking,
     TrackingSetup,
@@ -27,8 +22,8 @@ from vergence.control.servo_camera import (
     depth_for,
     mountings_by_name,
 )
+from vergence.control.situation import Situation
 from vergence.control.solvers import (
-    Obstacles,
     Problem,
     PseudoInverse,
     QuadraticProgram,
@@ -37,12 +32,11 @@ from vergence.control.solvers import (
     describe,
 )
 from vergence.control.solvers.quadratic_program import BoundProgram
-from vergence.control.solvers.solver import NO_FACES, NO_JOINTS, Solution
-from vergence.control.term import Term
-from vergence.errors import Absent, InputError, nearest
-from vergence.estimation.feature_faces import FeatureFaces
+from vergence.control.solvers.solver import AT_TIP, NO_FACES, NO_FEATURES, Solution
+from vergence.control.sum_of_terms import Total, total_of
+from vergence.control.term import Term, terms_of
 from vergence.features import Points
-from vergence.robot import Arm, Clearance
+from vergence.robot import Arm
 from vergence.signals import (
     JointCommand,
     JointState,
@@ -51,37 +45,7 @@ from vergence.signals import (
     Reference,
 )
 
-# The fault of an objective without a meaningful quadratic.
-NOT_FINITE = OutcomeKind.INFEASIBLE, "an objective returned numbers that are not finite"
 _PLAN_WEIGHT = 1e-3  # of a plan's joint rates: they decide where the image determines little
-AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
-NO_FEATURES = np.empty((0, 7))  # from `pack_features`
-
-
-class Situation(NamedTuple):
-    """The data of a servo other than its objectives, limits and solver.
-
-    Attributes:
-        period_s: between two images, for which a command acts.
-        motion: assumptions about the features between exposure and now.
-        obstacles: returns what may occlude features; None for nothing.
-        depth_range: bounds on true over believed depth, where the limits give none.
-        start: joint positions at the start, (n,); those of the first tick if None.
-        fewest: number of found features below which the target is lost.
-        features: in the target's frame, (M, 3), m, by camera, if known; "" for the only camera.
-        clearance: computes distances between bodies that must not collide; None for no check.
-        faces: of the same features, by camera, if a surface is known around them.
-    """
-
-    period_s: float = 1 / 30
-    motion: MotionSettings = MotionSettings()
-    obstacles: Obstacles | None = None
-    depth_range: tuple[float, float] = (0.5, 2.0)
-    start: FloatArray | None = None
-    fewest: int = 1
-    features: Mapping[str, FloatArray] = MappingProxyType({})
-    clearance: Clearance | None = None
-    faces: Mapping[str, FeatureFaces] = MappingProxyType({})
 
 
 class Servo:
@@ -133,7 +97,7 @@ class Servo:
         }
         self._first = next(iter(mountings))
         self._main = self._cameras[self._first]
-        self._terms = _terms(objectives, mountings)
+        self._terms = terms_of(objectives, mountings)
         solver = QuadraticProgram() if solver is None else solver
         self._solver = solver.bind(
             Setting(
@@ -278,55 +242,29 @@ class Servo:
         self, states: Mapping[str, CameraState], joints: JointState, rates: FloatArray | None
     ) -> JointCommand:
         """Sum the objectives and solve for joint rates; `rates` (n,) go into the null space."""
-        H, g, variance = np.zeros((6, 6)), np.zeros(6), 0.0
-        H_joints, g_joints = NO_JOINTS
-        for objective, weight, camera in self._terms:
-            state = states.get(camera)
-            if state is None:
-                continue
-            try:
-                quadratic = objective.quadratic(state)
-            except InputError as error:  # such as a line seen end-on
-                reason = f"{error.source}: {error.given}; needs {error.allowed}"
-                lost = OutcomeKind.TARGET_LOST, reason
-                return JointCommand(self._rest, np.zeros(6), fault=lost)
-            if isinstance(quadratic, JointQuadratic):
-                n = len(self._rest)
-                if not len(g_joints):
-                    H_joints, g_joints = np.zeros((n, n)), np.zeros(n)
-                H_joints, g_joints = (
-                    H_joints + weight * quadratic.H,
-                    g_joints + weight * quadratic.g,
-                )
-                continue
-            variance += weight * quadratic.variance
-            if state.A is None:
-                H, g = H + weight * quadratic.H, g + weight * quadratic.g
-            else:
-                H = H + weight * state.A.T @ quadratic.H @ state.A
-                g = g + weight * state.A.T @ quadratic.g
-        if fault := _nonsense(H, g, H_joints, g_joints):
-            return JointCommand(self._rest, np.zeros(6), fault=fault)
+        total = total_of(self._terms, states, self._arm.joint_count)
+        if not isinstance(total, Total):
+            return JointCommand(self._rest, np.zeros(6), fault=total)
         first = states.get(self._first)
         A = AT_TIP if first is None or first.A is None else first.A
-        if not H.any():  # no camera sees any feature
+        if not total.H.any():  # no camera sees any feature
             return JointCommand(self._rest, np.zeros(6))
         faces = None if first is None else first.faces
         problem = Problem(
             joints.position,
             joints.velocity,
-            H,
-            g,
+            total.H,
+            total.g,
             NO_FEATURES
             if first is None
             else pack_features(first.points, first.flow, first.depth_m),
             self._rest if rates is None else rates,
-            H_joints,
-            g_joints,
+            total.H_joints,
+            total.g_joints,
             A,
             _PLAN_WEIGHT if rates is not None and rates.any() else 0.0,
             float("nan") if first is None else first.depth_share,
-            variance,
+            total.variance,
             NO_FACES if faces is None else faces,
             faces is not None,
         )
@@ -346,25 +284,3 @@ def command_of(solution: Solution, A: FloatArray, names: tuple[str, ...]) -> Joi
         slack=said.slack,
         clearance=solution.clearance,
     )
-
-
-def _nonsense(*parts: FloatArray) -> tuple[OutcomeKind, str] | None:
-    return None if all(np.isfinite(values).all() for values in parts) else NOT_FINITE
-
-
-def _terms(
-    objectives: Objective | Sequence[Objective | Term], cameras: Mapping[str, CameraMounting]
-) -> list[Term]:
-    """Return objectives as terms, each with the name of its camera."""
-    listed = objectives if isinstance(objectives, Sequence) else [objectives]
-    if not listed:
-        raise InputError("Servo", "objectives", Absent("none"), "one objective or more")
-    first = next(iter(cameras))
-    terms = []
-    for given in listed:
-        term = given if isinstance(given, Term) else Term(given)
-        name = term.camera or first
-        if name not in cameras:
-            raise InputError("Servo", "objectives", name, nearest(name, cameras))
-        terms.append(Term(term.objective, term.weight, name))
-    return terms

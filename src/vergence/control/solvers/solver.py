@@ -15,8 +15,10 @@ from vergence.signals import OutcomeKind
 
 Obstacles: TypeAlias = Callable[[], FloatArray]  # what may occlude the features now, (K, 16)
 
-
+NO_FEATURES = np.empty((0, 7))  # from `pack_features`
 NO_FACES = np.empty((0, 6))
+NO_JOINTS = np.empty((0, 0)), np.empty(0)  # no quadratic in the joint rates
+AT_TIP = np.empty((0, 0))  # the twist map of a camera at the tip
 
 
 class Problem(NamedTuple):
@@ -104,7 +106,6 @@ class Solver(Protocol):
 
 
 UNBOUNDED = (np.full(2, -np.inf), np.full(2, np.inf))
-NO_JOINTS = (np.empty((0, 0)), np.empty(0))
 
 
 class Pressure(NamedTuple):

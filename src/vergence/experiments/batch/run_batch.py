@@ -13,7 +13,7 @@ from vergence.compiled_kernels import is_compiled
 from vergence.control import Servo, singular_fault
 from vergence.control.compile_law import CompiledLaw
 from vergence.control.point_law import ProgramSolver, TrackingLaw
-from vergence.control.servo import NOT_FINITE
+from vergence.control.sum_of_terms import NOT_FINITE
 from vergence.experiments.batch import closed_loop as kernel
 from vergence.experiments.batch.closed_loop import LoopInputs, LoopRecord, closed_loop
 from vergence.experiments.batch.kinematic_run import KinematicRun
