@@ -69,10 +69,16 @@ def curve(index: int) -> dict[str, Any]:
     return {"color": COLORS[index % len(COLORS)], "linestyle": line}
 
 
-def legend(axes: "Axes") -> None:
-    """Put the legend beside the axes, where it covers no data."""
-    if axes.get_legend_handles_labels()[0]:
+def legend(axes: "Axes", *others: "Axes") -> None:
+    """Put the legend beside the axes, where it covers no data; with what only others draw, too."""
+    entries: dict[str, Any] = {}
+    for drawn in (axes, *others):
+        for handle, label in zip(*drawn.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
         axes.legend(
+            list(entries.values()),
+            list(entries),
             loc="upper left",
             bbox_to_anchor=(1.01, 1.03),
             borderaxespad=0.0,

@@ -289,6 +289,16 @@ def test_every_colour_of_a_figure_has_a_counterpart_on_a_dark_system() -> None:
         assert f'[style*="fill: {light}"]{{fill:{DARK[light]}!important}}' in drawing
 
 
+def test_a_legend_names_what_only_one_of_several_axes_draws_and_everything_once() -> None:
+    _, (upper, lower) = figure(4.0, 3.0, rows=2)
+    for axes, label in ((upper, "arrived"), (upper, "lost"), (lower, "arrived")):
+        axes.plot([0.0, 1.0], [0.0, 1.0], label=label)
+    legend(lower, upper)
+    shown = lower.get_legend()
+    assert shown is not None
+    assert [text.get_text() for text in shown.get_texts()] == ["arrived", "lost"]
+
+
 @pytest.mark.parametrize("span", [(0.4, 3.0), (11.0, 47.0), (1e-3, 90.0)])
 def test_a_logarithmic_axis_names_more_than_one_of_its_values(span: tuple[float, float]) -> None:
     drawn, (axes,) = figure(7.0, 2.0)

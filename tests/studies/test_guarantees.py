@@ -1,5 +1,7 @@
 """No random run passes a limit, and a guard that lets go would be noticed."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,21 @@ def test_a_heading_that_led_the_papers_law_to_a_limit_is_completed(known):
 def test_faults_on_the_arms_of_the_cells_end_by_name_inside_the_limits(known):
     for index in range(3, len(FAULTS) * len(known), 11):
         assert try_fault(known, 7, index).good, FAULTS[index // len(known)]
+
+
+def test_ctrl_c_ends_a_run_by_name_in_a_worker_too_which_blocks_it(known):
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        assert try_fault(known, 7, FAULTS.index("SIGINT") * len(known)).good
+        assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, set())
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def test_faults_are_injected_without_tracebacks_on_the_screen(known, caplog):
+    for _ in range(2):
+        assert try_fault(known, 7, FAULTS.index("raises ValueError") * len(known)).good
+    assert not caplog.records
 
 
 def test_an_arm_continues_no_longer_than_stated_after_its_last_image(known, monkeypatch):

@@ -26,6 +26,8 @@ def test_answers_beyond_five_deviations_and_refusals_without_a_reason_fail() -> 
     worse = checks_of([*right, *[Answer("b", UNFOUNDED, 2)] * 2], 1001)
     assert [check.holds for check in worse][:2] == [False, True]
     assert not checks_of([refused("a", "")], 1)[2].holds
+    assert checks_of([refused("a", "dark")], 1)[1].note == "no answers: all refused"
+    assert not named["a.coverage_3sigma"].note
 
 
 @pytest.mark.parametrize("part", SCENES)

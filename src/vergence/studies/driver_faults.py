@@ -102,7 +102,10 @@ def _signalled(name: str) -> Callable[[FaultyDriver], None]:
     def press(driver: FaultyDriver) -> None:
         if not driver.memory.setdefault("pressed", False):
             driver.memory["pressed"] = True
-            signal.raise_signal(getattr(signal, name))
+            number = getattr(signal, name)
+            before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})  # workers block Ctrl-C
+            signal.raise_signal(number)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     return press
 

@@ -94,7 +94,7 @@ def checks_of(
         Check(
             "features.matrix_error_max", f"L v against central differences: at most {_ERROR_MAX:g}",
             errors[worst], "", within(errors[worst], high=_ERROR_MAX),
-            f"{len(errors)} features; largest of `{worst}`",
+            f"{len(errors)} features; largest: {worst}",
         )
     ]  # fmt: skip
     for kind in KINDS:
@@ -206,5 +206,5 @@ def _endings(found: Servoings) -> Any:
         ending_bars(panel, names, counts)
         panel.set_title(title, loc="left", fontsize=9)
     axes[1].set_xlabel("of the starts (%)")
-    legend(axes[1])
+    legend(axes[1], axes[0])
     return drawing

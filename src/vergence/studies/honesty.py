@@ -91,7 +91,7 @@ def _three(name: str, answers: Sequence[Answer], note: str) -> tuple[Check, ...]
         ),
         Check(
             f"{name}.coverage_3sigma", "answers within 3 σ: at least 0.99", covered, "",
-            within(covered, _LEAST_COVERED),
+            within(covered, _LEAST_COVERED), "" if len(off) else "no answers: all refused",
         ),
         Check(
             f"{name}.refused_share", "every refusal says why", len(refused) / len(answers), "",

@@ -117,7 +117,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
 
 _CAPTION = (
     "Final error with ideal images and with the preset real_camera, each run as a mark; runs that "
-    "lost the target have none. Pixels, of objects followed by their outline millimetres."
+    "lost the target have none. In pixels; in millimetres for objects followed by their outline."
 )
 
 

@@ -48,7 +48,8 @@ def draw(
         "figure_03": (
             _figure_3(section),
             "Figure 3: initial and desired image; paths without potentials in the image and "
-            "in the joints' ranges (limits at -1 and 1).",
+            "in the joints' ranges (limits at -1 and 1). Each mark's path runs from a circle to a "
+            "square.",
         ),
         "figure_04": (
             _figure_4(section),
@@ -69,7 +70,8 @@ def draw(
         ),
         "figure_classical": (
             _classical(section.scene, classical),
-            "Servoing from the same start without a plan, up to where it fails.",
+            "Servoing from the same start without a plan, up to where it fails; from circles to "
+            "squares.",
         ),
         "figure_success": (
             _success(starts),
@@ -185,5 +187,5 @@ def _success(starts: Mapping[str, Sequence[Trial]]) -> Any:
         ending_bars(place, names, [endings(trials, method) for method in METHODS])
         place.set_xlabel("of the feasible starts (%)")
         place.set_title(f"{titles[name]}: {feasible} of {len(trials)} feasible", fontsize=9)
-    legend(axes[0, -1])
+    legend(axes[0, -1], *axes[0, :-1])
     return drawing

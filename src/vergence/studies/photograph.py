@@ -82,7 +82,8 @@ def checks_of(results: Sequence[TrialResult]) -> tuple[Check, ...]:
         _most("photograph.worst_mm", 3.0, float(mm.max()), "mm"),
         _most("photograph.worst_deg", 0.7, float(deg.max()), "°"),
         Check(
-            "photograph.refused", "every trial that does not begin says why", len(refused), "",
+            "photograph.refused", "every trial that does not begin says why",
+            len(refused), "refused",
             all(r.reason for r in refused), f"{sum(r.feasible for r in refused)} of them feasible",
         ),
     )  # fmt: skip
@@ -108,10 +109,10 @@ def _within_share(results: Sequence[TrialResult]) -> float:
 
 
 _ERRORS = (
-    "Where the camera ended, over where it began; every photograph that was reached. Dashed: the "
-    "tolerance that was asked for."
+    "Final distance of the camera from the goal over its initial distance, for every photograph "
+    "that was reached. Dashed: the tolerance."
 )
-_METHODS = "Where the camera truly ended, method by method, whatever was said of it."
+_METHODS = "True final position of the camera by method, whatever the run reported."
 
 
 def _most(name: str, most: float, measured: float, unit: str) -> Check:
