@@ -1,18 +1,23 @@
 """A compiled kernel goes when its file, or any that it is made of, has changed."""
 
+import ast
 from pathlib import Path
 
 import pytest
 
-from vergence.stale_kernels import forget_stale_kernels
+import vergence
+from vergence.stale_kernels import _listed, forget_stale_kernels
 
 SOURCES = {
     "__init__.py": "",
     "low/__init__.py": "from vergence.low.chain import walk\n",
     "low/chain.py": "def walk(): ...\n",
     "low/apart.py": "def other(): ...\n",
-    "high/__init__.py": "",
+    "high/__init__.py": "from vergence.high.law import tick\n",
     "high/law.py": "from vergence.low import (\n    walk,\n)\n\ndef tick(): ...\n",
+    "high/goal.py": (
+        "import json\nfrom vergence.low.apart import other\nfrom vergence.high import tick\n"
+    ),
 }
 
 
@@ -54,10 +59,28 @@ def test_kernels_that_call_what_has_changed_go_with_it(package: Path) -> None:
     (package / "low/chain.py").write_text("def walk(): return 1\n")
     before = kernels(package)
     forget_stale_kernels(package)
-    assert before - kernels(package) == {"low/chain", "low/__init__", "high/law"}
+    changed = {"low/chain", "low/__init__", "high/law", "high/__init__", "high/goal"}
+    assert before - kernels(package) == changed
     assert forget_stale_kernels(package) == []
 
 
-def test_a_file_that_nothing_imports_changes_itself_alone(package: Path) -> None:
+def test_what_calls_nothing_that_has_changed_is_kept(package: Path) -> None:
     (package / "low/apart.py").write_text("def other(): return 1\n")
-    assert forget_stale_kernels(package) == [package / "low/apart.py"]
+    assert set(forget_stale_kernels(package)) == {
+        package / "low/apart.py",
+        package / "high/goal.py",
+    }
+
+
+def test_every_import_of_the_package_is_seen() -> None:
+    for path in Path(vergence.__file__).parent.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+        wanted = {
+            (Path(*(node.module or "").split(".")), name.name)
+            for node in imports
+            for name in node.names
+            if (node.module or "").startswith("vergence")
+        }
+        seen = {(place, name) for place, names in _listed(text, Path()) for name in names}
+        assert wanted <= seen, path

@@ -11,10 +11,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
+from typing import TypeAlias
 
 _PACKAGE = Path(__file__).parent
 _NOTED = "kernels_made_from.json"  # in the package's __pycache__
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+(vergence[\w.]*)(?:\s+import\s+\(?([\w, \n]*))?", re.M)
+_IMPORT = re.compile(
+    r"^[ \t]*(?:from|import)[ \t]+(vergence[\w.]*)(?:[ \t]+import[ \t]+(\([^)]*\)|[^\n]*))?", re.M
+)
 
 
 def forget_stale_kernels(package: Path = _PACKAGE) -> list[Path]:
@@ -68,19 +71,43 @@ def _marks(names: Iterable[str], package: Path) -> dict[str, str]:
     """Return a mark of each file of a package that changes with it and with all that it imports."""
     paths = {package / name: name for name in names}
     texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in paths}
-    root = package.parent
-    imports = {path: set(_imported(text, root)) & texts.keys() for path, text in texts.items()}
+    listed = {path: list(_listed(text, package.parent)) for path, text in texts.items()}
+    imports = {path: set(_imported(path, listed)) for path in paths}
     own = {path: blake2b(text.encode(), digest_size=8).hexdigest() for path, text in texts.items()}
     return {name: _mark(path, imports, own) for path, name in paths.items()}
 
 
-def _imported(text: str, root: Path) -> Iterator[Path]:
+def _listed(text: str, root: Path) -> Iterator[tuple[Path, list[str]]]:
+    """Yield what a source imports: a module or package, without suffix, and names in it."""
     for module, names in _IMPORT.findall(text):
-        place = root.joinpath(*module.split("."))
-        yield place.with_suffix(".py")
-        yield place / "__init__.py"
-        for name in re.findall(r"\w+", names):
-            yield place / f"{name}.py"
+        yield root.joinpath(*module.split(".")), re.findall(r"\w+", names)
+
+
+_Listed: TypeAlias = Mapping[Path, list[tuple[Path, list[str]]]]
+
+
+def _imported(path: Path, listed: _Listed) -> Iterator[Path]:
+    for place, names in listed[path]:
+        found = [_definer(place, name, listed) for name in names] or [_file(place, listed)]
+        yield from filter(None, found)
+
+
+def _definer(place: Path, name: str, listed: _Listed) -> Path | None:
+    """Return the file that defines a name, which a package may only hand on."""
+    home = _file(place, listed)
+    if home is None or home.name != "__init__.py":
+        return home
+    if below := _file(place / name, listed):
+        return below
+    for other, names in listed[home]:
+        if name in names and other != place:
+            return _definer(other, name, listed)
+    return home
+
+
+def _file(place: Path, listed: _Listed) -> Path | None:
+    files = (place.with_suffix(".py"), place / "__init__.py")
+    return next((file for file in files if file in listed), None)
 
 
 def _mark(path: Path, imports: Mapping[Path, set[Path]], own: Mapping[Path, str]) -> str:

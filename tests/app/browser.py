@@ -77,6 +77,13 @@ class Browser:
     def open(self, address: str) -> None:
         self.call("Page.navigate", url=address)
 
+    def reload(self) -> None:
+        """Load the page again, and return when it is there."""
+        loaded, heard = "Page.loadEventFired", len(self.told)
+        self.call("Page.reload")
+        while loaded not in (told.get("method") for told in self.told[heard:]):
+            self.told.append(json.loads(self._line.recv(_PATIENCE_S)))
+
     def value(self, expression: str) -> Any:
         """Return what a JavaScript expression is worth."""
         answer = self.call(

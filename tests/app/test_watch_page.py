@@ -138,7 +138,7 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
 
 def test_the_view_in_space_is_hidden_while_it_is_not_connected(browser: Browser) -> None:
     script = browser.call("Page.addScriptToEvaluateOnNewDocument", source=LOOKING)
-    browser.call("Page.reload")
+    browser.reload()
     browser.wait("typeof seen === 'object' && typeof watch === 'object'")
     browser.wait(SHOWN)
     assert browser.value("seen.connecting") > 0
@@ -148,7 +148,7 @@ def test_the_view_in_space_is_hidden_while_it_is_not_connected(browser: Browser)
     browser.wait(SHOWN)
     browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
     browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
-    browser.call("Page.reload")
+    browser.reload()
     browser.wait("typeof seen === 'undefined' && typeof watch === 'object'")
     browser.wait(ROWS, lambda rows: rows > 5)
 

@@ -20,6 +20,7 @@ FREE, RIGID = 0, 1  # whether the affine matrix may change
 WEIGHT_PX = 8.0  # standard deviation of the weights
 UNKNOWNS = 8  # x, y, four of the affine matrix, gain, bias
 STEPS = 12
+PATIENCE = 3  # steps before an alignment may be given up as hopeless
 CONVERGED_PX = 0.06  # length of a step, with the form's; the error left after it is a tenth
 NOISE_GREY = 16.0  # grey levels; only scales the prior on the affine matrix
 FORM_DEVIATION = 0.02  # standard deviation of the affine matrix from the expected one
@@ -166,13 +167,20 @@ def product(a: Patch, b: Patch) -> np.float32:
 
 @njit(cache=True)
 def align(
-    x: float, y: float, A: FloatArray, template: AlignmentTemplate, form: int, work: Resampling
+    x: float,
+    y: float,
+    A: FloatArray,
+    template: AlignmentTemplate,
+    form: int,
+    least: float,
+    work: Resampling,
 ) -> Alignment:
     """Align the area of the image to a template; A is updated in place, starting from the prior.
 
     Each step solves (JᵀJ + Λ) q = JᵀI + Λ g e, where q = (g δ, g - 0, b), Λ is the weight of the
     prior and e the deviation of A from its initial value, and composes the warp with the inverse of
-    the step δ.
+    the step δ. An alignment whose correlation, if it went on growing as in its last step, would not
+    reach the one required in the steps left is given up.
 
     Args:
         x: expected column of the feature in the area, px.
@@ -180,13 +188,19 @@ def align(
         A: affine matrix from template to image, (2, 2).
         template: the template.
         form: FREE, or RIGID to keep A constant.
+        least: correlation required; -1 if any will do.
         work: the area, and work memory.
     """
     strayed, right, q = np.zeros(4), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
-    gain, steps = 1.0, 0
+    gain, steps, before = 1.0, 0, -1.0
     for step in range(STEPS):
         steps = step + 1
         resample(x, y, A, template, work)
+        if least > -1.0:
+            now, _ = agreement(template, work)
+            if step >= PATIENCE and now + (STEPS - step) * (now - before) < least:
+                break
+            before = now
         for k in range(UNKNOWNS):
             right[k] = product(template.jacobian[k], work.sample)
         for k in range(4):

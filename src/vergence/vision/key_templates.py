@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.alignment import fill_template
 from vergence.vision.pyramid import anchor_of
-from vergence.vision.settled_place import fits, settle
+from vergence.vision.settled_place import LOST_CORRELATION, fits, settle
 from vergence.vision.ssd import SAME_PX, make_template, template_in
 from vergence.vision.ssd_surface import blot_out, lowest, ssd_around
 from vergence.vision.tracker_state import (
@@ -64,7 +64,8 @@ def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
         if surface[row, column] > limit:
             break
         blot_out(surface, row, column)
-        settle(image, x + column - TWIN_RANGE_PX, y + row - TWIN_RANGE_PX, k, state, place)
+        start_x, start_y = x + column - TWIN_RANGE_PX, y + row - TWIN_RANGE_PX
+        settle(image, start_x, start_y, k, state, LOST_CORRELATION, place)
         if place[VERDICT] == FOUND:
             off_x, off_y = place[0] - x, place[1] - y
             distance = np.hypot(off_x, off_y)

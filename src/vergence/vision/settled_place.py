@@ -64,11 +64,26 @@ FLOOR_PX = 0.01  # lower bound on the standard deviation: interpolation, quantis
 
 @njit(cache=True)
 def settle(
-    image: ImageArray, x: float, y: float, k: int, state: TrackerState, out: FloatArray
+    image: ImageArray,
+    x: float,
+    y: float,
+    k: int,
+    state: TrackerState,
+    least: float,
+    out: FloatArray,
 ) -> None:
     """Align point k from a start and judge whether it is the point; fills out, (COLUMNS + 4,).
 
     Position, covariance and affine matrix are filled only if it is. The state is not changed.
+
+    Args:
+        image: grey, (height, width).
+        x: start, px.
+        y: start, px.
+        k: index of the point.
+        state: of the tracker.
+        least: correlation below which the place is of no use; -1 if it is always of use.
+        out: columns as in the tracker's answers, and the affine matrix.
     """
     height, width = image.shape
     work = make_resampling(state.memory[WORKSPACE_SIZE:], state.corner)
@@ -80,12 +95,12 @@ def settle(
     template = key_template_of(state, k, key)
     for form in (FREE, RIGID):
         A = before.copy()
-        found = align(x - corner_x, y - corner_y, A, template, form, work)
+        found = align(x - corner_x, y - corner_y, A, template, form, least, work)
         point_x, point_y = found.x + corner_x, found.y + corner_y
         shift = np.hypot(point_x - x, point_y - y)
         verdict, detail = judge(found, shift, stretch(product2(A, inverse2(before))))
         out[RESIDUAL], out[CORRELATION], out[DETAIL] = found.residual, found.correlation, detail
-        if verdict == FOUND:
+        if verdict == FOUND or found.correlation < least:
             break
     doubtful = verdict == FOUND and out[CORRELATION] < DOUBTFUL
     if doubtful and surroundings_agree(image, point_x, point_y, k, state) < SURROUNDINGS:

@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision.key_templates import PROMISING, nearest, take_over
 from vergence.vision.pyramid import anchor_of
-from vergence.vision.settled_place import correlation_at, settle
+from vergence.vision.settled_place import LOST_CORRELATION, correlation_at, settle
 from vergence.vision.ssd import (
     SAME_PX,
     WORKSPACE_SIZE,
@@ -60,7 +60,8 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
         chosen = 0
         if alike[k] > 1:
             x, y = where_neighbours_go(k, expected, answers, sure)
-            settle(image, x, y, k, state, places[k, alike[k]])  # the search may not have found it
+            # The search may not have found it.
+            settle(image, x, y, k, state, worth_finding(places[k]), places[k, alike[k]])
             alike[k] = that_look_alike(places[k], alike[k] + 1)
             off = np.hypot(places[k, : alike[k], 0] - x, places[k, : alike[k], 1] - y)
             chosen = int(np.argmin(off))
@@ -147,7 +148,8 @@ def settle_all(
         else:
             promising = correlation_at(image, start_x, start_y, k, state) >= PROMISING
         if promising:
-            settle(image, start_x, start_y, k, state, places[count])
+            least = worth_finding(places) if count else -1.0
+            settle(image, start_x, start_y, k, state, least, places[count])
             if n == 0:
                 out[2:] = places[0, 2:COLUMNS]
             count += places[count, VERDICT] == FOUND
@@ -164,7 +166,7 @@ def settle_all(
             if nearest(places[:count, :2], start_x, start_y) < SAME_PX:
                 continue
             if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
-                settle(image, start_x, start_y, k, state, places[count])
+                settle(image, start_x, start_y, k, state, worth_finding(places), places[count])
                 count += places[count, VERDICT] == FOUND
     return count
 
@@ -184,6 +186,13 @@ def starting_places(
     places[:count, 1] += anchor_y - 0.5 + offset_y
     places[count, 0], places[count, 1] = x, y
     return places
+
+
+@njit(cache=True, inline="always")
+def worth_finding(places: FloatArray) -> float:
+    """Smallest correlation with which another position looks like the first one found."""
+    least: float = max(places[0, CORRELATION] - ALIKE, LOST_CORRELATION)
+    return least
 
 
 @njit(cache=True, inline="always")
