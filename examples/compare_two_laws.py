@@ -2,6 +2,12 @@
 
 import vergence as vg
 
-table = vg.compare("ur5", laws=["image_based", "own"], starts=20, duration_s=4)
+STATIONARY = {"motion": {"kind": "stationary"}}
+
+table = vg.compare(
+    "ur5", ["image_based", "own"], starts=20, spread=0.5, duration_s=4, target=STATIONARY
+)
 print(table)
-print("the fourth run:", table.runs[3].outcome)
+for run in table.runs:
+    if run.ending != "converged":
+        print(run.labels, run.ending.value, run.reason)

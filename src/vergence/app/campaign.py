@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vergence.experiments import CellSource, Trial, TrialResult
 
 
-_OF_STATIONARY_PX, _OF_MOVING_PX = 2.0, 5.0  # tolerances, by what the target does
+_MAP_PX = 2.0  # tolerance where the target is at rest, as in a map
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,7 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
     """
     from vergence.app.output import new_folder
     from vergence.app.run import overrides
-    from vergence.experiments import CellSource, renders
-    from vergence.parts import kind_of
+    from vergence.experiments import CellSource, renders, usual_tolerance_px
 
     source = CellSource.of(options.cell, overrides(options.settings), None)
     cell = source.load()
@@ -92,8 +91,7 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
     tolerance_px = options.tolerance_px
     if tolerance_px is None:
         # A map makes the target rest where it is to be found; a comparison lets it move on.
-        moves = command == "compare" and kind_of(cell.target.motion) != "stationary"
-        tolerance_px = _OF_MOVING_PX if moves else _OF_STATIONARY_PX
+        tolerance_px = usual_tolerance_px(cell) if command == "compare" else _MAP_PX
     return source, Running(folder, options, renders(cell), tolerance_px)
 
 

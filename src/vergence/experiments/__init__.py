@@ -2,6 +2,7 @@
 
 from vergence.experiments.campaign import run_campaign
 from vergence.experiments.comparison import Comparison, compare
+from vergence.experiments.evaluation import usual_tolerance_px
 from vergence.experiments.executor import Executor, WorkersLostError
 from vergence.experiments.goal import Goal
 from vergence.experiments.kinematic import renders
@@ -41,4 +42,5 @@ __all__ = [
     "scores",
     "start_trials",
     "usual_laws",
+    "usual_tolerance_px",
 ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from vergence.arrays import pandas_or_error
 from vergence.cell import Cell
 from vergence.experiments.campaign import run_campaign
+from vergence.experiments.evaluation import usual_tolerance_px
 from vergence.experiments.executor import Executor
 from vergence.experiments.presets import usual_laws
 from vergence.experiments.sampling import Sampling
@@ -92,7 +93,7 @@ def compare(
     seed: int = 0,
     vary: Sequence[str] = ("starts",),
     spread: float = 0.2,
-    tolerance_px: float = 2.0,
+    tolerance_px: float | None = None,
     workers: int = 1,
     folder: str | Path | None = None,
     **changes: Any,
@@ -107,7 +108,8 @@ def compare(
         seed: of the starts.
         vary: what is drawn: "starts", "targets", "motions".
         spread: share of the ranges that is drawn from.
-        tolerance_px: up to which error of the farthest feature a run has converged.
+        tolerance_px: up to which error of the farthest feature a run has converged; 2 px, or 5 px
+            if the target moves, if None.
         workers: processes to share the runs; with more than one a script needs
             ``if __name__ == "__main__":``.
         folder: keeps results as they come; a rerun resumes from there.
@@ -119,6 +121,7 @@ def compare(
     source = CellSource.changed(cell, changes)
     loaded = source.load()
     sampling = Sampling(tuple(vary), spread)
+    tolerance_px = usual_tolerance_px(loaded) if tolerance_px is None else tolerance_px
     trials = start_trials(loaded, laws or usual_laws(loaded), starts, seed, sampling)
     executor = Executor(workers)
     if folder is not None:

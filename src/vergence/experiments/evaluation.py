@@ -6,7 +6,9 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
+from vergence.cell import Cell
 from vergence.experiments.trial import Ending, Trial, TrialResult
+from vergence.parts import kind_of
 from vergence.runtime.results import CameraTrace, Run, points_at_pose
 from vergence.signals import Outcome, OutcomeKind
 
@@ -15,6 +17,15 @@ _ENDINGS = {
     OutcomeKind.COLLISION: Ending.COLLISION,
     OutcomeKind.SINGULARITY: Ending.SINGULAR,
 }
+_AT_REST_PX, _MOVING_PX = 2.0, 5.0  # tolerances, by what the target does
+
+
+def usual_tolerance_px(cell: Cell) -> float:
+    """Return up to which error of the farthest feature a run of a cell has converged.
+
+    Every law lags behind a target that moves.
+    """
+    return _AT_REST_PX if kind_of(cell.target.motion) == "stationary" else _MOVING_PX
 
 
 class TrueTracks(NamedTuple):
