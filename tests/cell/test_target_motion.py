@@ -5,7 +5,8 @@ import pytest
 
 from vergence.cell.schema import Placement
 from vergence.parts import kind_of
-from vergence.simulation import placement_pose, target_pose
+from vergence.simulation import placement_pose, target_pose, target_poses
+from vergence.simulation.motion import PoseByTick
 from vergence.simulation.motions import Circle, Line, Random, Stationary, Step
 
 START = Placement(position_m=(0.3, -0.2, 0.1), rotation_rpy_deg=(10.0, -20.0, 30.0))
@@ -37,6 +38,15 @@ def test_it_stays_a_rigid_motion(motion) -> None:
         R = pose(time)[:3, :3]
         np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=kind_of)
+def test_poses_computed_ahead_are_those_of_their_times(motion) -> None:
+    pose, rate_hz = target_pose(START, motion, 3), 500.0
+    ahead = PoseByTick(target_poses(START, motion, 3), rate_hz)
+    for tick in (*range(0, 1200, 7), 100, 0):
+        np.testing.assert_array_equal(ahead(tick / rate_hz), pose(tick / rate_hz))
+    np.testing.assert_array_equal(ahead(1.2345), pose(1.2345))
 
 
 def test_a_placement_turns_by_roll_then_pitch_then_yaw_about_fixed_axes() -> None:

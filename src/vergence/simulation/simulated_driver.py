@@ -12,7 +12,8 @@ from vergence.cell.schema import Task
 from vergence.robot import Arm
 from vergence.signals import Frame, JointState, Sample, Setpoint
 from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
-from vergence.simulation.motion import target_pose, target_seed
+from vergence.simulation.motion import PoseByTick, target_poses, target_seed
+from vergence.simulation.motions import TargetPose
 from vergence.simulation.renderer import choose_renderer
 
 
@@ -39,8 +40,11 @@ class SimulatedDriver:
         self.cell = cell
         built = as_built(cell)
         self.world = World(built)
-        self._motions = {
-            name: target_pose(built.targets[name], target.motion, target_seed(cell.seed, number))
+        self._motions: dict[str, TargetPose] = {
+            name: PoseByTick(
+                target_poses(built.targets[name], target.motion, target_seed(cell.seed, number)),
+                cell.inner_rate_hz,
+            )
             for number, (name, target) in enumerate(cell.targets.items())
         }
         self._grippers = {n: Gripper(self.world, n, t) for n, t in cell.outputs.items()}
