@@ -1,11 +1,14 @@
 """A compiled kernel goes when its file, or any that it is made of, has changed."""
 
 import ast
+import json
+import runpy
 from pathlib import Path
 
 import pytest
 
 import vergence
+from vergence.kernel_cache import kernel_cache, kernels_of
 from vergence.stale_kernels import _listed, forget_stale_kernels
 
 SOURCES = {
@@ -70,6 +73,52 @@ def test_what_calls_nothing_that_has_changed_is_kept(package: Path) -> None:
         package / "low/apart.py",
         package / "high/goal.py",
     }
+
+
+@pytest.mark.parametrize("chosen", [True, False])
+def test_kernels_that_are_kept_elsewhere_go_too(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chosen: bool
+) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    if chosen:
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(elsewhere))
+    else:  # the package cannot be written to
+        monkeypatch.setenv("XDG_CACHE_HOME", str(elsewhere))
+        monkeypatch.setattr("vergence.kernel_cache.os.access", lambda *_: False)
+    kernel = kernel_cache(package / "high") / "law.tick-5.py311.nbi"
+    assert elsewhere in kernel.parents
+    kernel.parent.mkdir(parents=True)
+    kernel.write_text("code")
+    assert forget_stale_kernels(package) == []
+    (package / "low/chain.py").write_text("def walk(): return 1\n")
+    forget_stale_kernels(package)
+    assert not kernel.exists()
+
+
+def test_numba_keeps_kernels_where_they_are_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "kernel.py"
+    source.write_text("from numba import njit\n\n@njit(cache=True)\ndef one(): return 1\n")
+    for chosen in ("", str(tmp_path / "chosen")):
+        monkeypatch.setattr("numba.config.CACHE_DIR", chosen)
+        monkeypatch.setenv("NUMBA_CACHE_DIR", chosen)
+        kernels = runpy.run_path(str(source))
+        assert kernels["one"]() == 1
+        assert len(list(kernels_of(source))) == 2
+
+
+def test_of_a_wheel_only_its_own_kernels_stay(package: Path) -> None:
+    own, other = "high/__pycache__/law.walk-3.py311.nbi", "low/__pycache__/chain.walk-3.py311.nbi"
+    wheel = package / "kernels.json"
+    wheel.write_text(json.dumps({"kernels": [own], "sources": "1"}))
+    assert package / "low/chain.py" in forget_stale_kernels(package)
+    assert kernels(package) == {"high/law"}
+    (package / other).write_text("compiled here, with this wheel")
+    assert forget_stale_kernels(package) == []
+    assert kernels(package) == {"high/law", "low/chain"}
+    wheel.write_text(json.dumps({"kernels": [own], "sources": "2"}))  # the next wheel
+    assert forget_stale_kernels(package) == [package / "low/chain.py"]
 
 
 def test_every_import_of_the_package_is_seen() -> None:
