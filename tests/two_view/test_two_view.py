@@ -130,6 +130,20 @@ def test_deviations_cover_a_motion_that_wrong_matches_bend(scene: int) -> None:
     assert answer.deviations < 5.0
 
 
+# In turn: a wrong match without which a long valley opens; three wrong ones that agree with a
+# motion 90° aside; a reference plane that nearly holds the desired camera; a bent valley without
+# any wrong match; and planes that are nearly frontal, or whose noise is more than stated.
+@pytest.mark.parametrize(
+    ("kind", "scene"),
+    [("general", 2012), ("general", 182), ("general", 3087), ("general", 9672)]
+    + [("near plane", 8256), ("plane", 1365), ("near plane", 8576)],
+)
+def test_deviations_cover_what_valleys_and_wrong_matches_leave_open(kind: str, scene: int) -> None:
+    (answer,) = try_scene(np.random.default_rng([1000, 0, scene]), KINDS.index(kind))
+    assert answer.explanations > 0
+    assert answer.deviations < 5.0
+
+
 # Seven of eight or nine points happen to lie on the plane of a motion far longer than theirs.
 @pytest.mark.parametrize("scene", [1257, 2527])
 def test_a_plane_by_chance_does_not_hide_the_motion_of_all_points(scene: int) -> None:

@@ -1,264 +1,204 @@
-"""Motions of an object of any shape, sampled according to the likelihood of the matches.
+"""Motions of an object of any shape that the matches allow beside the best one.
 
 The error of a motion has narrow, curved valleys, since rotation and sideways translation look
-alike; and a wrong match close to its epipolar line attracts the best motion. Neither is visible in
-the covariance at the minimum. Motions are therefore sampled from the likelihood of all matches,
-each of which may be wrong, and the covariance is that of the samples about the best motion.
+alike, which the covariance at the minimum does not show. The valley through each local optimum of
+the likelihood is therefore followed both ways, motions are drawn about the points on the way, and
+the covariance is widened to contain each of them.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray, IntArray
-from vergence.geometry import skew, so3_exp, so3_log
+from vergence.arrays import BoolArray, FloatArray
+from vergence.geometry import so3_log
 from vergence.vision.two_view.covariance import reference_plane
 from vergence.vision.two_view.decomposition import inverse_depths
-from vergence.vision.two_view.evidence import log_densities
+from vergence.vision.two_view.likelihood_optima import (
+    NOISIER,
+    UNLIKELY,
+    Likelihood,
+    Optima,
+    information_of,
+    least_unlikelihood,
+    local_optima,
+    motion_at,
+    unlikelihood,
+)
 from vergence.vision.two_view.linear import homogeneous
-from vergence.vision.two_view.motions import choose_motion
-from vergence.vision.two_view.sampson import (
-    refine_essential,
-    sampson_jacobian,
-    sampson_residuals,
-    tangent_basis,
-)
+from vergence.vision.two_view.motions import essential
+from vergence.vision.two_view.sampson import sampson_jacobian, sampson_residuals
 from vergence.vision.two_view.search import sampled_motions
-from vergence.vision.two_view.small import (
-    apply,
-    dot,
-    symmetric_eigen,
-    times,
-    transposed_apply,
-    transposed_times,
-    unit,
-)
+from vergence.vision.two_view.small import apply, dot, symmetric_eigen, transposed_apply
 from vergence.vision.two_view.widening import upsilon_between, widen
 
-TEMPERATURE = 3.0  # of the sampling, to include unlikely motions; the moments are reweighted
-_WALKERS, _ROUNDS, _SETTLING = 48, 60, 20
-_STARTS = 24  # walkers that start from motions of five matches
-_NOISIER = np.log(4.0)  # largest ratio of the noise to the stated one
-_MANY = 16  # matches from which the noise can be estimated
+_STEPS = 6  # along a valley, each way
+_DRAWS = 1.3 * np.random.default_rng(0).normal(size=(6, 5))  # about each point of a valley
+_NOISE = 1.3 * np.random.default_rng(1).normal(size=211)  # of the reference plane's distance
 _FARTHEST = 1e-4  # smallest inverse depth, relative to that of the translation
-_FEWEST = 50  # samples with their reference plane in front of both cameras
-_LEAST = 16.0  # χ² below which a sample does not widen the covariance: the moments include it
-_ASIDE = 1.33  # factor on χ² relative to that of the samples: what their moments may miss
-_AHEAD = 0.1  # smallest cosine between the translation directions of a sample and the best motion
-
-
-class Likelihood(NamedTuple):
-    """The likelihood of motions given matches, each of which may be wrong."""
-
-    m_star: FloatArray  # (N, 2) in the desired view, normalized
-    m: FloatArray  # (N, 2) in the current view
-    noise: float  # stated standard deviation of a coordinate
-    wrong: float  # density of a wrong match's Sampson distance, over that of a right one's e⁻⁰/σ
-
-
-class Draws(NamedTuple):
-    """The random numbers of a differential-evolution Markov chain, for each round and walker."""
-
-    partners: IntArray  # (G, K, 2) two other walkers, whose difference is the step
-    length: FloatArray  # (G, K) factor on the step
-    jitter: FloatArray  # (G, K, 6) standard normal
-    threshold: FloatArray  # (G, K) −2 log of a uniform number
-
-
-def _draws() -> Draws:
-    random = np.random.default_rng(0)
-    size = (_ROUNDS, _WALKERS)
-    first = random.integers(1, _WALKERS, size)
-    second = 1 + (first - 1 + random.integers(1, _WALKERS - 1, size)) % (_WALKERS - 1)
-    return Draws(
-        (np.arange(_WALKERS)[:, None] + np.stack((first, second), axis=-1)) % _WALKERS,
-        np.where(random.uniform(size=size) < 0.1, 1.0, 0.7),
-        random.normal(size=(*size, 6)),
-        -2.0 * np.log(random.uniform(size=size)),
-    )
-
-
-_DRAWS = _draws()
-
-
-def likelihood_of(m_star: FloatArray, m: FloatArray, noise: float, dropped: int) -> Likelihood:
-    """Return the likelihood of matches (N, 2) of which some do not agree with the best motion.
-
-    A wrong match lies anywhere in the region that the matches cover: its Sampson distance, which is
-    its distance from the line over √2, has the density √2 D/A.
-    """
-    share = (dropped + 1.0) / (len(m) + 2.0)
-    _, band = log_densities(m_star, m)
-    wrong = share / (1.0 - share) * np.sqrt(2.0 * np.pi) * np.sqrt(0.5) * float(np.exp(band))
-    return Likelihood(m_star, m, noise, wrong)
+_SHORTEST = 4.0  # least information: half a radian is a deviation at most
+_STEP = 1e-6  # of a numerical derivative
+_FAR = 30.0  # χ² above which a motion is ignored
+_ASIDE = 1.33  # factor on χ² of what is drawn
+_LEAST = 16.0  # χ² below which a motion counts as that far
 
 
 @njit(cache=True)
-def unlikelihood(likelihood: Likelihood, E: FloatArray, log_noise: float) -> float:
-    """Return −2 log of the likelihood of an essential matrix, up to a constant.
+def along_valley(
+    likelihood: Likelihood,
+    R: FloatArray,
+    t: FloatArray,
+    right: BoolArray,
+    log_noise: float,
+    highest: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return motions along the valley of the error through an optimum, both ways, the given first.
+
+    Each step goes by a deviation along the weakest direction, which turns on the way, then back to
+    the bottom of the valley by a step along the others.
 
     Args:
-        likelihood: of the matches.
-        E: the matrix, (3, 3).
+        likelihood: of all matches.
+        R: of the optimum, (3, 3).
+        t: of the optimum, unit, (3,).
+        right: mask of the matches that determine the valley, (N,).
         log_noise: logarithm of the noise over the stated one.
-    """
-    deviation = likelihood.noise * np.exp(log_noise)
-    total = 0.0
-    for residual in sampson_residuals(E, likelihood.m_star, likelihood.m):
-        right = np.exp(-0.5 * (residual / deviation) ** 2) / deviation
-        total -= 2.0 * np.log(right + likelihood.wrong)
-    return total
-
-
-@njit(cache=True)
-def motion_at(R: FloatArray, t: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the motion at x = (ω, τ, …) about (R, t): exp(ω) R, and t + B τ normalised."""
-    turned = times(so3_exp(x[:3].copy()), R)
-    return turned, unit(t + apply(tangent_basis(t), x[3:5].copy()))
-
-
-@njit(cache=True)
-def starting_walkers(
-    likelihood: Likelihood,
-    R: FloatArray,
-    t: FloatArray,
-    log_noise: float,
-    matrices: FloatArray,
-    count: int,
-) -> FloatArray:
-    """Return initial walkers, (≤ count, 6): the most likely motions of five matches, refined."""
-    unlikely = np.empty(len(matrices))
-    for k in range(len(matrices)):
-        unlikely[k] = unlikelihood(likelihood, matrices[k], log_noise + np.log(2.0))
-    starts, found = np.zeros((count, 6)), 0
-    B, gate = tangent_basis(t), 4.0 * likelihood.noise * np.exp(log_noise)
-    for k in np.argsort(unlikely)[: 2 * count]:
-        residuals = sampson_residuals(matrices[k], likelihood.m_star, likelihood.m)
-        near = np.flatnonzero(np.abs(residuals) < gate)
-        if found == count or len(near) < 6:
-            continue
-        m_star, m = likelihood.m_star[near], likelihood.m[near]
-        R_k, t_k, _ = choose_motion(matrices[k], m_star, m)
-        R_k, t_k, _ = refine_essential(R_k, t_k, m_star, m, 6)
-        ahead = dot(t_k, t)
-        if ahead > _AHEAD:
-            starts[found, :3] = so3_log(times(R_k, R.T.copy()))
-            starts[found, 3:5] = transposed_apply(B, t_k) / ahead
-            found += 1
-    return starts[:found]
-
-
-@njit(cache=True)
-def draw_motions(
-    likelihood: Likelihood,
-    R: FloatArray,
-    t: FloatArray,
-    log_noise: float,
-    starts: FloatArray,
-    draws: Draws,
-) -> tuple[FloatArray, FloatArray]:
-    """Sample motions by a differential-evolution Markov chain [TerBraak2006].
-
-    Args:
-        likelihood: of the matches.
-        R: of the best motion, (3, 3).
-        t: of the best motion, unit, (3,).
-        log_noise: of the noise over the stated one; sampled as well if there are many matches.
-        starts: initial walkers, (S, 6); the others start near the best motion.
-        draws: random numbers.
+        highest: unlikelihood at which the valley ends.
 
     Returns:
-        (ω, τ, log noise) of the samples, (M, 6), and −2 log of their likelihoods, (M,).
+        R (K, 3, 3), t (K, 3), and the deviations of (ω, τ) about each, the weakest first, by
+        columns (K, 5, 5).
     """
-    rounds, walkers = draws.threshold.shape
-    J = sampson_jacobian(R, t, likelihood.m_star, likelihood.m)
-    deviation = likelihood.noise * np.exp(log_noise)
-    values, vectors = symmetric_eigen(transposed_times(J, J) / deviation**2)
-    spread = np.zeros((6, 6))
-    for k in range(5):
-        spread[:5, k] = vectors[:, k] / np.sqrt(max(values[k], 1.0))
-    if len(likelihood.m) >= _MANY:
-        spread[5, 5] = 0.5 / np.sqrt(len(likelihood.m))
-    x, unlikely = np.zeros((walkers, 6)), np.empty(walkers)
-    samples = np.empty(((rounds - _SETTLING) * walkers, 6))
-    values = np.empty(len(samples))
-    x[:, 5] = log_noise
-    x[: len(starts), :5] = starts[:, :5]
-    for i in range(walkers):
-        x[i] += apply(spread, draws.jitter[0, i])
-        x[i, 5] = min(max(x[i, 5], 0.0), _NOISIER)
-        R_i, t_i = motion_at(R, t, x[i])
-        unlikely[i] = unlikelihood(likelihood, times(skew(t_i), R_i), x[i, 5])
-    for g in range(rounds):
-        for i in range(walkers):
-            step = x[draws.partners[g, i, 0]] - x[draws.partners[g, i, 1]]
-            trial = x[i] + draws.length[g, i] * step + 0.05 * apply(spread, draws.jitter[g, i])
-            if 0.0 <= trial[5] <= _NOISIER:
-                R_i, t_i = motion_at(R, t, trial)
-                value = unlikelihood(likelihood, times(skew(t_i), R_i), trial[5])
-                if value - unlikely[i] < TEMPERATURE * draws.threshold[g, i]:
-                    x[i], unlikely[i] = trial, value
-            if g >= _SETTLING:
-                at = (g - _SETTLING) * walkers + i
-                samples[at], values[at] = x[i], unlikely[i]
-    return samples, values
+    rotations, translations = np.empty((2 * _STEPS + 1, 3, 3)), np.empty((2 * _STEPS + 1, 3))
+    spreads = np.empty((2 * _STEPS + 1, 5, 5))
+    rotations[0], translations[0], found = R, t, 1
+    spreads[0] = local_spread(likelihood, R, t, right, log_noise)
+    for sign in (1.0, -1.0):
+        R_k, t_k, heading = R, t, sign * spreads[0, :, 0].copy()
+        for _ in range(_STEPS):
+            R_k, t_k = motion_at(R_k, t_k, heading)
+            spread = local_spread(likelihood, R_k, t_k, right, log_noise)
+            gradient = gradient_of(likelihood, R_k, t_k, right, log_noise)
+            step = np.zeros(5)
+            for k in range(1, 5):
+                v = spread[:, k].copy()
+                step -= v * dot(v, gradient)
+            R_k, t_k = motion_at(R_k, t_k, step)
+            if not unlikelihood(likelihood, essential(R_k, t_k), log_noise) < highest:
+                break
+            spread = local_spread(likelihood, R_k, t_k, right, log_noise)
+            rotations[found], translations[found], spreads[found] = R_k, t_k, spread
+            ahead = spread[:, 0].copy()
+            heading = ahead if dot(ahead, heading) > 0.0 else -ahead
+            found += 1
+    return rotations[:found], translations[:found], spreads[:found]
 
 
 @njit(cache=True)
-def spread_of_motions(
+def local_spread(
+    likelihood: Likelihood, R: FloatArray, t: FloatArray, right: BoolArray, log_noise: float
+) -> FloatArray:
+    """Return deviations along the axes of the error of right matches, weakest first, (5, 5)."""
+    values, vectors = symmetric_eigen(information_of(likelihood, R, t, right, log_noise))
+    for k in range(5):
+        vectors[:, k] /= np.sqrt(max(values[k], _SHORTEST))
+    return vectors
+
+
+@njit(cache=True)
+def gradient_of(
+    likelihood: Likelihood, R: FloatArray, t: FloatArray, right: BoolArray, log_noise: float
+) -> FloatArray:
+    """Return the gradient of half the χ² of the right matches by (ω, τ), (5,)."""
+    m_star, m = likelihood.m_star[right], likelihood.m[right]
+    residuals = sampson_residuals(essential(R, t), m_star, m)
+    J = sampson_jacobian(R, t, m_star, m)
+    J /= (likelihood.noise * np.exp(log_noise)) ** 2
+    return transposed_apply(J, residuals)
+
+
+@njit(cache=True)
+def widen_for_likely(
+    covariance: FloatArray,
+    likelihood: Likelihood,
     R: FloatArray,
     t: FloatArray,
-    samples: FloatArray,
-    unlikely: FloatArray,
+    log_noise: float,
+    optima: Optima,
     m_star: FloatArray,
     m: FloatArray,
-    noise: FloatArray,
-) -> tuple[FloatArray, int]:
-    """Return the covariance of Υ about a motion, (6, 6), and the number of samples used.
-
-    It is the second moment of the samples, widened to contain each of them.
+) -> bool:
+    """Let the covariance of Υ contain the likely motions, in place.
 
     Args:
-        R: of the motion, (3, 3).
-        t: of the motion, unit, (3,).
-        samples: (ω, τ, …) about it, (M, 6).
-        unlikely: −2 log of their likelihoods, (M,).
-        m_star: points of the reference plane in the desired view, normalized, (K, 2).
-        m: the same points in the current view, (K, 2).
-        noise: of their coordinates in both views, (M, K, 4).
+        covariance: of the best motion, (6, 6).
+        likelihood: of all matches.
+        R: of the best motion, (3, 3).
+        t: of the best motion, unit, (3,).
+        log_noise: logarithm of the noise over the stated one.
+        optima: of the likelihood.
+        m_star: points of the reference plane in the desired view, normalized, (P, 2).
+        m: the same points in the current view, (P, 2).
+
+    Returns:
+        Whether the reference plane lies in front of both cameras.
     """
     t_d, behind = translation_over_distance(R, t, m_star, m)
-    differences, above = np.empty((len(samples), 6)), np.empty(len(samples))
-    moments, total, count = np.zeros((1, 6, 6)), 0.0, 0
     if behind:
-        return moments[0], 0
+        return False
     upsilon = np.concatenate((t_d, so3_log(R.T.copy())))
-    for s in range(len(samples)):
-        R_s, t_s = motion_at(R, t, samples[s])
-        t_d, behind = translation_over_distance(R_s, t_s, m_star, m)
-        t_noisy, noisy_behind = translation_over_distance(
-            R_s, t_s, m_star + noise[s, :, :2], m + noise[s, :, 2:]
+    least = least_unlikelihood(likelihood, essential(R, t), log_noise)
+    covariances, differences = covariance.reshape(1, 6, 6), np.empty((1, 6))
+    steepest = likelihood.noise * np.exp(log_noise) * steepest_noise(R, t, m_star, m)
+    drawn = 0
+    for k in range(len(optima.t)):
+        R_way, t_way, spreads = along_valley(
+            likelihood, optima.R[k], optima.t[k], optima.right[k], log_noise, least + UNLIKELY
         )
-        if behind or noisy_behind:
-            continue
-        difference = upsilon_between(upsilon, R_s.T.copy(), t_d)
-        differences[count], above[count] = difference, unlikely[s] - unlikely.min()
-        difference[:3] += t_noisy - t_d
-        weight = np.exp(-0.5 * above[count] * (1.0 - 1.0 / TEMPERATURE))
-        for i in range(6):
-            for j in range(6):
-                moments[0, i, j] += weight * difference[i] * difference[j]
-        total += weight
-        count += 1
-    moments /= max(total, 1e-300)
-    if count >= _FEWEST:
-        for s in range(count):
-            widen(moments, differences[s].copy().reshape(1, 6), max(_ASIDE * above[s], _LEAST))
-    return moments[0], count
+        for i in range(len(R_way)):
+            for j in range(len(_DRAWS) + 1):
+                R_j, t_j = R_way[i], t_way[i]
+                if j < len(_DRAWS):
+                    R_j, t_j = motion_at(R_j, t_j, apply(spreads[i], _DRAWS[j]))
+                above = least_unlikelihood(likelihood, essential(R_j, t_j), log_noise) - least
+                if above > _FAR:
+                    continue
+                noise = _NOISE[drawn % len(_NOISE)]
+                drawn += 1
+                t_d, behind = translation_over_distance(
+                    R_j, t_j, m_star + noise * steepest[:, :2], m + noise * steepest[:, 2:]
+                )
+                if not behind:
+                    differences[0] = upsilon_between(upsilon, R_j.T.copy(), t_d)
+                    aside = _ASIDE * above + noise**2
+                    widen(covariances, differences, max(aside, _LEAST))
+    return True
+
+
+@njit(cache=True)
+def steepest_noise(R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
+    """Return the unit change of the reference plane's points, (P, 4), that changes ‖t_d‖ most.
+
+    The first two columns are of the desired view, the others of the current one.
+    """
+    changes = np.zeros((len(m), 4))
+    t_d, _ = translation_over_distance(R, t, m_star, m)
+    least = np.sqrt(dot(t_d, t_d))
+    for p in range(len(m)):
+        for axis in range(4):
+            moved_star, moved = m_star.copy(), m.copy()
+            if axis < 2:
+                moved_star[p, axis] += _STEP
+            else:
+                moved[p, axis - 2] += _STEP
+            t_d, behind = translation_over_distance(R, t, moved_star, moved)
+            if not behind:
+                changes[p, axis] = np.sqrt(dot(t_d, t_d)) - least
+    changes /= max(np.sqrt(np.sum(changes**2)), 1e-300)
+    return changes
 
 
 def covariance_of_likely(
+    covariance: FloatArray,
     likelihood: Likelihood,
     R: FloatArray,
     t: FloatArray,
@@ -266,28 +206,26 @@ def covariance_of_likely(
     m_star: FloatArray,
     m: FloatArray,
 ) -> FloatArray | None:
-    """Return the covariance of Υ over the likely motions about the best one, (6, 6).
+    """Return a covariance of Υ that contains the likely motions, (6, 6).
 
     Args:
+        covariance: at the best motion, (6, 6).
         likelihood: of all matches.
         R: of the best motion, (3, 3).
         t: of the best motion, unit, (3,).
         scale: variance of the noise over the stated one.
-        m_star: points of the reference plane in the desired view, normalized, (K, 2).
-        m: the same points in the current view, (K, 2).
+        m_star: points of the reference plane in the desired view, normalized, (P, 2).
+        m: the same points in the current view, (P, 2).
 
     Returns:
-        The covariance, or None if the reference plane lies behind a camera for most of them.
+        The covariance, or None if the reference plane lies behind a camera.
     """
-    log_noise = min(0.5 * float(np.log(scale)), float(_NOISIER))
+    log_noise = min(0.5 * float(np.log(scale)), NOISIER)
     matrices = sampled_motions(likelihood.m_star, likelihood.m)
-    starts = starting_walkers(likelihood, R, t, log_noise, matrices, _STARTS)
-    samples, unlikely = draw_motions(likelihood, R, t, log_noise, starts, _DRAWS)
-    random = np.random.default_rng(0)
-    deviation = likelihood.noise * np.exp(log_noise)
-    noise = deviation * random.normal(size=(len(samples), len(m), 4))
-    covariance, count = spread_of_motions(R, t, samples, unlikely, m_star, m, noise)
-    return covariance if count >= _FEWEST else None
+    optima = local_optima(likelihood, R, t, log_noise, matrices)
+    widened = covariance.copy()
+    in_front = widen_for_likely(widened, likelihood, R, t, log_noise, optima, m_star, m)
+    return widened if in_front else None
 
 
 @njit(cache=True)

@@ -18,8 +18,9 @@ from vergence.vision.two_view.decomposition import decompose_homography
 from vergence.vision.two_view.explain import Explanation
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
 from vergence.vision.two_view.fit import Fit
+from vergence.vision.two_view.likelihood_optima import likelihood_of
 from vergence.vision.two_view.linear import homogeneous
-from vergence.vision.two_view.motion_samples import covariance_of_likely, likelihood_of
+from vergence.vision.two_view.motion_samples import covariance_of_likely
 from vergence.vision.two_view.result import TwoView
 from vergence.vision.two_view.widening import DRAWS, widen_for_plane
 
@@ -56,17 +57,18 @@ class Report(NamedTuple):
         H = fit.state.R + np.outer(fit.state.t, fit.state.n)
         H = H / np.linalg.svd(H)[1][1]
         motions = zip(*decompose_homography(H), strict=True)
-        results = [self._planar_motion(fit, found, *motion) for motion in motions]
+        scale = max(found.scale, fit.chi_square / max(fit.freedom, 1))
+        results = [self._planar_motion(fit, scale, *motion) for motion in motions]
         possible = sorted(
             (result for result in results if result is not None),
             key=lambda result: -float(result.normal @ self.hint),
         )
         if len(possible) == 2 and np.allclose(possible[0].upsilon, possible[1].upsilon, atol=1e-6):
             possible = possible[:1]
-        return _widened(possible, fit, found.scale)
+        return _widened(possible, fit, scale)
 
     def _planar_motion(
-        self, fit: Fit, found: Explanation, R: FloatArray, t: FloatArray, n: FloatArray
+        self, fit: Fit, scale: float, R: FloatArray, t: FloatArray, n: FloatArray
     ) -> TwoView | None:
         rays = homogeneous(fit.state.x_star)
         inverse_rho_star = rays @ n
@@ -86,11 +88,11 @@ class Report(NamedTuple):
             rho_star=self._spread(1.0 / inverse_rho_star, fit),
             rho=self._spread(depth / inverse_rho_star, fit),
             delta=self._spread(np.zeros(len(rays)), fit),
-            covariance=found.scale * covariance,
+            covariance=scale * covariance,
             inliers=self._inliers(fit),
             planar=True,
             rms_px=self._rms_px(fit),
-            noise_px=self.noise_px * float(np.sqrt(found.scale)),
+            noise_px=self.noise_px * float(np.sqrt(scale)),
         )
 
     def _of_any(self, fit: Fit, found: Explanation) -> list[TwoView] | TwoViewFailure:
@@ -126,7 +128,9 @@ class Report(NamedTuple):
         rays = homogeneous(state.x_star)
         rho_star = inverse_distance / state.w
         views = found.views
+        blocks = bundle.normal_blocks(GENERAL, state, fit.residuals, fit.views.weight)
         covariance = covariance_of_likely(
+            found.scale * upsilon_covariance(GENERAL, state, blocks, chosen),
             likelihood_of(views.m_star, views.m, views.noise, len(views) - len(fit.views)),
             np.ascontiguousarray(state.R),
             state.t,

@@ -19,7 +19,7 @@ from vergence.vision.two_view.small import apply, cholesky_solve, dot, symmetric
 
 SLACK = 1.5  # of dᵀC⁻¹d over χ²: what the covariance at the minimum may miss
 _LEAST = 1.0  # χ² below which a motion counts as that far
-DRAWS = 1.2 * np.random.default_rng(0).normal(size=(256, 8))  # out to where few motions lie
+DRAWS = 2.0 * np.random.default_rng(0).normal(size=(512, 8))  # out to where few motions lie
 
 
 @njit(cache=True)
