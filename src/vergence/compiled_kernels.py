@@ -1,13 +1,24 @@
-"""Whether a kernel has to be compiled before it can be called."""
+"""Whether a kernel has to be compiled before it can be called.
 
+numba has no public question for this; the answers come from its cache, as its dispatcher reads it.
+"""
+
+from pathlib import Path
 from typing import Any
+
+
+def is_kept(kernel: Any) -> bool:
+    """Return whether numba keeps a kernel on this computer, for whatever arguments.
+
+    Args:
+        kernel: compiled by `numba.njit(cache=True)`.
+    """
+    index = getattr(getattr(kernel._cache, "_cache_file", None), "_index_path", None)
+    return index is not None and Path(index).exists()
 
 
 def is_compiled(kernel: Any, *arguments: object) -> bool:
     """Return whether a call needs no compilation: it was made in this process, or numba keeps it.
-
-    numba has no public question for this; the answer comes from the index of its cache, as its
-    dispatcher reads it.
 
     Args:
         kernel: compiled by `numba.njit(cache=True)`.

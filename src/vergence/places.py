@@ -3,7 +3,7 @@
 from itertools import takewhile
 from pathlib import Path
 
-from vergence.errors import Absent, InputError, nearest
+from vergence.errors import NOTHING, Absent, InputError, nearest
 
 CELLS = Path(__file__).parent / "cells"  # those that come with vergence
 CELL = "cell.toml"
@@ -44,7 +44,22 @@ def find_cell(name_or_path: str | Path) -> Path:
     yours = f"one in this folder ({', '.join(here)}), " if here else ""
     built_in = nearest(str(name_or_path), built_in_cells())
     allowed = f"a cell file, {yours}or a built-in cell: {built_in}"
-    raise InputError("cell", "", name_or_path, allowed)
+    raise InputError("cell", "", _given(name_or_path), allowed)
+
+
+def _given(name_or_path: str | Path) -> str:
+    """Return what was given in place of a cell, and what is wrong with it as a path."""
+    path, given = Path(name_or_path), str(name_or_path)
+    if not given:
+        return NOTHING
+    if path.is_dir():
+        return f"{given}, a folder without {CELL}"
+    return f"{given}, which does not exist" if path.suffix or "/" in given else given
+
+
+def no_file(path: Path) -> str:
+    """Return what is given where a file is expected and none is there."""
+    return "a folder" if path.is_dir() else Absent("no such file")
 
 
 def is_track(path: str | Path) -> bool:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.errors import NOTHING, Absent, InputError, nearest
+from vergence.errors import NOTHING, InputError, nearest
+from vergence.places import no_file
 
 KINDS = (".toml", ".json", ".yaml", ".yml")
 _MOST_BYTES = 1_000_000
@@ -69,7 +70,7 @@ def read_text(path: Path, what: str, most_bytes: int = _MOST_BYTES) -> str:
         InputError: if it is not there, too large, or no text.
     """
     if not path.is_file():
-        raise InputError(str(path), "", Absent("no such file"), f"{what} in a file that exists")
+        raise InputError(str(path), "", no_file(path), f"{what} in a file that exists")
     with path.open("rb") as stream:
         raw = stream.read(most_bytes + 1)
     if len(raw) > most_bytes:
@@ -146,10 +147,16 @@ def numbers(
     except KeyError:
         raise InputError(source, key, NOTHING, expected) from None
     except (TypeError, ValueError, OverflowError):
-        raise InputError(source, key, table[key], expected) from None
+        raise InputError(source, key, _typed(table[key]), expected) from None
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
     )
     if not fits or not np.isfinite(array).all():
-        raise InputError(source, key, table[key], expected)
+        raise InputError(source, key, _typed(table[key]), expected)
     return array
+
+
+def _typed(given: Any) -> Any:
+    """Return words of the command line as they were typed."""
+    words = isinstance(given, list) and bool(given) and all(isinstance(w, str) for w in given)
+    return ",".join(given) if words else given

@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-from vergence.app.campaign import prepare, reasons_table
+from vergence.app.campaign import Campaign, prepare, reasons_table
 from vergence.app.main import main
 from vergence.app.options.campaign import CompareOptions
 from vergence.experiments import (
@@ -98,6 +98,10 @@ def test_a_second_run_in_the_same_folder_continues_and_says_the_same(
     assert Path("c/results.jsonl").read_bytes() == results
     assert command(*COMPARE, "--seed", "5", "--out", "c") == 2
     assert "another campaign" in capsys.readouterr().err
+
+
+def test_a_campaign_whose_runs_are_all_refused_has_no_speed() -> None:
+    assert Campaign((), 48.9).in_words == "no run was possible"
 
 
 def test_what_is_done_is_kept_when_the_user_stops_it(

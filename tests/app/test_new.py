@@ -101,6 +101,13 @@ def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsy
     assert "--out" in capsys.readouterr().err
 
 
+def test_a_body_that_no_joint_carries_is_answered_with_the_option(command, capsys) -> None:
+    model = "package:example-robot-data/robots/z1_description/urdf/z1.urdf"
+    assert command("new", model, "--body", "link00") == 2
+    said = capsys.readouterr().err
+    assert "z1.urdf: --body: given link00; allowed: a body that a hinge or slide joint" in said
+
+
 @pytest.mark.parametrize("body", ["", "flang"])
 def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsys, body) -> None:
     assert command("new", ARMS[6][0], "--body", body) == 2
@@ -115,6 +122,12 @@ def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.urdf.xacro").write_text("<robot/>")
     with pytest.raises(InputError, match=r"xacro no.urdf.xacro > no.urdf"):
         draft_cell(tmp_path / "no.urdf.xacro", "tool")
+    include = '<xacro:include xmlns:xacro="http://www.ros.org/wiki/xacro" filename="arm.xacro"/>'
+    (tmp_path / "no.urdf").write_text(f'<robot name="r">{include}</robot>')
+    with pytest.raises(InputError, match="given an xacro; allowed: a URDF; expand it first"):
+        draft_cell(tmp_path / "no.urdf", "tool")
+    with pytest.raises(InputError, match="given a folder; allowed: an MJCF or URDF file"):
+        draft_cell(tmp_path, "tool")
     (tmp_path / "no.xml").write_text("<mujoco>")
     with pytest.raises(InputError, match=r"no\.xml"):
         draft_cell(tmp_path / "no.xml", "tool")

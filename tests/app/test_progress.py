@@ -1,6 +1,10 @@
 """Long work says how far it is, in a pipe too, and how many kernels it has to compile first."""
 
+import sys
 import time
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
 
 import pytest
 from numba import njit
@@ -55,7 +59,10 @@ def test_what_compiling_takes_does_not_count_in_the_pace(
     with bar("{task.completed} of {task.total} runs") as progress, Compilations() as beside:
         task = progress.add_task("runs", total=1000)
         event.start_event("numba:compile")
-        wait_for("runs: 0 of 1000 runs, 0 s so far, compiling kernels, once on", capsys)
+        wait_for(
+            "runs: 0 of 1000 runs, 0 s so far, compiling kernels, once on this computer: 1 of",
+            capsys,
+        )
         event.end_event("numba:compile")
         assert beside.count == 1
         assert not beside.under_way
@@ -72,4 +79,32 @@ def test_compilation_is_told_while_it_lasts(capsys: pytest.CaptureFixture[str]) 
     with working("setting up"):
         wait_for("setting up, 0 s so far", capsys)
         njit(lambda x: x + 1)(1)
-        wait_for("setting up: compiling kernels, once on this computer, 1 so far, 0 s", capsys)
+        wait_for("setting up: compiling kernels, once on this computer: 1 of at most ", capsys)
+
+
+def test_kernels_of_imported_modules_that_are_not_kept_are_those_to_be_compiled_at_most(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def kernel(name: str) -> Any:
+        path = tmp_path / f"{name}.py"
+        path.write_text("def kernel(x):\n    return x + 1\n")
+        spec = spec_from_file_location(f"vergence.{name}", path)
+        assert spec is not None
+        assert spec.loader is not None
+        module: Any = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        module.kernel = njit(cache=True)(module.kernel)
+        monkeypatch.setitem(sys.modules, f"vergence.{name}", module)
+        return module.kernel
+
+    for name in [name for name in sys.modules if name.startswith("vergence.")]:
+        monkeypatch.delitem(sys.modules, name)
+    kept, first, other = map(kernel, ("kept", "first", "other"))
+    kept(1)
+    monkeypatch.setitem(vars(sys.modules["vergence.kept"]), "kernel", kernel("kept"))
+    with Compilations() as seen:
+        assert ": 0 of at most 2, " in seen.words()
+        first(1)
+        assert ": 1 of at most 2, at most " in seen.words()
+        other(1)
+        assert seen.words().endswith(": 2 of at most 2, at most 0 s left")

@@ -224,7 +224,7 @@ def test_points_of_a_small_flat_object_begin_with_both_its_poses(tmp_path: Path)
         ({"camera": None}, "--fx: missing"),
         ({"camera": None, "fx": "nan"}, "--fx: given nan; allowed: a finite number"),
         ({"fx": "300"}, "either --camera or intrinsics"),
-        ({"start": "1,2,3"}, "6 finite numbers"),
+        ({"start": "1,2,3"}, "--start: given 1,2,3; allowed: x,y,z,roll,pitch,yaw in metres"),
         ({"start": "0,0,-1,0,0,0"}, "allowed: a place before the camera"),
         ({"start": "bad.toml"}, "bad.toml: T_camera_target"),
         ({"images": "torn"}, "torn/b.png: given a file that cannot be read"),

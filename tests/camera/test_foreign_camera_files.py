@@ -105,6 +105,11 @@ def test_block_lists_and_nested_tables_are_read(tmp_path: Path) -> None:
     assert camera.distortion.tolist() == [-0.1, 0.02, 0.0, 0.0, 0.0]
 
 
+def test_a_camera_of_ros_without_its_matrix_is_told_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="camera_matrix: missing; needed: fx, 0, cx"):
+        read_camera(written(tmp_path, "image_width: 640\nimage_height: 480\n"))
+
+
 def test_several_messages_of_one_camera_are_one_camera(tmp_path: Path) -> None:
     later = INFO.replace("nanosec: 12", "nanosec: 99")
     path = written(tmp_path, f"{INFO}---\n{later}---\n")

@@ -10,7 +10,7 @@ import pytest
 from vergence.assembly import run_cell
 from vergence.cell import built_in_cells, load_cell
 from vergence.errors import InputError, RenderingError
-from vergence.places import CELLS
+from vergence.places import CELLS, find_cell
 from vergence.simulation import choose_renderer
 from vergence.simulation import renderer as renderer_module
 
@@ -285,3 +285,23 @@ def test_egl_is_chosen_before_osmesa(monkeypatch, present: str, chosen: str) -> 
     )
     choose_renderer()
     assert os.environ["MUJOCO_GL"] == chosen
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("empty", "given empty, a folder without cell.toml; "),
+        ("my_cell.toml", "given my_cell.toml, which does not exist; "),
+        ("puma56", "given puma56; "),
+        ("", "missing; "),
+    ],
+)
+def test_what_is_no_cell_is_named_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError) as caught:
+        find_cell(given)
+    assert str(caught.value).startswith(f"cell: {said}")
+    assert "a cell file, or a built-in cell: cups, " in str(caught.value)

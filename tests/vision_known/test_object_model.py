@@ -148,6 +148,7 @@ def test_parts_of_a_model_stay_together(tmp_path: Path) -> None:
         ("gone.obj", None, "no such file"),
         ("notes.txt", "", "a file of kind .txt"),
         ("broken.obj", "v 0 0\nf 1 2 3\n", "geometry that MuJoCo reads"),
+        ("empty.obj", "", "refuses: at least 4 vertices required; allowed: geometry"),
         ("broken.xml", "<mujoco><nonsense/></mujoco>", "a model that MuJoCo reads"),
         (
             "flat.xml",

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
 from rich.text import Text
 
-from vergence.app.compilations import COMPILING, Compilations
+from vergence.app.compilations import Compilations
 from vergence.app.heartbeat import Heartbeat
 
 
@@ -56,7 +56,7 @@ class Bar(Progress):
     def rest(self, task: Any) -> str:
         """Return what is waited for: kernels, or so many seconds; empty before anything is done."""
         if self._compilations.under_way:
-            return f"{COMPILING}, {self._compilations.count} so far"
+            return self._compilations.words()
         if not task.completed or not task.total:
             return ""
         worked_s = max(task.elapsed - self._set_up_s - self._compilations.spent_s, 0.0)

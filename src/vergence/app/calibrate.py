@@ -36,7 +36,7 @@ def calibrate(options: "CalibrateOptions") -> int:
     folder = options.out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
     if not options.overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
         given = f"{folder}, which holds a calibration"
-        raise InputError("calibrate", "--out", given, "another folder, or --overwrite")
+        raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
     data, truth = calibration_data(options, folder)
     if truth is not None:
@@ -62,10 +62,10 @@ def _require_one_source(options: "CalibrateOptions") -> None:
     if count != 1:
         given = "several of them" if count else NOTHING
         allowed = "a folder of images, a ROS 2 bag, --synthetic CELL, or --driver NAME --cell CELL"
-        raise InputError("calibrate", "", given, allowed)
+        raise InputError("vergence calibrate", "", given, allowed)
     if options.driver and not options.cell:
         allowed = "only together with --cell CELL, or with --latency CELL or --mounting CELL"
-        raise InputError("calibrate", "--driver", options.driver, allowed)
+        raise InputError("vergence calibrate", "--driver", options.driver, allowed)
     bag = options.images is not None and is_bag(options.images)
     for key, given_too, fits in (
         ("--topic", options.topic, bag),
@@ -73,32 +73,32 @@ def _require_one_source(options: "CalibrateOptions") -> None:
         ("--cell", options.cell, bag or options.driver is not None),
     ):
         if given_too and not fits:
-            raise InputError("calibrate", key, given_too, "only with a ROS 2 bag")
+            raise InputError("vergence calibrate", key, given_too, "only with a ROS 2 bag")
     if options.joints and not options.cell:
         allowed = "--cell too: the cell whose arm has these joints"
-        raise InputError("calibrate", "--joints", options.joints, allowed)
+        raise InputError("vergence calibrate", "--joints", options.joints, allowed)
     if options.move and options.driver is None:
         allowed = "only together with --driver NAME --cell CELL"
-        raise InputError("calibrate", "--move", True, allowed)
+        raise InputError("vergence calibrate", "--move", True, allowed)
     if options.yes and not options.move:
-        raise InputError("calibrate", "--yes", True, "only together with --move")
+        raise InputError("vergence calibrate", "--yes", True, "only together with --move")
     if options.projected and options.synthetic is None:
-        raise InputError("calibrate", "--projected", True, "with --synthetic CELL")
+        raise InputError("vergence calibrate", "--projected", True, "with --synthetic CELL")
     if options.watch and options.synthetic is None and options.driver is None:
         allowed = "with --synthetic CELL or --driver NAME"
-        raise InputError("calibrate", "--watch", options.watch, allowed)
+        raise InputError("vergence calibrate", "--watch", options.watch, allowed)
 
 
 def _require_lens(lens: str) -> None:
     from vergence.camera.calibration import MODELS
 
     if lens not in MODELS:
-        raise InputError("calibrate", "--lens", lens, nearest(lens, MODELS))
+        raise InputError("vergence calibrate", "--lens", lens, nearest(lens, MODELS))
 
 
 def _require_deviation(percent: float) -> None:
     if not 0.0 <= percent <= 20.0:
-        raise InputError("calibrate", "--square-deviation", percent, "0 … 20, in percent")
+        raise InputError("vergence calibrate", "--square-deviation", percent, "0 … 20, in percent")
 
 
 def _base(options: "CalibrateOptions") -> "FloatArray":

@@ -63,9 +63,10 @@ class Campaign(NamedTuple):
     def in_words(self) -> str:
         """Say how fast the runs were made, and in what."""
         made = ", ".join(f"{count} in {_MADE_IN[name]}" for name, count in self.made_in.items())
-        if self.runs_per_cpu_s is None:
-            return made
-        return f"{self.runs_per_cpu_s:.3g} runs per CPU second, set-up included; {made}"
+        speed = ""
+        if made and self.runs_per_cpu_s is not None:
+            speed = f"{self.runs_per_cpu_s:.3g} runs per CPU second, set-up included"
+        return "; ".join(filter(None, (speed, made))) or "no run was possible"
 
     def as_json(self) -> dict[str, Any]:
         """Return the same as JSON values."""

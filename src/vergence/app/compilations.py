@@ -1,40 +1,46 @@
-"""Counts the kernels that a command compiles, and the time that takes."""
+"""Counts the kernels that a command compiles and may still have to, and the time that takes."""
 
+import sys
 import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
+from vergence.compiled_kernels import is_kept
+
 COMPILING = "compiling kernels, once on this computer"
 
 
 class Compilations:
-    """Tells each time a kernel is compiled how many have been so far.
+    """Tells each time a kernel is compiled how far that is.
 
     Args:
-        told: is called with the count.
+        told: is called with it in words.
     """
 
-    def __init__(self, told: Callable[[int], None] | None = None) -> None:
+    def __init__(self, told: Callable[[str], None] | None = None) -> None:
         from numba.core import event
 
         class Listener(event.Listener):  # type: ignore[misc]
             count = nested = 0  # a kernel's callees are compiled within it
             began = spent = 0.0
 
+            def __init__(self, words: Callable[[], str]) -> None:
+                self.words = words
+
             def on_start(self, begun: Any) -> None:
                 self.began = self.began if self.nested else time.perf_counter()
                 self.nested += 1
                 self.count += 1
                 if told is not None:
-                    told(self.count)
+                    told(self.words())
 
             def on_end(self, ended: Any) -> None:
                 self.nested -= 1
                 self.spent += 0.0 if self.nested else time.perf_counter() - self.began
 
         self._event: Any = event
-        self._listener = Listener()
+        self._listener = Listener(self.words)
 
     @property
     def count(self) -> int:
@@ -53,6 +59,17 @@ class Compilations:
         now = time.perf_counter() - listener.began if listener.nested else 0.0
         return listener.spent + now
 
+    def words(self) -> str:
+        """Return what is compiled, how many of how many at most, and how long that takes at most.
+
+        Every kernel of the imported modules that is not kept may have to be compiled. Which of them
+        a run calls is not known before it calls them, so there may be far fewer.
+        """
+        left = _not_compiled()
+        most = f"{self.count} of at most {self.count + left}"
+        rest_s = self.spent_s * left / max(self.count, 1)
+        return f"{COMPILING}: {most}, at most {rest_s:.0f} s left"
+
     def __enter__(self) -> Self:
         self._event.register("numba:compile", self._listener)
         return self
@@ -64,3 +81,13 @@ class Compilations:
         traceback: TracebackType | None,
     ) -> None:
         self._event.unregister("numba:compile", self._listener)
+
+
+def _not_compiled() -> int:
+    """Return how many kernels of the modules imported so far are neither compiled nor kept."""
+    from numba.core.dispatcher import Dispatcher
+
+    modules = [module for name, module in [*sys.modules.items()] if name.startswith("vergence.")]
+    values = (value for module in modules for value in [*vars(module).values()])
+    kernels = {id(value): value for value in values if isinstance(value, Dispatcher)}
+    return sum(not kernel.overloads and not is_kept(kernel) for kernel in kernels.values())

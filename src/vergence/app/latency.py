@@ -30,7 +30,7 @@ def latency(options: "CalibrateOptions") -> int:
     cell, driver = str(options.latency), options.driver
     if driver is None:
         raise InputError(
-            "calibrate", "--latency", cell, "only together with --driver NAME[:ADDRESS]"
+            "vergence calibrate", "--latency", cell, "only together with --driver NAME[:ADDRESS]"
         )
     loaded = load_cell(cell, overrides(options.settings))
     camera = carried_camera(loaded)

@@ -7,7 +7,7 @@ import gc
 import re
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -29,7 +29,7 @@ from vergence.app.options import (
 )
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.warnings_once import warn_once
-from vergence.errors import InputError, VergenceError
+from vergence.errors import Absent, InputError, VergenceError
 from vergence.places import cell_description, find_cell, find_recording, is_track
 from vergence.prebuilt import use_prebuilt_kernels
 from vergence.studies import PAPERS
@@ -56,6 +56,13 @@ _NEXT = """vergence controls robot arms with their cameras.
   vergence --install-completion           complete names with Tab
 """
 
+_FILES = (
+    (IsADirectoryError, "a folder", "a file"),
+    ((FileExistsError, NotADirectoryError), "a file", "a folder"),
+    (FileNotFoundError, Absent("no such file or folder"), "one that exists"),
+    (PermissionError, "a path without permission", "one that you may read and write"),
+)
+
 
 def main() -> None:
     """Run the command line; a mistake of the user is one message and exit code 2."""
@@ -66,12 +73,25 @@ def main() -> None:
     try:
         app()
     except VergenceError as error:
-        warn(f"vergence: {error}")
-        sys.exit(BAD_INPUT)
+        _complain(str(error))
     except OSError as error:  # such as a folder that cannot be written
-        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        warn(f"vergence: {told}")
-        sys.exit(BAD_INPUT)
+        _complain(_of_files(error))
+
+
+def _complain(told: str) -> NoReturn:
+    """Say what is wrong with the input, and end."""
+    warn(told if told.startswith("vergence ") else f"vergence: {told}")
+    sys.exit(BAD_INPUT)
+
+
+def _of_files(error: OSError) -> str:
+    """Return what the system says of a file, in the words of our own messages."""
+    if not error.filename:
+        return str(error)
+    for kinds, given, allowed in _FILES:
+        if isinstance(error, kinds):
+            return str(InputError(str(error.filename), "", given, allowed))
+    return f"{error.filename}: {error.strerror}"
 
 
 @app.callback(invoke_without_command=True)
@@ -150,7 +170,9 @@ def _track_report(folder: Path, other: Path | None, out: Path | None) -> Path:
 
     if other is not None:
         given = f"{folder}, which holds tracked footage"
-        raise InputError("report", "", given, "two recordings of runs to compare, or one folder")
+        raise InputError(
+            "vergence report", "", given, "two recordings of runs to compare, or one folder"
+        )
     return write_track_page(folder, page_at(out))
 
 
@@ -292,7 +314,9 @@ def calibrate(options: CalibrateOptions) -> int:
     camera's images is measured. With --mounting, the robot reports where its cameras are.
     """
     if options.mounting is not None and options.latency is not None:
-        raise InputError("calibrate", "--mounting", options.mounting, "only without --latency")
+        raise InputError(
+            "vergence calibrate", "--mounting", options.mounting, "only without --latency"
+        )
     if options.latency is not None:
         from vergence.app.latency import latency as measure
 
@@ -303,9 +327,11 @@ def calibrate(options: CalibrateOptions) -> int:
         return mounting(options)
     if options.write:
         allowed = "only together with --latency CELL or --mounting CELL"
-        raise InputError("calibrate", "--write", True, allowed)
+        raise InputError("vergence calibrate", "--write", True, allowed)
     if options.settings and not options.driver:
-        raise InputError("calibrate", "--set", options.settings, "only together with --driver NAME")
+        raise InputError(
+            "vergence calibrate", "--set", options.settings, "only together with --driver NAME"
+        )
     from vergence.app.calibrate import calibrate as command
 
     return command(options)

@@ -25,7 +25,7 @@ def mounting(options: "CalibrateOptions") -> int:
     name, driver = str(options.mounting), options.driver
     if driver is None:
         raise InputError(
-            "calibrate", "--mounting", name, "only together with --driver NAME[:ADDRESS]"
+            "vergence calibrate", "--mounting", name, "only together with --driver NAME[:ADDRESS]"
         )
     cell = load_cell(name, overrides(options.settings))
     check_driver(cell, driver)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from vergence.app.compilations import COMPILING, Compilations
+from vergence.app.compilations import Compilations
 from vergence.app.heartbeat import Heartbeat
 from vergence.runtime import RunInfo, TickRecord
 from vergence.signals import Outcome
@@ -35,15 +35,15 @@ def bar(words: str) -> "Bar":
 
 @contextmanager
 def working(words: str) -> Iterator[None]:
-    """Show on stderr that something is being done, and how many kernels are compiled for it."""
+    """Show on stderr that something is being done, and what is compiled for it."""
     from rich.console import Console
 
     began, said = time.perf_counter(), words
     status = Console(stderr=True, quiet=not sys.stderr.isatty()).status(words)
 
-    def compiling(count: int) -> None:
+    def compiling(how_far: str) -> None:
         nonlocal said
-        said = f"{words}: {COMPILING}, {count} so far"
+        said = f"{words}: {how_far}"
         status.update(said)
 
     def line() -> str:

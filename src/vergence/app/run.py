@@ -161,7 +161,8 @@ def _tell_outcome(result: "Run") -> None:
         (f"drift {summary.get('max_drift_px', 0.0):.2f} px", "max_drift_px"),
         (f"{summary.get('real_time_factor', 0.0):.1f} × real time", "real_time_factor"),
     ]
-    say("  " + " · ".join(text for text, key in words if key in summary))
+    if known := [text for text, key in words if key in summary]:
+        say("  " + " · ".join(known))
     for event in result.events:
         if event.name in ADVICE:
             say(f"  {event.text}")

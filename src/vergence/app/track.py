@@ -112,12 +112,16 @@ def _prepare(options: "TrackOptions") -> "Start":
     """
     named = next((key for key in _SUBJECTS if getattr(options, key)), None)
     if named is None:
-        raise InputError("track", "--model", NOTHING, "--model with --start, --tag, or --curve")
+        raise InputError(
+            "vergence track", "--model", NOTHING, "--model with --start, --tag, or --curve"
+        )
     module, own = _SUBJECTS[named]
     for key, field in type(options).__dataclass_fields__.items():
         given = getattr(options, key)
         if key not in _ALWAYS | own | {named} and given != field.default:
-            raise InputError("track", f"--{key}", given, f"nothing together with --{named}")
+            raise InputError(
+                "vergence track", f"--{key}", given, f"nothing together with --{named}"
+            )
     start: Start = import_module(f"vergence.app.tracking.{module}").prepare(options)
     return start
 

@@ -44,6 +44,8 @@ def own_table(table: Mapping[str, Any], source: str) -> dict[str, Any]:
         return _from_kalibr(table, source)
     if any(key in table for key in _MATRICES):
         return _from_matrix(table, source)
+    if "image_width" in table or "distortion_model" in table:
+        raise InputError(source, "camera_matrix", NOTHING, "fx, 0, cx, 0, fy, cy, 0, 0, 1")
     return dict(table)
 
 

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from vergence.errors import Absent, InputError
+from vergence.errors import InputError
+from vergence.places import no_file
 from vergence.robot.mjcf import read_mjcf
 from vergence.robot.urdf import read_urdf
 
@@ -19,7 +20,7 @@ def read_model(path: Path, last_body: str | None = None) -> Any:
         InputError: if the file does not exist or cannot be used.
     """
     if not path.is_file():
-        raise InputError(str(path), "", Absent("no such file"), "an MJCF or URDF file")
+        raise InputError(str(path), "", no_file(path), "an MJCF or URDF file")
     if path.suffix.lower() == ".xacro":
         name = path.stem.removesuffix(".urdf")
         first = f"a URDF; expand it first: xacro {path.name} > {name}.urdf"

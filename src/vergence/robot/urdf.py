@@ -47,6 +47,8 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     robot = read_xml(path)
     if robot.tag != "robot":
         raise InputError(source, "", f"<{robot.tag}>", "<robot>, the root element of a URDF")
+    if any("xacro" in str(child.tag) for child in robot):
+        raise InputError(source, "", "an xacro", "a URDF; expand it first: xacro FILE > NAME.urdf")
     shapes = Shapes(path, path.parent / _own_mesh_folder(robot), {}, {})
     for child in [child for child in robot if child.tag not in _PARTS]:
         robot.remove(child)

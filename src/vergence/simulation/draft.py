@@ -15,6 +15,7 @@ from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
 from vergence.robot.model_files import read_model
 from vergence.robot.mujoco_chain import read_chain
+from vergence.robot.mujoco_coupling import joints_above
 from vergence.simulation.build import named_joints
 from vergence.simulation.cell_model import hidden
 
@@ -27,6 +28,7 @@ _ABOVE_FLOOR_M = 0.05
 _WITHOUT_LIMITS = 2.0  # rad or m: range in which a joint without limits starts
 _RATES = 0.25, np.pi / 2  # m/s (prismatic), rad/s (revolute): where the model has no limit
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
+_CARRIED = "a body that a hinge or slide joint carries"
 SPAN = 0.35  # half a side of the board as a share of its distance
 _FARTHEST = 1.5  # multiples of its reach up to which an arm can keep a target in view
 
@@ -102,7 +104,10 @@ def _compile(path: Path, body: str) -> Any:
                 allowed = f"the last body of the arm; {allowed}"
             raise InputError(str(path), "--body", body or Absent("no body is named"), allowed)
         named_joints(bodies[body])
-        return spec.compile()
+        model = spec.compile()
+        if not joints_above(model, model.body(body).id):
+            raise InputError(str(path), "--body", body, _CARRIED)
+        return model
     except InputError:
         raise
     except ValueError as error:

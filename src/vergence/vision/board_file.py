@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from vergence.errors import NOTHING, Absent, InputError
+from vergence.errors import NOTHING, InputError
+from vergence.places import no_file
 from vergence.tables import numbers, read_table, require_known
 from vergence.vision.board import DICTIONARY, PATTERNS, Board
 
@@ -20,7 +21,7 @@ def read_board(path: str | Path) -> Board:
     path, source = Path(path), str(path)
     if not path.is_file():
         allowed = "--board 11x8 --square-mm 20, or this file with columns, rows and square_mm"
-        raise InputError(source, "", Absent("no such file"), allowed)
+        raise InputError(source, "", no_file(path), allowed)
     table = read_table(path, "a board")
     require_known(table, _KEYS, source)
     sizes = {key: float(numbers(table, key, (), source)) for key in _KEYS[:4] if key in table}

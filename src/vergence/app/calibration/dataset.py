@@ -75,18 +75,27 @@ def board_of_options(
             ("--pattern", pattern),
         ):  # fmt: skip
             if value is not None:
-                raise InputError("calibrate", key, value, "with --board COLUMNSxROWS")
+                raise InputError("vergence calibrate", key, value, "with --board COLUMNSxROWS")
         return None
     columns, _, rows = size.lower().partition("x")
     if not (columns.isdigit() and rows.isdigit()):
         allowed = "inner corners in a row x rows, such as 11x8"
-        raise InputError("calibrate", "--board", size, allowed)
+        raise InputError("vergence calibrate", "--board", size, allowed)
     if square_mm is None:
-        raise InputError("calibrate", "--square-mm", NOTHING, "a square's side in mm")
+        raise InputError("vergence calibrate", "--square-mm", NOTHING, "a square's side in mm")
     sizes = {"columns": float(columns), "rows": float(rows), "square_mm": square_mm}
     if marker_mm is not None:
         sizes["marker_mm"] = marker_mm
-    return make_board(sizes, dictionary or DICTIONARY, "vergence calibrate", pattern or "")
+    try:
+        return make_board(sizes, dictionary or DICTIONARY, "vergence calibrate", pattern or "")
+    except InputError as error:
+        option, given = {
+            "square": ("--square-mm", f"{square_mm:g}"),
+            "marker": ("--marker-mm", f"{marker_mm or 0.0:g}"),
+            "columns": ("--board", size),
+            "rows": ("--board", size),
+        }.get(error.key, (f"--{error.key}", error.given))
+        raise InputError(error.source, option, given, error.allowed) from None
 
 
 def _require_images(

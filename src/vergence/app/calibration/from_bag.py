@@ -105,7 +105,7 @@ class _Poses:
             names = next(iter(model.arms.values())).names
             missing = next(name for name in names if name not in joints.names)
             given = Absent(f"no joint {missing} in {bag.path}")
-            raise InputError("calibrate", "--cell", given, nearest(missing, joints.names))
+            raise InputError("vergence calibrate", "--cell", given, nearest(missing, joints.names))
         name = next(iter(named))
         self._joints: BagJoints = joints.of(tuple(named[name].names), str(bag.path))
         self._pose = flange_pose(cell, name, model)

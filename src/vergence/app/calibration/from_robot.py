@@ -68,7 +68,7 @@ def written_poses(taken: dict[str, FloatArray], folder: Path) -> Path:
     """
     if len(taken) < _FEWEST:
         given = f"images at {len(taken)} stops of the arm"
-        raise InputError("calibrate", "--driver", given, "ten stops or more")
+        raise InputError("vergence calibrate", "--driver", given, "ten stops or more")
     file = folder / "poses.csv"
     write_poses(file, taken)
     return file

@@ -75,11 +75,11 @@ def _robot_data(options: "CalibrateOptions", board: "Board | None", folder: Path
     from vergence.cell import load_cell
 
     if board is None:
-        raise InputError("calibrate", "--board", None, "COLUMNSxROWS of the board")
+        raise InputError("vergence calibrate", "--board", None, "COLUMNSxROWS of the board")
     cell = load_cell(str(options.cell), overrides(options.settings))
     camera = options.watch or cell.task.camera
     if camera not in cell.cameras:
-        raise InputError("calibrate", "--watch", camera, nearest(camera, cell.cameras))
+        raise InputError("vergence calibrate", "--watch", camera, nearest(camera, cell.cameras))
     if options.move:
         _require_agreement(cell, camera, options.yes)
     images = _empty_folder(folder / "images")
@@ -100,12 +100,12 @@ def _require_agreement(cell: "Cell", camera: str, agreed: bool) -> None:
     arm = cell.task.arm
     if cell.cameras[camera].arm != arm:
         allowed = f"a camera that {arm} carries; without --move you move the arm yourself"
-        raise InputError("calibrate", "--move", f"camera {camera}", allowed)
+        raise InputError("vergence calibrate", "--move", f"camera {camera}", allowed)
     question = (
         f"{arm} will move by itself, slowly, around the board it sees now. Is it free? [y/N] "
     )
     if not agreed and not confirmed(question):
-        raise InputError("calibrate", "--move", NOTHING, "y, or --yes")
+        raise InputError("vergence calibrate", "--move", NOTHING, "y, or --yes")
 
 
 def _empty_folder(folder: Path) -> Path:

@@ -36,7 +36,7 @@ def board_pose(camera: Camera, board: Board, image: ImageArray) -> FloatArray:
             T: FloatArray = se3(so3_exp(np.ravel(w).astype(float)), np.ravel(t).astype(float))
             return T
     given = "no board in the image at the arm's present position"
-    raise InputError("calibrate", "--board", given, "the board in view at the start")
+    raise InputError("vergence calibrate", "--board", given, "the board in view at the start")
 
 
 def suggested_poses(

@@ -127,7 +127,7 @@ class Studio:
                 T_world_base = placement_pose(self._cell.arms[self.arm])
                 return se3_inverse(T_world_base) @ self._flange()
         given = f"{self._cell.name}, in which no pose of {self.arm} shows the board"
-        raise InputError("calibrate", "--synthetic", given, "another cell or camera")
+        raise InputError("vergence calibrate", "--synthetic", given, "another cell or camera")
 
     def corners(self, name: str, noise_px: float) -> Sighting:
         """Return the board's corners as the camera sees them now, with noise."""

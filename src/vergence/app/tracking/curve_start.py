@@ -41,26 +41,28 @@ def prepare(options: TrackOptions) -> Start:
         if value is not None and not any(option in one.kind.options for one in named):
             fitting = [name for name, kind in KINDS.items() if option in kind.options]
             allowed = f"only with --curve {' or '.join(fitting)}"
-            raise InputError("track", f"--{option}", value, allowed)
+            raise InputError("vergence track", f"--{option}", value, allowed)
     return partial(_start, named)
 
 
 def _read(text: str, options: TrackOptions) -> _Named:
     name, colon, numbers = text.partition(":")
     if not colon:
-        raise InputError("track", "--curve", text, _HOW)
+        raise InputError("vergence track", "--curve", text, _HOW)
     if name not in KINDS:
-        raise InputError("track", "--curve", f"{text}: kind {name}", nearest(name, KINDS))
+        raise InputError("vergence track", "--curve", f"{text}: kind {name}", nearest(name, KINDS))
     try:
         flat = np.array([float(word) for word in numbers.replace(",", " ").split()])
     except ValueError:
         flat = np.empty(0)
     if not len(flat) or len(flat) % 2 or not np.isfinite(flat).all():
-        raise InputError("track", "--curve", text, _HOW)
+        raise InputError("vergence track", "--curve", text, _HOW)
     kind, points_px = KINDS[name], flat.reshape(-1, 2)
     if not kind.counts(len(points_px)):
         count = f"{len(points_px)} point" + "s" * (len(points_px) > 1)
-        raise InputError("track", "--curve", f"{text}: {count}", f"for {name}: {kind.points}")
+        raise InputError(
+            "vergence track", "--curve", f"{text}: {count}", f"for {name}: {kind.points}"
+        )
     return _Named(text, name, kind, points_px, _part(kind, options))
 
 
@@ -70,7 +72,7 @@ def _part(kind: CurveKind, options: TrackOptions) -> Any:
         return kind.part(**{field: value for field, value in given.items() if value is not None})
     except InputError as error:
         option = next(key for key, field in kind.options.items() if field == error.key)
-        raise InputError("track", f"--{option}", error.given, error.allowed) from None
+        raise InputError("vergence track", f"--{option}", error.given, error.allowed) from None
 
 
 def _start(named: Sequence[_Named], _footage: Footage, first: FootageFrame) -> CurveSubject:
@@ -83,11 +85,13 @@ def _start(named: Sequence[_Named], _footage: Footage, first: FootageFrame) -> C
             u, v = one.points_px[outside][0]
             given = f"{one.text}: point {u:g},{v:g} outside the image"
             allowed = f"0,0 to {width - 1},{height - 1}"
-            raise InputError("track", "--curve", given, allowed)
+            raise InputError("vergence track", "--curve", given, allowed)
         follower = CurveFollower(number, one.name, one.kind)
         reason = follower.begin(one.part, first.image, one.points_px)
         if reason:
             given = f"{one.text}: {reason} in the first image"
-            raise InputError("track", "--curve", given, f"{one.kind.points} of the {one.name}")
+            raise InputError(
+                "vergence track", "--curve", given, f"{one.kind.points} of the {one.name}"
+            )
         followers.append(follower)
     return CurveSubject(followers)

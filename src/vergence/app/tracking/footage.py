@@ -78,9 +78,9 @@ def open_footage(
     """
     where = Path(path)
     if topic is not None and not is_bag(where):
-        raise InputError("track", "--topic", topic, "only with a ROS 2 bag")
+        raise InputError("vergence track", "--topic", topic, "only with a ROS 2 bag")
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise InputError("track", "--rate", rate_hz, "images a second, above zero")
+        raise InputError("vergence track", "--rate", rate_hz, "images a second, above zero")
     if is_bag(where):
         return _open_bag(where, rate_hz, topic)
     if where.is_dir():

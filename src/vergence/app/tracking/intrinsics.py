@@ -23,7 +23,9 @@ def camera_of_options(options: TrackOptions, first: FootageFrame) -> Camera:
     if options.camera is not None:
         for key, value in given.items():
             if value is not None:
-                raise InputError("track", f"--{key}", value, "either --camera or intrinsics")
+                raise InputError(
+                    "vergence track", f"--{key}", value, "either --camera or intrinsics"
+                )
         return read_camera(options.camera, width, height)
     source, fx = "vergence track", options.fx
     if fx is None:

@@ -38,7 +38,9 @@ def prepare(options: TrackOptions) -> Start:
     """
     assert options.model is not None
     if options.start is None:
-        raise InputError("track", "--start", NOTHING, "the object's pose in the first image")
+        raise InputError(
+            "vergence track", "--start", NOTHING, "the object's pose in the first image"
+        )
     return partial(_start, options, load_object_model(options.model, options.scale))
 
 
@@ -50,12 +52,12 @@ def _start(
     jolt_px = _JOLT_PX if options.jolt is None else options.jolt
     for key, value in (("--contrast", contrast), ("--jolt", jolt_px)):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError("track", key, value, "a number above zero")
+            raise InputError("vergence track", key, value, "a number above zero")
     share = options.share
     if share is not None and not LEAST_SHARE <= share <= 1.0:
         reason = "with less, an object cannot be distinguished from its background"
         allowed = f"{LEAST_SHARE} … 1: {reason}"
-        raise InputError("track", "--share", share, allowed)
+        raise InputError("vergence track", "--share", share, allowed)
     assert options.start is not None
     starts = starting_poses(options.start, camera)
     tracker, usual = _tracker(options.by, model, contrast, first)

@@ -13,6 +13,7 @@ from vergence.tables import KINDS, numbers, read_table, require_known
 
 _ROTATIONS = ("rotation_rpy_deg", "quaternion_wxyz", "rotation_vector")
 _KEYS = ("T_camera_target", "position_m", *_ROTATIONS, "points_m", "points_px")
+_START = "x,y,z,roll,pitch,yaw in metres and degrees, or a TOML, JSON or YAML file"
 _NOISE_PX = 3.0  # standard deviation of a point found by hand
 _MOST_MISS_PX = 20.0  # of such a point from where the pose puts it
 _HOW = (
@@ -35,7 +36,10 @@ def starting_poses(text: str, camera: Camera) -> list[FloatArray]:
     else:
         source = "--start"
         given = {"--start": text.replace(",", " ").split()}
-        values = numbers(given, "--start", (6,), "vergence track")
+        try:
+            values = numbers(given, "--start", (6,), "vergence track")
+        except InputError as error:
+            raise InputError("vergence track", "--start", error.given, _START) from None
         poses = [se3(_rotation(values[3:]), values[:3].copy())]
     ahead = [T for T in poses if T[2, 3] > 0.0]
     if not ahead:

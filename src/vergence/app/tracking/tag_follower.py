@@ -39,7 +39,7 @@ def tag_of_option(text: str) -> TagTable:
         dictionary, number, size = parts[0], int(parts[1]), float(parts[2])
     except (IndexError, ValueError):
         allowed = "DICTIONARY:ID:SIZE, the side of its border in metres: apriltag_36h11:7:0.05"
-        raise InputError("track", "--tag", text, allowed) from None
+        raise InputError("vergence track", "--tag", text, allowed) from None
     from pydantic import ValidationError
 
     from vergence.validation import explain

@@ -34,7 +34,7 @@ def watch(options: "WatchOptions") -> int:
 
     bag = is_bag(options.source)
     if options.topic is not None and not bag:
-        raise InputError("watch", "--topic", options.topic, "only with a ROS 2 bag")
+        raise InputError("vergence watch", "--topic", options.topic, "only with a ROS 2 bag")
     recording = Path(options.source) if bag else _recording_in(Path(options.source))
     answer = _watch_cell(options) if recording is None else _watch_recording(options, recording)
     if options.as_json:
@@ -58,7 +58,7 @@ def _watch_recording(options: "WatchOptions", path: Path) -> Mapping[str, object
     ):
         if given is not None:
             raise InputError(
-                "watch", option, given, "only with a cell; a recording cannot be changed"
+                "vergence watch", option, given, "only with a cell; a recording cannot be changed"
             )
     from vergence.app.progress import working
     from vergence.app.watch.replay import Replay
@@ -110,7 +110,7 @@ def _watch_cell(options: "WatchOptions") -> Mapping[str, object]:
 def _watch_robot(options: "WatchOptions", settings: Mapping[str, str]) -> Mapping[str, object]:
     """Run a cell on a robot."""
     if not options.images:
-        raise InputError("watch", "--no-images", Absent("images"), "images with --driver")
+        raise InputError("vergence watch", "--no-images", Absent("images"), "images with --driver")
     from vergence.app.progress import working
     from vergence.app.watch.live_robot import LiveRobot
     from vergence.app.watch.server import listen

@@ -152,6 +152,6 @@ def listen(host: str, port: int | None) -> socket.socket:
         except (OSError, UnicodeError) as error:
             if getattr(error, "errno", None) not in (errno.EADDRINUSE, errno.EACCES):
                 allowed = "127.0.0.1, or another address of this machine"
-                raise InputError("watch", "--host", host, allowed) from None
+                raise InputError("vergence watch", "--host", host, allowed) from None
     given = f"{ports[0]} … {ports[-1]}" if port is None else port
-    raise InputError("watch", "--port", given, "a port that is free and that you may use")
+    raise InputError("vergence watch", "--port", given, "a port that is free and that you may use")

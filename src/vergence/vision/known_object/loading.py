@@ -8,12 +8,14 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.errors import Absent, InputError
+from vergence.places import no_file
 from vergence.vision.known_object.object_model import SHARP_RAD, ObjectModel
 from vergence.vision.known_object.primitives import box, capsule, cylinder, ellipsoid
 
 MESHES = (".obj", ".stl")
 SCENES = (".xml", ".mjcf")
 SEEN_GROUPS = 3  # MuJoCo draws geoms of groups 0, 1, 2
+_ELEMENT = "Element name 'object', id 0"  # how MuJoCo names the only one of a mesh file
 _SHAPES = ("mesh", "box", "cylinder", "sphere", "ellipsoid", "capsule")
 
 
@@ -36,9 +38,7 @@ def load_object_model(
         allowed = "an object model: " + ", ".join(MESHES + SCENES)
         raise InputError(str(path), "", f"a file of kind {kind or '(none)'}", allowed)
     if not file.is_file():
-        raise InputError(
-            str(path), "", Absent("no such file"), "an OBJ, STL or MJCF file that exists"
-        )
+        raise InputError(str(path), "", no_file(file), "an OBJ, STL or MJCF file that exists")
     if not (np.isfinite(scale) and scale > 0.0):
         raise InputError(str(path), "scale", scale, "positive metres per unit of the file")
     compiled = _compile_mesh(file) if kind in MESHES else _compile_scene(file)
@@ -104,7 +104,7 @@ def _compile_scene(file: Path) -> Any:
     try:
         spec = mujoco.MjSpec.from_file(str(file))
     except ValueError as error:
-        raise InputError(str(file), "", _one_line(error), "a model that MuJoCo reads") from None
+        raise InputError(str(file), "", _refusal(error), "a model that MuJoCo reads") from None
     return _compiled(spec, file)
 
 
@@ -112,11 +112,13 @@ def _compiled(spec: Any, file: Path) -> Any:
     try:
         return spec.compile()
     except ValueError as error:
-        raise InputError(str(file), "", _one_line(error), "geometry that MuJoCo reads") from None
+        raise InputError(str(file), "", _refusal(error), "geometry that MuJoCo reads") from None
 
 
-def _one_line(error: ValueError) -> str:
-    return " ".join(str(error).split())
+def _refusal(error: ValueError) -> str:
+    """Return what MuJoCo says, on one line, without its name for our only element."""
+    text = " ".join(str(error).split()).removeprefix("Error: ")
+    return f"something that MuJoCo refuses: {text.removesuffix(_ELEMENT).rstrip('; ')}"
 
 
 def _joined(model: Any, source: str, body: int = 0) -> tuple[FloatArray, IntArray]:
