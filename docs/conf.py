@@ -25,6 +25,7 @@ extensions = [
     "gallery",
     "mathml",
     "references",
+    "table_names",
 ]
 exclude_patterns = ["_build", "extensions", "**/_*.md"]  # what begins with _ is included
 

@@ -187,7 +187,16 @@ def test_a_guessed_rate_limit_says_so(command, tmp_path: Path) -> None:
     (tmp_path / "rail.urdf").write_text(RAIL.format(velocity=""))
     assert command("new", "rail.urdf", "--body", "tip") == 0
     text = (tmp_path / "rail" / "cell.toml").read_text()
-    assert "[0.4, 90, 57.3]  # guesses for shoulder: the model has no limits" in text
+    assert "[0.4, 90, 57.3]  # guesses for shoulder: the model has no limits;" in text
+
+
+def test_a_rate_limit_that_is_none_is_replaced_by_a_guess_that_says_so(
+    command, tmp_path: Path
+) -> None:
+    (tmp_path / "rail.urdf").write_text(RAIL.format(velocity='velocity="10000"'))
+    assert command("new", "rail.urdf", "--body", "tip") == 0
+    text = (tmp_path / "rail" / "cell.toml").read_text()
+    assert "[0.4, 90, 57.3]  # guesses for shoulder: the model has no limits below 100 " in text
 
 
 def test_the_lens_of_a_camera_file_is_the_cameras(command, tmp_path: Path) -> None:

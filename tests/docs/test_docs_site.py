@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 from cell_file import reference
 from command_line import reference as commands
+from docutils import nodes
+from docutils.utils import new_document
 from gallery import gallery
+from table_names import let_break
 
 import vergence
 from vergence.cell import schema
@@ -66,6 +69,17 @@ def test_options_that_a_command_mentions_are_code():
     text = re.sub(r"```.*?```|`[^`]*`", "", "\n".join(commands()), flags=re.DOTALL)
     assert "Instead of" in text
     assert [line for line in text.splitlines() if re.search(r"--[a-z]", line)] == []
+
+
+def test_names_in_tables_break_after_underscores_and_dots_and_nowhere_else():
+    page = new_document("page")
+    names = [nodes.literal("", "law.optimal_tracking"), nodes.literal("", "0.5 s; a, b")]
+    page += nodes.entry("", *names)
+    page += nodes.literal("", "law.optimal_tracking")
+    let_break(page)
+    shown = ["".join(child.astext() for child in name) for name in page.findall(nodes.literal)]
+    broken = "law.<wbr>optimal_<wbr>tracking"
+    assert shown == [broken, "0.5 s; a, b", "law.optimal_tracking"]
 
 
 def test_the_gallery_has_every_cell_with_its_image():

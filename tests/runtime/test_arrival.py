@@ -17,9 +17,11 @@ def arrival(
     speed: float = 0.0,
     active: tuple[str, ...] = (),
     noise_px: float = 0.0,
+    rate_max: float = 1.0,
 ) -> Arrival:
     """Return what has seen two seconds of points with the square desired."""
-    watched, random = Arrival(goal or Goal(), np.ones(6)), np.random.default_rng(0)
+    watched = Arrival(goal or Goal(), np.full(6, rate_max))
+    random = np.random.default_rng(0)
     for k in range(60):
         measured = points_px + noise_px * random.standard_normal(points_px.shape)
         found = np.ones(len(measured), dtype=np.bool_)
@@ -63,6 +65,15 @@ def test_a_task_with_an_end_that_moves_when_its_time_is_over_is_not_reached() ->
 
 def test_a_task_without_an_end_that_lags_behind_its_target_is_completed() -> None:
     assert arrival(SQUARE + 5.0, speed=0.1).outcome(2.0, 2.0).kind is OutcomeKind.COMPLETED
+
+
+def test_an_arm_whose_model_has_no_real_rate_limits_is_not_taken_for_resting_while_it_moves() -> (
+    None
+):
+    for rate_max in (100.0, np.inf):
+        watched = arrival(SQUARE + 5.0, speed=0.05, rate_max=rate_max)
+        assert watched.outcome(2.0, 2.0).kind is OutcomeKind.COMPLETED
+        assert arrival(SQUARE + 5.0, rate_max=rate_max).stalled
 
 
 def test_a_stall_names_the_limits_that_hold_the_arm() -> None:

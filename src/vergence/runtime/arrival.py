@@ -17,6 +17,7 @@ _NO_LIMIT = (
     "determine the rest of the motion"
 )
 _REST = 1e-3  # fraction of the rate limits below which an arm is at rest
+_FASTEST = 10.0  # rad/s or m/s: the limits of a model without real ones may be ten times that
 _DESIRED_MOVED_PX = 0.1  # in a window, below which the desired features are at rest
 
 
@@ -137,7 +138,7 @@ class Arrival:
             return False
         first, last = self._rows[0], self._rows[-1]
         positions = np.array([row.q for row in self._rows])
-        moved = np.ptp(positions, axis=0) / (self._rate_max * _WINDOW_S)
+        moved = np.ptp(positions, axis=0) / (np.minimum(self._rate_max, _FASTEST) * _WINDOW_S)
         desired = np.abs(last.desired_px - first.desired_px).max(initial=0.0)
         return bool(moved.max() < _REST and desired < _DESIRED_MOVED_PX)
 

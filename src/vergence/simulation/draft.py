@@ -27,6 +27,7 @@ _HANGING_M = 0.1  # below its own zero: an arm that reaches lower is assumed to 
 _ABOVE_FLOOR_M = 0.05
 _WITHOUT_LIMITS = 2.0  # rad or m: range in which a joint without limits starts
 _RATES = 0.25, np.pi / 2  # m/s (prismatic), rad/s (revolute): where the model has no limit
+_NO_RATE = 100.0  # rad/s or m/s: stands in models that have no limit; no joint is that fast
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
 _CARRIED = "a body that a hinge or slide joint carries"
 SPAN = 0.35  # half a side of the board as a share of its distance
@@ -118,11 +119,13 @@ def _arm(model: Any, body: str) -> tuple[Arm, str]:
     """Return the arm, with cautious limits where its model has none, and their origin."""
     arm = Arm.from_mujoco(model, body, kind="body")
     given = read_chain(model, body, "body").rate_max
-    guessed = [name for name, rate in zip(arm.names, given, strict=True) if np.isinf(rate)]
-    rates = np.where(np.isinf(given), np.where(arm.sliding, *_RATES), given)
+    unlimited = given >= _NO_RATE
+    rates = np.where(unlimited, np.where(arm.sliding, *_RATES), given)
     whose = "the model's velocity limits"
-    if guessed:
-        whose = f"guesses for {', '.join(guessed)}: the model has no limits"
+    if unlimited.any():
+        named = ", ".join(np.array(arm.names)[unlimited])
+        below = "" if np.isinf(given[unlimited]).all() else f" below {_NO_RATE:g} rad/s or m/s"
+        whose = f"guesses for {named}: the model has no limits{below}"
     accelerations = np.where(arm.sliding, *_ACCELERATIONS)
     return replace(arm, rate_max=rates, acceleration_max=accelerations), whose
 
