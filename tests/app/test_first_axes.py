@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vergence.app.first_axes import poorly_measured, poorly_served
+from vergence.app.first_axes import _words, poorly_measured, poorly_served
 from vergence.camera import Camera
 from vergence.geometry import se3, se3_inverse, so3_exp, transform_points
 from vergence.places import CELLS
@@ -61,3 +61,9 @@ def test_a_direction_that_the_arm_hardly_serves_is_named_with_its_speed(draft: D
     speeds = np.linalg.norm(rates / np.linalg.norm(rates, axis=1, keepdims=True) @ J.T, axis=1)
     assert speeds.max() * draft.distance_m == pytest.approx(fast, rel=0.1)
     assert slow < 0.05 * fast
+
+
+def test_several_motions_at_once_are_named_with_one_with() -> None:
+    named = "a move along x with a move along z and a turn about y"
+    assert _words(np.array([[0.6, 0.0, 0.6, 0.0, 0.6, 0.0]])) == named
+    assert _words(np.eye(6)[:2]) == "a move along x and a move along y"

@@ -67,7 +67,13 @@ def poorly_served(draft: "Draft") -> str:
 def _words(poor: FloatArray) -> str:
     """Name directions of a twist, rows (k, 6), each by the axes that have a part in it."""
     named = (
-        " with ".join(name for name, part in zip(_AXES, row**2, strict=True) if part > _PART)
+        _combined([name for name, part in zip(_AXES, row**2, strict=True) if part > _PART])
         for row in poor
     )
     return listed(tuple(dict.fromkeys(named)), "and")
+
+
+def _combined(names: list[str]) -> str:
+    """Name motions that are made together."""
+    first, *others = names
+    return f"{first} with {' and '.join(others)}" if others else first
