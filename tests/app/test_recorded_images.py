@@ -7,7 +7,7 @@ import made_up_run
 import numpy as np
 import pytest
 
-from vergence.app.recorded_images import CameraImages, camera_images
+from vergence.app.recorded_images import CameraImages, MarkedImage, camera_images, thinned
 from vergence.runtime.recording import Recording
 
 
@@ -29,6 +29,16 @@ def test_a_film_has_every_kept_image_at_its_time(
     texture = cv2.resize(kept[40][1], (400, 300), interpolation=cv2.INTER_LINEAR)
     drawn = decoded(images.film[40].jpeg).mean(axis=2)
     assert np.median(np.abs(drawn - texture)) < 3.0
+
+
+@pytest.mark.parametrize("size", [10, 3_000, 40_000])
+def test_a_film_of_large_images_has_fewer_of_them(size: int) -> None:
+    frames = [MarkedImage(0.1 * k, bytes(size)) for k in range(160)]
+    kept = thinned(frames, 4e5)
+    assert 4 / 3 * size * len(kept) <= 4e5 + 4 / 3 * size
+    assert len(kept) == 160 or 4 / 3 * size * len(kept) > 1e5
+    times = [frame.time for frame in kept]
+    np.testing.assert_allclose(np.diff(times), times[1], atol=1e-9)
 
 
 def test_a_long_run_has_a_film_of_bounded_size(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Images of a run for its report: a film's frames and a few key frames, marks drawn in."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,8 +10,9 @@ from vergence.app.overlay import Marks, draw
 from vergence.arrays import ImageArray
 from vergence.runtime.recording import Recording
 
-FILM_FRAMES = 160  # at most, so that a page stays small: about 20 kB each
-FILM_WIDTH_PX, FILM_QUALITY = 400, 80
+FILM_FRAMES = 160  # at most
+FILM_WIDTH_PX, FILM_QUALITY = 400, 72
+FILM_BYTES = 7e6  # at most, of all cameras' films on a page, where three bytes take four letters
 _KEY_FRAMES = 4
 KEY_FRAME_WIDTH_PX, KEY_FRAME_QUALITY = 640, 88
 
@@ -51,7 +53,18 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
         if number in key:
             jpeg = _jpeg(image, marks, KEY_FRAME_WIDTH_PX, KEY_FRAME_QUALITY)
             key_frames.append(MarkedImage(time, jpeg))
-    return CameraImages(tuple(frames), tuple(key_frames))
+    return CameraImages(thinned(frames, FILM_BYTES / len(recording.cameras)), tuple(key_frames))
+
+
+def thinned(frames: Sequence[MarkedImage], most: float) -> tuple[MarkedImage, ...]:
+    """Return as many of a film's frames, evenly over it, as a page has room for.
+
+    Args:
+        frames: in order of time.
+        most: bytes on the page.
+    """
+    needed = 4 / 3 * sum(len(frame.jpeg) for frame in frames)
+    return tuple(frames[:: max(1, math.ceil(needed / most))])
 
 
 def film_numbers(count: int) -> range:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence.app.recorded_images import (
+    FILM_BYTES,
     FILM_QUALITY,
     FILM_WIDTH_PX,
     KEY_FRAME_QUALITY,
@@ -17,6 +18,7 @@ from vergence.app.recorded_images import (
     MarkedImage,
     film_numbers,
     jpeg_of,
+    thinned,
 )
 from vergence.app.tracking.track_record import TrackRecord
 from vergence.arrays import ImageArray
@@ -26,7 +28,7 @@ def overlay_images(record: TrackRecord) -> CameraImages:
     """Return the images that a page shows; both empty where none were written."""
     film = record.answer.get("overlay")
     frames = tuple(_film(record, record.folder / Path(str(film)).name)) if film else ()
-    return CameraImages(frames, tuple(_key_frames(record)))
+    return CameraImages(thinned(frames, FILM_BYTES), tuple(_key_frames(record)))
 
 
 def _film(record: TrackRecord, path: Path) -> Iterator[MarkedImage]:
