@@ -60,7 +60,7 @@ def test_what_compiling_takes_does_not_count_in_the_pace(
         task = progress.add_task("runs", total=1000)
         event.start_event("numba:compile")
         wait_for(
-            "runs: 0 of 1000 runs, 0 s so far, compiling kernels, once on this computer: 1 of",
+            "runs: 0 of 1000 runs, 0 s so far, compiling kernels, once on this computer, usually",
             capsys,
         )
         event.end_event("numba:compile")
@@ -79,7 +79,7 @@ def test_compilation_is_told_while_it_lasts(capsys: pytest.CaptureFixture[str]) 
     with working("setting up"):
         wait_for("setting up, 0 s so far", capsys)
         njit(lambda x: x + 1)(1)
-        wait_for("setting up: compiling kernels, once on this computer: 1 of at most ", capsys)
+        wait_for("setting up: compiling kernels, once on this computer, usually within two", capsys)
 
 
 def test_kernels_of_imported_modules_that_are_not_kept_are_those_to_be_compiled_at_most(
@@ -103,8 +103,8 @@ def test_kernels_of_imported_modules_that_are_not_kept_are_those_to_be_compiled_
     kept(1)
     monkeypatch.setitem(vars(sys.modules["vergence.kept"]), "kernel", kernel("kept"))
     with Compilations() as seen:
-        assert ": 0 of at most 2, " in seen.words()
+        assert seen.words().endswith(": 0 of at most 2")
         first(1)
-        assert ": 1 of at most 2, at most " in seen.words()
+        assert seen.words().endswith(": 1 of at most 2")
         other(1)
-        assert seen.words().endswith(": 2 of at most 2, at most 0 s left")
+        assert seen.words().endswith(": 2 of at most 2")

@@ -60,15 +60,14 @@ class Compilations:
         return listener.spent + now
 
     def words(self) -> str:
-        """Return what is compiled, how many of how many at most, and how long that takes at most.
+        """Return what is compiled, how long that usually takes, and how many of how many at most.
 
         Every kernel of the imported modules that is not kept may have to be compiled. Which of them
-        a run calls is not known before it calls them, so there may be far fewer.
+        a run calls is not known before it calls them, so there may be far fewer: of the first run
+        on a computer a good third.
         """
-        left = _not_compiled()
-        most = f"{self.count} of at most {self.count + left}"
-        rest_s = self.spent_s * left / max(self.count, 1)
-        return f"{COMPILING}: {most}, at most {rest_s:.0f} s left"
+        most = self.count + _not_compiled()
+        return f"{COMPILING}, usually within two minutes: {self.count} of at most {most}"
 
     def __enter__(self) -> Self:
         self._event.register("numba:compile", self._listener)
