@@ -10,7 +10,7 @@ import pytest
 from vergence import features
 from vergence.errors import InputError
 from vergence.features import Feature
-from vergence.geometry import se3_exp, se3_inverse, transform_points
+from vergence.geometry import se3_exp, se3_inverse, so3_exp, transform_points
 from vergence.registry import find, kinds
 
 POLYGON = np.array(
@@ -126,11 +126,35 @@ def test_moments_of_a_polygon_are_integrals() -> None:
     """Against a triangle's moments of inertia, in closed form."""
     a, b = 0.3, 0.2
     triangle = np.array([[0.0, 0.0], [a, 0.0], [0.0, b]])
-    x_n, y_n, a_n, _, _, turn = features.RegionMoments(triangle).value()
+    x_n, y_n, a_n, _, _, turn, long = features.RegionMoments(triangle).value()
     area = a * b / 2
     np.testing.assert_allclose([x_n, y_n, a_n], [a / 3 * a_n, b / 3 * a_n, area**-0.5])
     mu20, mu02, mu11 = a**3 * b / 36, a * b**3 / 36, -(a**2) * b**2 / 72
     assert turn == pytest.approx(0.5 * np.arctan2(2 * mu11, mu20 - mu02))
+    short, longest = np.linalg.eigvalsh([[mu20, mu11], [mu11, mu02]])
+    assert long == pytest.approx((longest - short) / (longest + short) / 4)
+
+
+def test_of_two_tilts_that_six_moments_do_not_tell_apart_the_elongation_differs() -> None:
+    places = np.array(
+        [
+            [0.034953983670, -0.055437444062, 0.548959198496],
+            [0.025061554005, -0.051164138853, 0.446513010230],
+        ]
+    )
+    turns = np.array(
+        [
+            [3.092855938278, -0.172386402988, -0.520061283722],
+            [2.369718141904, -0.024227349237, -0.425877506030],
+        ]
+    )
+    goal, other = (
+        feature_of("region_moments", FLAT @ so3_exp(turn).T + place)
+        for place, turn in zip(places, turns, strict=True)
+    )
+    error = other.error(goal)
+    np.testing.assert_allclose(error[:6], 0.0, atol=1e-9)
+    assert error[6] == pytest.approx(0.08, abs=0.005)
 
 
 def test_only_turns_move_a_vanishing_point() -> None:

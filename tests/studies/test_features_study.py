@@ -26,6 +26,11 @@ def test_every_kind_arrives_at_its_goal_free_and_on_the_arm(kind: str) -> None:
         assert not went.too_fast
 
 
+@pytest.mark.parametrize("number", [5, 8, 21, 43])
+def test_moments_arrive_from_starts_at_which_six_values_end_at_another_tilt(number: int) -> None:
+    assert servo("moments", draw_start(0, number), on_arm=False).ending is Ending.ARRIVED
+
+
 def test_a_start_is_drawn_the_same_again_and_shows_the_target_at_both_ends() -> None:
     again = draw_start(3, 0)
     np.testing.assert_array_equal(again.q, START.q)

@@ -101,6 +101,16 @@ def orientation(name: str, mu: FloatArray) -> float:
     return float(0.5 * np.arctan2(across, along))
 
 
+def elongation(mu: FloatArray) -> float:
+    """Return ε = √φ2 / φ1, with the invariants φ of [Hu1962]: 0 for like extents, 1 for a line.
+
+    It is invariant to translation, scale and rotation in the image. An oblique view shortens one
+    extent, and changes it the more the more oblique the view is.
+    """
+    across, along = 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
+    return float(np.hypot(across, along) / (mu[2, 0] + mu[0, 2]))
+
+
 def tilt_invariants(moments: CentralMoments) -> FloatArray:
     """Return s_x and s_y, (2,), [Tahri2005].
 

@@ -1,4 +1,4 @@
-"""Moments of a set of points, or of the interior of a polygon, as a feature of six values."""
+"""Moments of a set of points, or of the interior of a polygon, as a feature of seven values."""
 
 import numpy as np
 
@@ -6,6 +6,7 @@ from vergence.arrays import FloatArray
 from vergence.features._angles import wrapped
 from vergence.features._moments import (
     CentralMoments,
+    elongation,
     moments_of_points,
     moments_of_polygon,
     orientation,
@@ -14,29 +15,36 @@ from vergence.features._moments import (
 from vergence.features.feature import Feature
 from vergence.parts import as_part
 
+# Factor of ε. Its rate is about the tilt itself, so a law that believes a wrong depth gets even the
+# sign wrong in a nearly frontal view; this little, ε does not outweigh s_x and s_y there.
+_ELONGATION = 0.25
+
 
 @as_part("feature", "moments")
 class Moments(Feature):
-    """Centre, size, tilt and orientation of points on a plane: s = (x_n, y_n, a_n, s_x, s_y, α).
+    """Where points on a plane are, and how they are turned: s = (x_n, y_n, a_n, s_x, s_y, α, ε/4).
 
-    The normalised set of [Tahri2005]. With a the sum of squared distances from the centre,
-    a_n = 1/√a, and x_n, y_n are the centre times a_n: for a target parallel to the image plane,
-    each changes with one of the camera's three translations. s_x and s_y change with rotations
-    about the x and y axes, α with rotation about the optical axis. The points may be in any order.
+    The first six are the normalised set of [Tahri2005]. With a the sum of squared distances from
+    the centre, a_n = 1/√a, and x_n, y_n are the centre times a_n: for a target parallel to the
+    image plane, each changes with one of the camera's three translations. s_x and s_y change with
+    rotations about the x and y axes, α with rotation about the optical axis. At another tilt all
+    six can be those of the goal again, but the elongation ε [Hu1962] then differs. The points may
+    be in any order.
     """
 
     def value(self) -> FloatArray:
-        """Return s, (6,); α in rad, known up to half a turn."""
+        """Return s, (7,); α in rad, known up to half a turn."""
         moments = self._moments()
         a_n = 1.0 / np.sqrt(moments.size)
         tilt = tilt_invariants(moments)
         turn = orientation(self._name, moments.mu)
-        return np.array([*(moments.centre * a_n), a_n, *tilt, turn])
+        long = _ELONGATION * elongation(moments.mu)
+        return np.array([*(moments.centre * a_n), a_n, *tilt, turn, long])
 
     def error(self, desired: "Moments") -> FloatArray:
-        """Return e = s - s_star, (6,), with the difference of α within a quarter turn."""
+        """Return e = s - s_star, (7,), with the difference of α within a quarter turn."""
         difference = self.value() - desired.value()
-        difference[5:] = wrapped(difference[5:], np.pi)
+        difference[5:6] = wrapped(difference[5:6], np.pi)
         return difference
 
     _name = "moments"
