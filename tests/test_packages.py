@@ -37,7 +37,10 @@ ROOMS = (
     "studies",
     "app",
 )
-ROOT_MODULES = sorted(path.stem for path in SOURCE.glob("*.py") if not path.stem.startswith("__"))
+ROOT_MODULES = [
+    *sorted(path.stem for path in SOURCE.glob("*.py") if not path.stem.startswith("__")),
+    *(f"kernels/{path.stem}" for path in sorted((SOURCE / "kernels").glob("*.py"))),
+]
 HEAVY = ("mujoco", "cv2", "matplotlib", "scipy", "pydantic", "mcap", "foxglove", "dask", "typer")
 
 
@@ -97,7 +100,7 @@ def level(name: str) -> int | None:
     parts = name.split(".")
     if parts[0] != "vergence":
         return None
-    if len(parts) == 1 or parts[1] in ROOT_MODULES or parts[1].startswith("__"):
+    if len(parts) == 1 or parts[1] in ("kernels", *ROOT_MODULES) or parts[1].startswith("__"):
         return 0
     assert parts[1] in ROOMS, f"{name}: no room of that name"
     return 1 + ROOMS.index(parts[1])

@@ -4,8 +4,8 @@
 that the import itself takes milliseconds; `__init__.pyi` says what each of them is.
 """
 
-from vergence.prebuilt import use_prebuilt_kernels as _use_prebuilt_kernels
-from vergence.stale_kernels import forget_stale_kernels as _forget_stale_kernels
+from vergence.kernels.prebuilt import use_prebuilt_kernels as _use_prebuilt_kernels
+from vergence.kernels.stale import forget_stale_kernels as _forget_stale_kernels
 
 _ROOMS = {
     "app.report": ("report",),

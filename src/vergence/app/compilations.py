@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
-from vergence.compiled_kernels import is_kept
+from vergence.kernels.compiled import is_kept
 
 COMPILING = "compiling kernels, once on this computer"
 

@@ -30,8 +30,8 @@ from vergence.app.options import (
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
 from vergence.app.warnings_once import warn_once
 from vergence.errors import Absent, InputError, VergenceError
+from vergence.kernels.prebuilt import use_prebuilt_kernels
 from vergence.places import cell_description, find_cell, find_recording, is_track
-from vergence.prebuilt import use_prebuilt_kernels
 from vergence.studies import PAPERS
 
 app = typer.Typer(

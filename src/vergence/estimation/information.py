@@ -10,7 +10,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.measurement import POSE
-from vergence.scratch import scratch
+from vergence.kernels.scratch import scratch
 
 STATES = 12
 

@@ -10,7 +10,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.geometry import so3_exp, so3_left_jacobian
-from vergence.scratch import scratch
+from vergence.kernels.scratch import scratch
 
 
 @njit(cache=True)

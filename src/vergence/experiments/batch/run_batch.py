@@ -9,7 +9,6 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import image_times
-from vergence.compiled_kernels import is_compiled
 from vergence.control import Servo, singular_fault
 from vergence.control.compile_law import CompiledLaw
 from vergence.control.point_law import ProgramSolver, TrackingLaw
@@ -17,6 +16,7 @@ from vergence.control.sum_of_terms import NOT_FINITE
 from vergence.experiments.batch import closed_loop as kernel
 from vergence.experiments.batch.closed_loop import LoopInputs, LoopRecord, closed_loop
 from vergence.experiments.batch.kinematic_run import KinematicRun
+from vergence.kernels.compiled import is_compiled
 from vergence.runtime import endings
 from vergence.signals import Outcome
 from vergence.simulation.exact_points import OUT_OF_SIGHT, covariance_px

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vergence.compiled_kernels import is_compiled
+from vergence.kernels.compiled import is_compiled
 
 KERNEL = """
 from numba import njit

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 SWITCH = "VERGENCE_KERNELS"  # "native": compile for this processor, whatever came with the wheel
-_DESCRIBED = Path(__file__).with_name("kernels.json")
+_DESCRIBED = Path(__file__).parents[1] / "kernels.json"
 
 
 def use_prebuilt_kernels() -> str:

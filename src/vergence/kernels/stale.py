@@ -13,9 +13,9 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from vergence.kernel_cache import kernel_cache, kernels_of
+from vergence.kernels.cache import kernel_cache, kernels_of
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _NOTED = "kernels_made_from.json"  # in the cache of the package's folder
 _IMPORT = re.compile(
     r"^[ \t]*(?:from|import)[ \t]+(vergence[\w.]*)(?:[ \t]+import[ \t]+(\([^)]*\)|[^\n]*))?", re.M

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vergence import prebuilt
+from vergence.kernels import prebuilt
 
 HERE = {
     "python": f"{sys.version_info.major}.{sys.version_info.minor}",

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from vergence.scratch import scratch
+from vergence.kernels.scratch import scratch
 
 
 @njit

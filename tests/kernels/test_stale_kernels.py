@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import vergence
-from vergence.kernel_cache import kernel_cache, kernels_of
-from vergence.stale_kernels import _listed, forget_stale_kernels
+from vergence.kernels.cache import kernel_cache, kernels_of
+from vergence.kernels.stale import _listed, forget_stale_kernels
 
 SOURCES = {
     "__init__.py": "",
@@ -84,7 +84,7 @@ def test_kernels_that_are_kept_elsewhere_go_too(
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(elsewhere))
     else:  # the package cannot be written to
         monkeypatch.setenv("XDG_CACHE_HOME", str(elsewhere))
-        monkeypatch.setattr("vergence.kernel_cache.os.access", lambda *_: False)
+        monkeypatch.setattr("vergence.kernels.cache.os.access", lambda *_: False)
     kernel = kernel_cache(package / "high") / "law.tick-5.py311.nbi"
     assert elsewhere in kernel.parents
     kernel.parent.mkdir(parents=True)
