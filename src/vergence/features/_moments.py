@@ -8,13 +8,13 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.errors import InputError
 
-_ORDER = 3
+ORDER = 3
 # Terms of the integrals over a polygon: p, q, and the powers of a side's end point.
 _P, _Q, _K, _J = np.array(
     [
         (p, q, k, j)
-        for p in range(_ORDER + 1)
-        for q in range(_ORDER + 1 - p)
+        for p in range(ORDER + 1)
+        for q in range(ORDER + 1 - p)
         for k in range(p + 1)
         for j in range(q + 1)
     ]
@@ -23,13 +23,13 @@ _P, _Q, _K, _J = np.array(
 
 def _factors() -> FloatArray:
     """Return the factor of each term in each integral, (16, terms)."""
-    factors = np.zeros(((_ORDER + 1) ** 2, len(_P)))
+    factors = np.zeros(((ORDER + 1) ** 2, len(_P)))
     for term, (p, q, k, j) in enumerate(
         zip(*map(np.ndarray.tolist, (_P, _Q, _K, _J)), strict=True)
     ):
         share = (p + q + 2) * (p + q + 1) * comb(p + q, p)
         ways = comb(k + j, j) * comb(p + q - k - j, q - j)
-        factors[(_ORDER + 1) * p + q, term] = ways / share
+        factors[(ORDER + 1) * p + q, term] = ways / share
     return factors
 
 
@@ -61,7 +61,7 @@ def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
         InputError: if all points coincide.
     """
     centre = points.mean(axis=0)
-    powers = (points - centre)[:, :, None] ** np.arange(_ORDER + 1)
+    powers = (points - centre)[:, :, None] ** np.arange(ORDER + 1)
     mu = _up_to_order(np.einsum("mp,mq->pq", powers[:, 0], powers[:, 1]))
     size = float(mu[2, 0] + mu[0, 2])
     if not size > 0.0:
@@ -132,13 +132,13 @@ def _polygon_integrals(corners: FloatArray) -> FloatArray:
     """Return ∫ x^p y^q over the interior of a polygon, signed by its orientation, (4, 4)."""
     before = np.concatenate((corners[-1:], corners[:-1]))
     twice = before[:, 0] * corners[:, 1] - corners[:, 0] * before[:, 1]
-    now = corners[:, :, None] ** np.arange(_ORDER + 1)
-    last = before[:, :, None] ** np.arange(_ORDER + 1)
+    now = corners[:, :, None] ** np.arange(ORDER + 1)
+    last = before[:, :, None] ** np.arange(ORDER + 1)
     terms = now[:, 0, _K] * last[:, 0, _P - _K] * now[:, 1, _J] * last[:, 1, _Q - _J]
-    integrals: FloatArray = (_FACTORS @ (twice @ terms)).reshape(_ORDER + 1, _ORDER + 1)
+    integrals: FloatArray = (_FACTORS @ (twice @ terms)).reshape(ORDER + 1, ORDER + 1)
     return integrals
 
 
 def _up_to_order(mu: FloatArray) -> FloatArray:
-    p = np.arange(_ORDER + 1)
-    return np.where(p[:, None] + p <= _ORDER, mu, 0.0)
+    p = np.arange(ORDER + 1)
+    return np.where(p[:, None] + p <= ORDER, mu, 0.0)

@@ -54,3 +54,11 @@ def depth_interaction(points: FloatArray, depth: FloatArray) -> FloatArray:
     L[:, 2] = -1.0
     L[:, 3], L[:, 4] = -points[:, 1] * depth, points[:, 0] * depth
     return L
+
+
+def skew_matrices(vectors: FloatArray) -> FloatArray:
+    """Return [u]×, with [u]× ω = u × ω, of vectors u (N, 3), (N, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros(len(vectors))
+    rows = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    return np.moveaxis(rows, 2, 0)

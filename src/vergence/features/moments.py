@@ -4,6 +4,14 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.features._angles import wrapped
+from vergence.features._moment_rates import (
+    MomentRates,
+    elongation_rate,
+    orientation_rate,
+    rates_of_points,
+    rates_of_polygon,
+    tilt_rates,
+)
 from vergence.features._moments import (
     CentralMoments,
     elongation,
@@ -13,6 +21,7 @@ from vergence.features._moments import (
     tilt_invariants,
 )
 from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 # Factor of ε. Its rate is about the tilt itself, so a law that believes a wrong depth gets even the
@@ -41,6 +50,21 @@ class Moments(Feature):
         long = _ELONGATION * elongation(moments.mu)
         return np.array([*(moments.centre * a_n), a_n, *tilt, turn, long])
 
+    def interaction(self) -> FloatArray:
+        """Return L (7, 6): the derivatives of s as the points, or corners, move with the camera."""
+        moments = self._moments()
+        flows = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
+        rates = self._rates(flows, moments)
+        a_n, tilt = 1.0 / np.sqrt(moments.size), tilt_invariants(moments)
+        orientation(self._name, moments.mu)  # refuses extents that are alike
+        L = np.empty((7, 6))
+        L[2] = -0.5 * a_n / moments.size * rates.size
+        L[:2] = a_n * rates.centre + np.outer(moments.centre, L[2])
+        L[3:5] = tilt_rates(moments, tilt, rates)
+        L[5] = orientation_rate(moments.mu, rates.mu)
+        L[6] = _ELONGATION * elongation_rate(moments.mu, rates.mu)
+        return L
+
     def error(self, desired: "Moments") -> FloatArray:
         """Return e = s - s_star, (7,), with the difference of α within a quarter turn."""
         difference = self.value() - desired.value()
@@ -52,6 +76,9 @@ class Moments(Feature):
     def _moments(self) -> CentralMoments:
         return moments_of_points(self._name, self.points)
 
+    def _rates(self, flows: FloatArray, moments: CentralMoments) -> MomentRates:
+        return rates_of_points(self.points, flows, moments)
+
 
 @as_part("feature", "region_moments")
 class RegionMoments(Moments):
@@ -62,3 +89,6 @@ class RegionMoments(Moments):
 
     def _moments(self) -> CentralMoments:
         return moments_of_polygon(self._name, self.points)
+
+    def _rates(self, flows: FloatArray, moments: CentralMoments) -> MomentRates:
+        return rates_of_polygon(self.points, flows, moments)

@@ -4,6 +4,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
+from vergence.features.interaction import skew_matrices
 from vergence.parts import as_part
 
 
@@ -19,3 +20,10 @@ class Points3d(Feature):
         rays = np.column_stack((self.points, np.ones(len(self.points))))
         positions: FloatArray = (rays * self.depth_m[:, None]).ravel()
         return positions
+
+    def interaction(self) -> FloatArray:
+        """Return L (3M, 6) by Ẋ = -v - ω × X."""
+        X = self.value().reshape(-1, 3)
+        return np.concatenate((-np.tile(np.eye(3), (len(X), 1, 1)), skew_matrices(X)), 2).reshape(
+            -1, 6
+        )

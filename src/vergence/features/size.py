@@ -3,8 +3,10 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.features._moment_rates import rates_of_points
 from vergence.features._moments import moments_of_points
 from vergence.features.feature import Feature
+from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -18,3 +20,11 @@ class Size(Feature):
     def value(self) -> FloatArray:
         """Return s, (1,)."""
         return np.array([moments_of_points("size", self.points).size ** -0.5])
+
+    def interaction(self) -> FloatArray:
+        """Return L (1, 6), by the chain rule from those of the points."""
+        moments = moments_of_points("size", self.points)
+        flows = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
+        rates = rates_of_points(self.points, flows, moments)
+        L: FloatArray = -0.5 * moments.size**-1.5 * rates.size[None]
+        return L

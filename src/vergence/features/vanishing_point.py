@@ -6,6 +6,7 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError
 from vergence.features._pairs import ends
 from vergence.features.feature import Feature
+from vergence.features.interaction import skew_matrices
 from vergence.parts import as_part
 
 
@@ -32,3 +33,7 @@ class VanishingPoint(Feature):
         towards = np.sum((second - first) * (ray[:2] - ray[2] * first))
         unit: FloatArray = ray / (length if towards > 0.0 else -length)
         return unit
+
+    def interaction(self) -> FloatArray:
+        """Return L (3, 6) by u̇ = -ω × u, at whatever depth the lines are."""
+        return np.hstack((np.zeros((3, 3)), skew_matrices(self.value()[None])[0]))
