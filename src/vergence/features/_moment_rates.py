@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.features._moments import ORDER, CentralMoments
+from vergence.features._moments import ORDER, CentralMoments, axes, up_to_order
 
 # Gauss's rule on a side, from 0 to 1: exact for the polynomials here, of fifth degree at most.
 _ALONG = 0.5 + np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
@@ -37,7 +37,7 @@ def rates_of_points(points: FloatArray, flows: FloatArray, now: CentralMoments) 
     slopes = np.arange(ORDER + 1) * np.roll(powers, 1, axis=2)  # p xᵖ⁻¹; 0 for p = 0
     mu = np.einsum("mp,mq,mk->pqk", slopes[:, 0], powers[:, 1], own[:, 0])
     mu += np.einsum("mp,mq,mk->pqk", powers[:, 0], slopes[:, 1], own[:, 1])
-    mu = _up_to_order(mu)
+    mu = up_to_order(mu)
     return MomentRates(centre, mu[2, 0] + mu[0, 2], mu)
 
 
@@ -65,7 +65,7 @@ def rates_of_polygon(corners: FloatArray, flows: FloatArray, now: CentralMoments
     centre = np.array([raw[1, 0], raw[0, 1]]) / now.size
     mu = raw - _slopes(now.mu)[..., None] * centre[0]
     mu -= _slopes(now.mu.T).T[..., None] * centre[1]
-    return MomentRates(centre, raw[0, 0], _up_to_order(mu))
+    return MomentRates(centre, raw[0, 0], up_to_order(mu))
 
 
 def orientation_rate(mu: FloatArray, rates: FloatArray) -> FloatArray:
@@ -75,14 +75,14 @@ def orientation_rate(mu: FloatArray, rates: FloatArray) -> FloatArray:
         mu: central moments, (4, 4).
         rates: of those, (4, 4, K); likewise below.
     """
-    (across, along), (by_across, by_along) = _axes(mu), _axes(rates)
+    (across, along), (by_across, by_along) = axes(mu), axes(rates)
     rate: FloatArray = 0.5 * (along * by_across - across * by_along) / (across**2 + along**2)
     return rate
 
 
 def elongation_rate(mu: FloatArray, rates: FloatArray) -> FloatArray:
     """Return the rate of ε, (K,)."""
-    (across, along), (by_across, by_along) = _axes(mu), _axes(rates)
+    (across, along), (by_across, by_along) = axes(mu), axes(rates)
     total, apart = mu[2, 0] + mu[0, 2], np.hypot(across, along)
     by_apart = (across * by_across + along * by_along) / apart
     rate: FloatArray = by_apart / total - apart / total**2 * (rates[2, 0] + rates[0, 2])
@@ -98,7 +98,7 @@ def tilt_rates(now: CentralMoments, tilt: FloatArray, rates: MomentRates) -> Flo
         rates: of the moments.
     """
     mu, by = now.mu, rates.mu
-    (s1, c1), (by_s1, by_c1) = _axes(mu), _axes(by)
+    (s1, c1), (by_s1, by_c1) = axes(mu), axes(by)
     c2, s2 = mu[0, 3] - 3.0 * mu[2, 1], mu[3, 0] - 3.0 * mu[1, 2]
     by_c2, by_s2 = by[0, 3] - 3.0 * by[2, 1], by[3, 0] - 3.0 * by[1, 2]
     c3, s3 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
@@ -115,17 +115,7 @@ def tilt_rates(now: CentralMoments, tilt: FloatArray, rates: MomentRates) -> Flo
     return changed
 
 
-def _axes(mu: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return 2 μ11 and μ20 - μ02."""
-    return 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
-
-
 def _slopes(mu: FloatArray) -> FloatArray:
     """Return p μ_{p-1,q}, (4, 4): by how much a shift along x changes each moment."""
     slopes: FloatArray = np.arange(ORDER + 1)[:, None] * np.roll(mu, 1, axis=0)
     return slopes
-
-
-def _up_to_order(mu: FloatArray) -> FloatArray:
-    p = np.arange(ORDER + 1)
-    return np.where((p[:, None] + p <= ORDER)[..., None], mu, 0.0)

@@ -62,7 +62,7 @@ def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
     """
     centre = points.mean(axis=0)
     powers = (points - centre)[:, :, None] ** np.arange(ORDER + 1)
-    mu = _up_to_order(np.einsum("mp,mq->pq", powers[:, 0], powers[:, 1]))
+    mu = up_to_order(np.einsum("mp,mq->pq", powers[:, 0], powers[:, 1]))
     size = float(mu[2, 0] + mu[0, 2])
     if not size > 0.0:
         raise InputError(name, "points", "points that all coincide", "distinct points")
@@ -89,13 +89,18 @@ def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
     return CentralMoments(about + middle, float(mu[0, 0]), mu, dense=True)
 
 
+def axes(mu: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return 2 μ11 and μ20 - μ02, of moments or of their rates, (4, 4, …)."""
+    return 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
+
+
 def orientation(name: str, mu: FloatArray) -> float:
     """Return the direction α of the longest extent, rad in (-π/2, π/2].
 
     Raises:
         InputError: if the extent is the same in all directions.
     """
-    across, along = 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
+    across, along = axes(mu)
     if np.hypot(across, along) <= _ROUND * (mu[2, 0] + mu[0, 2]):
         raise InputError(name, "points", "extents that are alike", "a set with a longest extent")
     return float(0.5 * np.arctan2(across, along))
@@ -107,7 +112,7 @@ def elongation(mu: FloatArray) -> float:
     It is invariant to translation, scale and rotation in the image. An oblique view shortens one
     extent, and changes it the more the more oblique the view is.
     """
-    across, along = 2.0 * mu[1, 1], mu[2, 0] - mu[0, 2]
+    across, along = axes(mu)
     return float(np.hypot(across, along) / (mu[2, 0] + mu[0, 2]))
 
 
@@ -118,7 +123,7 @@ def tilt_invariants(moments: CentralMoments) -> FloatArray:
     rotates about its x or y axis.
     """
     mu = moments.mu
-    c1, s1 = mu[2, 0] - mu[0, 2], 2.0 * mu[1, 1]
+    s1, c1 = axes(mu)
     c2, s2 = mu[0, 3] - 3.0 * mu[2, 1], mu[3, 0] - 3.0 * mu[1, 2]
     c3, s3 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
     scale = (c1 * c1 + s1 * s1) * (mu[2, 0] + mu[0, 2]) ** 1.5
@@ -139,6 +144,8 @@ def _polygon_integrals(corners: FloatArray) -> FloatArray:
     return integrals
 
 
-def _up_to_order(mu: FloatArray) -> FloatArray:
+def up_to_order(mu: FloatArray) -> FloatArray:
+    """Return moments or their rates, (4, 4, …), with zeros where p + q > 3."""
     p = np.arange(ORDER + 1)
-    return np.where(p[:, None] + p <= ORDER, mu, 0.0)
+    kept = p[:, None] + p <= ORDER
+    return np.where(kept.reshape(kept.shape + (1,) * (mu.ndim - 2)), mu, 0.0)

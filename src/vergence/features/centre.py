@@ -2,7 +2,6 @@
 
 from vergence.arrays import FloatArray
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -17,6 +16,5 @@ class Centre(Feature):
 
     def interaction(self) -> FloatArray:
         """Return L (2, 6), the mean of the interaction matrices of the points."""
-        rows = interaction_matrix_points(self.points, self.depth_m)
-        L: FloatArray = rows.reshape(-1, 2, 6).mean(axis=0)
+        L: FloatArray = self.flows().mean(axis=0)
         return L

@@ -43,17 +43,21 @@ class Feature(ABC):
     def value(self) -> FloatArray:
         """Return s, (k,)."""
 
+    def flows(self) -> FloatArray:
+        """Return the velocity of each point under each unit twist of the camera, (M, 2, 6)."""
+        L: FloatArray = interaction_matrix_points(self.points, self.depth_m)
+        return L.reshape(-1, 2, 6)
+
     def interaction(self) -> FloatArray:
         """Return L (k, 6) with ṡ = L v_camera for a stationary target.
 
         Column i is the central difference of s as points and depths move under unit twist i. A
         subclass may override this with a closed form.
         """
-        flows = interaction_matrix_points(self.points, self.depth_m).T
         rates = depth_interaction(self.points, self.depth_m).T
         columns = [
-            self._change(flow.reshape(-1, 2), rate, _STEP_S)
-            for flow, rate in zip(flows, rates, strict=True)
+            self._change(flow, rate, _STEP_S)
+            for flow, rate in zip(np.moveaxis(self.flows(), 2, 0), rates, strict=True)
         ]
         return np.column_stack(columns)
 

@@ -6,7 +6,6 @@ from vergence.arrays import FloatArray
 from vergence.features._angles import wrapped
 from vergence.features._pairs import ends
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -44,8 +43,7 @@ class Lines(Feature):
         way = second - first
         length = np.linalg.norm(way, axis=1)[:, None]
         normal = np.column_stack((way[:, 1], -way[:, 0])) / length
-        rows: FloatArray = interaction_matrix_points(self.points, self.depth_m)
-        rows = rows.reshape(-1, 2, 2, 6)  # line, end, coordinate
+        rows = self.flows().reshape(-1, 2, 2, 6)  # line, end, coordinate
         across = np.einsum("lc,lecv->lev", normal, rows)
         turn = (across[:, 0] - across[:, 1]) / length
         along = np.sum(way / length * first, axis=1)[:, None]

@@ -21,7 +21,6 @@ from vergence.features._moments import (
     tilt_invariants,
 )
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 # Factor of ε. Its rate is about the tilt itself, so a law that believes a wrong depth gets even the
@@ -53,8 +52,7 @@ class Moments(Feature):
     def interaction(self) -> FloatArray:
         """Return L (7, 6): the derivatives of s as the points, or corners, move with the camera."""
         moments = self._moments()
-        flows = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
-        rates = self._rates(flows, moments)
+        rates = self._rates(moments)
         a_n, tilt = 1.0 / np.sqrt(moments.size), tilt_invariants(moments)
         orientation(self._name, moments.mu)  # refuses extents that are alike
         L = np.empty((7, 6))
@@ -76,8 +74,8 @@ class Moments(Feature):
     def _moments(self) -> CentralMoments:
         return moments_of_points(self._name, self.points)
 
-    def _rates(self, flows: FloatArray, moments: CentralMoments) -> MomentRates:
-        return rates_of_points(self.points, flows, moments)
+    def _rates(self, moments: CentralMoments) -> MomentRates:
+        return rates_of_points(self.points, self.flows(), moments)
 
 
 @as_part("feature", "region_moments")
@@ -90,5 +88,5 @@ class RegionMoments(Moments):
     def _moments(self) -> CentralMoments:
         return moments_of_polygon(self._name, self.points)
 
-    def _rates(self, flows: FloatArray, moments: CentralMoments) -> MomentRates:
-        return rates_of_polygon(self.points, flows, moments)
+    def _rates(self, moments: CentralMoments) -> MomentRates:
+        return rates_of_polygon(self.points, self.flows(), moments)

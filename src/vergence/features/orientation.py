@@ -7,7 +7,6 @@ from vergence.features._angles import wrapped
 from vergence.features._moment_rates import orientation_rate, rates_of_points
 from vergence.features._moments import moments_of_points, orientation
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -23,8 +22,7 @@ class Orientation(Feature):
         """Return L (1, 6), by the chain rule from those of the points."""
         moments = moments_of_points("", self.points)
         orientation("orientation", moments.mu)  # refuses extents that are alike
-        flows = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
-        rates = rates_of_points(self.points, flows, moments)
+        rates = rates_of_points(self.points, self.flows(), moments)
         return orientation_rate(moments.mu, rates.mu)[None]
 
     def error(self, desired: "Orientation") -> FloatArray:

@@ -24,6 +24,5 @@ class Points3d(Feature):
     def interaction(self) -> FloatArray:
         """Return L (3M, 6) by Ẋ = -v - ω × X."""
         X = self.value().reshape(-1, 3)
-        return np.concatenate((-np.tile(np.eye(3), (len(X), 1, 1)), skew_matrices(X)), 2).reshape(
-            -1, 6
-        )
+        moved = np.tile(-np.eye(3), (len(X), 1, 1))
+        return np.concatenate((moved, skew_matrices(X)), axis=2).reshape(-1, 6)

@@ -6,7 +6,6 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError
 from vergence.features._angles import wrapped
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -25,7 +24,7 @@ class PolarPoints(Feature):
 
     def interaction(self) -> FloatArray:
         """Return L (2M, 6): the rows of the points, along and across the ray from the centre."""
-        L = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
+        L = self.flows()
         rho = np.hypot(*self.points.T)
         if not rho.all():
             raise InputError("polar_points", "points", "one at the centre", "points off it")

@@ -6,7 +6,6 @@ from vergence.arrays import FloatArray
 from vergence.features._angles import wrapped
 from vergence.features._pairs import ends
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -28,8 +27,7 @@ class Segments(Feature):
     def interaction(self) -> FloatArray:
         """Return L (2M, 6) of [Chaumette1990], from the motion of the two ends of each segment."""
         first, second = ends("segments", self.points)
-        rows: FloatArray = interaction_matrix_points(self.points, self.depth_m)
-        rows = rows.reshape(-1, 2, 2, 6)  # segment, end, coordinate
+        rows = self.flows().reshape(-1, 2, 2, 6)  # segment, end, coordinate
         length = np.linalg.norm(second - first, axis=1)[:, None]
         c, s = np.split((second - first) / length, 2, axis=1)
         across, down = np.moveaxis(rows[:, 1] - rows[:, 0], 1, 0)

@@ -6,7 +6,6 @@ from vergence.arrays import FloatArray
 from vergence.features._moment_rates import rates_of_points
 from vergence.features._moments import moments_of_points
 from vergence.features.feature import Feature
-from vergence.features.interaction import interaction_matrix_points
 from vergence.parts import as_part
 
 
@@ -24,7 +23,6 @@ class Size(Feature):
     def interaction(self) -> FloatArray:
         """Return L (1, 6), by the chain rule from those of the points."""
         moments = moments_of_points("size", self.points)
-        flows = interaction_matrix_points(self.points, self.depth_m).reshape(-1, 2, 6)
-        rates = rates_of_points(self.points, flows, moments)
+        rates = rates_of_points(self.points, self.flows(), moments)
         L: FloatArray = -0.5 * moments.size**-1.5 * rates.size[None]
         return L
