@@ -13,11 +13,13 @@ from numba.core import event
 from vergence.app import heartbeat
 from vergence.app.compilations import Compilations
 from vergence.app.progress import bar, working
+from vergence.experiments.workers import Workers
 
 
 @pytest.fixture(autouse=True)
 def often(monkeypatch: pytest.MonkeyPatch) -> None:
     """A line every hundredth of a second, not every ten."""
+    monkeypatch.setattr(heartbeat, "FIRST_S", 0.01)
     monkeypatch.setattr(heartbeat, "PERIOD_S", 0.01)
 
 
@@ -45,7 +47,7 @@ def test_what_is_left_is_told_at_the_pace_of_the_whole(capsys: pytest.CaptureFix
         task = progress.add_task("runs", total=4000)
         time.sleep(0.2)
         for _ in range(2):  # two at once, after a wait
-            progress.advance(task)
+            progress.update(task, advance=1)
         wait_for("runs: 2 of 4000 runs, 0 s so far, ", capsys)
         time.sleep(0.05)
         words = capsys.readouterr().err.splitlines()[-1]
@@ -67,12 +69,43 @@ def test_what_compiling_takes_does_not_count_in_the_pace(
         assert beside.count == 1
         assert not beside.under_way
         time.sleep(0.05)
-        progress.advance(task)
+        progress.update(task, advance=1)
         left_s = float(progress.rest(progress.tasks[0]).removesuffix(" s left"))
         assert left_s < 1.0 + 999.0 * (progress.tasks[0].elapsed - beside.spent_s)
         progress.begin()
+        progress.update(task, advance=1)
         from_here_s = float(progress.rest(progress.tasks[0]).removesuffix(" s left"))
         assert from_here_s < left_s
+
+
+def test_an_estimate_counts_down_until_the_next_step_makes_a_new_one() -> None:
+    with bar("") as progress:
+        task = progress.add_task("runs", total=2)
+        time.sleep(1.0)
+        progress.update(task, advance=1)
+        first = progress.rest(progress.tasks[0])
+        time.sleep(0.6)
+        later = progress.rest(progress.tasks[0])
+        assert (first, later) == ("1 s left", "0 s left")
+        time.sleep(0.6)
+        assert progress.rest(progress.tasks[0]) == "takes longer than estimated"
+
+
+def compile_twice(_: int) -> None:
+    kernel = njit(lambda x: x + 1)
+    kernel(1)
+    kernel(1.0)
+    time.sleep(0.05)
+
+
+def test_what_workers_compile_is_told_and_does_not_count_in_the_pace() -> None:
+    with bar("") as progress, Workers(2) as workers:
+        progress.add_task("runs", total=4)
+        assert len(list(workers.share_out(compile_twice, range(4)))) == 4
+        words = progress._compilations
+        assert words.words().endswith("usually within two minutes: 1 so far in the workers")
+        assert words.spent_s > 0.0
+        assert not words.under_way
 
 
 def test_compilation_is_told_while_it_lasts(capsys: pytest.CaptureFixture[str]) -> None:

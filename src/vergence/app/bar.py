@@ -4,7 +4,7 @@ import sys
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TextColumn
 from rich.text import Text
 
 from vergence.app.compilations import Compilations
@@ -12,11 +12,12 @@ from vergence.app.heartbeat import Heartbeat
 
 
 class Bar(Progress):
-    """A progress bar on stderr; where that is no terminal, a line every ten seconds.
+    """A progress bar on stderr; where that is no terminal, a line after a second, then every ten.
 
     What compiling takes, and what came before `begin`, does not count in the pace by which the
-    time that is left is estimated. Rich's own estimate is the pace of the newest steps, which may
-    have come all at once.
+    time that is left is estimated. Each step that is done makes a new estimate; until the next it
+    counts down. Rich's own estimate is the pace of the newest steps, which may have come all at
+    once.
 
     Args:
         words: the text beside the bar, as rich's `TextColumn` formats it.
@@ -24,6 +25,7 @@ class Bar(Progress):
 
     def __init__(self, words: str) -> None:
         self._words, self._set_up_s = words, 0.0
+        self._expected_s: dict[TaskID, float] = {}  # how long a task will have taken
         self._compilations = Compilations()
         self._heartbeat = Heartbeat(lambda: "\n".join(map(self._line, self.tasks)))
         super().__init__(
@@ -53,14 +55,26 @@ class Bar(Progress):
         elapsed = max(task.elapsed or 0.0 for task in self.tasks)
         self._set_up_s = elapsed - self._compilations.spent_s
 
+    def update(self, task_id: TaskID, **changes: Any) -> None:
+        """Note how far a task is, as rich does, and how long it will take at this pace."""
+        with self._lock:
+            before = self._tasks[task_id].completed
+            super().update(task_id, **changes)
+            task = self._tasks[task_id]
+            if task.total and task.completed > before:
+                self._expected_s[task_id] = self._worked_s(task) * task.total / task.completed
+
     def rest(self, task: Any) -> str:
         """Return what is waited for: kernels, or so many seconds; empty before anything is done."""
         if self._compilations.under_way:
             return self._compilations.words()
-        if not task.completed or not task.total:
+        if task.id not in self._expected_s:
             return ""
-        worked_s = max(task.elapsed - self._set_up_s - self._compilations.spent_s, 0.0)
-        return f"{worked_s * (task.total / task.completed - 1.0):.0f} s left"
+        left_s = self._expected_s[task.id] - self._worked_s(task)
+        return f"{left_s:.0f} s left" if left_s > 0.0 else "takes longer than estimated"
+
+    def _worked_s(self, task: Any) -> float:
+        return max((task.elapsed or 0.0) - self._set_up_s - self._compilations.spent_s, 0.0)
 
     def _line(self, task: Any) -> str:
         told = (self._words.format(task=task), f"{task.elapsed:.0f} s so far", self.rest(task))

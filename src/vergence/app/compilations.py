@@ -6,13 +6,14 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
-from vergence.kernels.compiled import is_kept
+from vergence.kernels.compiled import COMPILED_IN_WORKER, is_kept
 
-COMPILING = "compiling kernels, once on this computer"
+COMPILING, USUALLY = "compiling kernels, once on this computer", "usually within two minutes"
+_KINDS = ("numba:compile", COMPILED_IN_WORKER)
 
 
 class Compilations:
-    """Tells each time a kernel is compiled how far that is.
+    """Tells each time a kernel is compiled, here or in a worker process, how far that is.
 
     Args:
         told: is called with it in words.
@@ -27,11 +28,15 @@ class Compilations:
 
             def __init__(self, words: Callable[[], str]) -> None:
                 self.words = words
+                self.in_workers: set[str] = set()  # names: several may compile the same
 
             def on_start(self, begun: Any) -> None:
                 self.began = self.began if self.nested else time.perf_counter()
                 self.nested += 1
-                self.count += 1
+                if begun.kind == COMPILED_IN_WORKER:
+                    self.in_workers.add(begun.data)
+                else:
+                    self.count += 1
                 if told is not None:
                     told(self.words())
 
@@ -44,7 +49,7 @@ class Compilations:
 
     @property
     def count(self) -> int:
-        """How many kernels have been compiled or are at the moment."""
+        """How many kernels have been compiled or are at the moment, by this process."""
         return self._listener.count
 
     @property
@@ -64,13 +69,15 @@ class Compilations:
 
         Every kernel of the imported modules that is not kept may have to be compiled. Which of them
         a run calls is not known before it calls them, so there may be far fewer: of the first run
-        on a computer a good third.
+        on a computer a good third. What worker processes import is not known here.
         """
-        most = self.count + _not_compiled()
-        return f"{COMPILING}, usually within two minutes: {self.count} of at most {most}"
+        if self._listener.in_workers:
+            return f"{COMPILING}, {USUALLY}: {len(self._listener.in_workers)} so far in the workers"
+        return f"{COMPILING}, {USUALLY}: {self.count} of at most {self.count + _not_compiled()}"
 
     def __enter__(self) -> Self:
-        self._event.register("numba:compile", self._listener)
+        for kind in _KINDS:
+            self._event.register(kind, self._listener)
         return self
 
     def __exit__(
@@ -79,7 +86,8 @@ class Compilations:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._event.unregister("numba:compile", self._listener)
+        for heard in _KINDS:
+            self._event.unregister(heard, self._listener)
 
 
 def _not_compiled() -> int:

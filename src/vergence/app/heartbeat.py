@@ -1,4 +1,4 @@
-"""Progress where no terminal shows it: a line on stderr every ten seconds."""
+"""Progress where no terminal shows it: a line on stderr after a second, then every ten."""
 
 import sys
 import threading
@@ -6,11 +6,13 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-PERIOD_S = 10.0
+FIRST_S, PERIOD_S = 1.0, 10.0
 
 
 class Heartbeat:
-    """Writes a line every ten seconds until it is stopped; nothing if stderr is a terminal.
+    """Writes a line after a second and then every ten until it is stopped.
+
+    It writes nothing if stderr is a terminal.
 
     Args:
         line: what there is to say at the moment; called in a thread of its own.
@@ -43,5 +45,7 @@ class Heartbeat:
         self.stop()
 
     def _beat(self) -> None:
-        while not self._ended.wait(PERIOD_S):
+        wait_s = FIRST_S
+        while not self._ended.wait(wait_s):
             print(self._line(), file=sys.stderr, flush=True)
+            wait_s = PERIOD_S

@@ -83,26 +83,30 @@ class Workers:
                 while waiting and len(busy) < self.count:
                     occupy(self._idle.pop() if self._idle else Worker.start())
                 for connection in wait(list(busy)):
-                    worker = busy.pop(connection)
+                    worker = busy[connection]
                     number = worker.number
                     try:
-                        error, result, cpu_s = worker.connection.recv()
+                        done = worker.answer()
                     except (EOFError, OSError):
+                        del busy[connection]
                         worker.end()
                         deaths[number] += 1
                         if deaths[number] == DEATHS:
                             raise DeadlyTaskError(number) from None
                         waiting.appendleft(number)
                         continue
-                    if waiting and error is None:
+                    if done is None:
+                        continue
+                    del busy[connection]
+                    if waiting and done.error is None:
                         occupy(worker)
                     else:
                         self._idle.append(worker)
                     if spent is not None:
-                        spent(cpu_s)
-                    if error is not None:
-                        raise error
-                    yield number, result
+                        spent(done.cpu_s)
+                    if done.error is not None:
+                        raise done.error
+                    yield number, done.result
         finally:
             for worker in busy.values():
                 worker.process.terminate()

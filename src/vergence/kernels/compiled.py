@@ -6,6 +6,10 @@ numba has no public question for this; the answers come from its cache, as its d
 from pathlib import Path
 from typing import Any
 
+COMPILED_IN_WORKER = (
+    "vergence:compile"  # kind of event, by name: a worker process compiles a kernel
+)
+
 
 def is_kept(kernel: Any) -> bool:
     """Return whether numba keeps a kernel on this computer, for whatever arguments.

@@ -48,7 +48,7 @@ def read_dataset(folder: Path, board: Board | None, poses: Path | None) -> Datas
     progress = bar("{task.completed} / {task.total}")
     task = progress.add_task("find the board", total=len(names))
     with progress:
-        images = find_board(folder, board, lambda count: progress.advance(task, count))
+        images = find_board(folder, board, lambda count: progress.update(task, advance=count))
     found = [seen for seen in images.sightings if arm is None or seen.name in arm]
     without = [s.name for s in images.sightings if arm is not None and s.name not in arm]
     reason = f"no pose of the arm in {poses}"

@@ -246,7 +246,7 @@ def make_data(
                 sightings.append(studio.corners(name, noise_px))
             else:
                 cv2.imwrite(str(folder / name), studio.film(renderer, studio.noise_grey))
-            progress.advance(task)
+            progress.update(task, advance=1)
     if folder is not None and renderer is not None:
         renderer.close()
         write_poses(folder / "poses.csv", poses)
