@@ -48,7 +48,8 @@ class InputError(VergenceError, ValueError):
 def _told(given: object, allowed: str) -> str:
     """Return what is wrong."""
     if not isinstance(given, Absent):
-        return f"given {echo(given)}; allowed: {allowed}"
+        shown = echo(given) or "an empty text"
+        return f"given {shown}; allowed: {allowed}"
     return f"{'missing' if given == NOTHING else echo(given)}; needed: {allowed}"
 
 

@@ -151,16 +151,28 @@ def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: o
         (["bench", "contrl"], "did you mean control?"),
         (["plan", "gantry", "--planner", "potential"], "did you mean potential_field?"),
         (["map", "puma560", "--over", "heading"], "did you mean headings?"),
-        (["map", "puma560", "--extent", "0"], "above zero"),
-        (["map", "puma560", "--speeds", "nan"], "above zero"),
+        (["map", "puma560", "--extent", "0"], "--extent: given 0.0; allowed: above 0 and up to"),
+        (["map", "puma560", "--extent", "1e6"], "--extent: given 1000000.0; allowed: above 0"),
+        (["map", "puma560", "--speeds", "nan"], "--speeds: given nan; allowed: above 0 and up to"),
+        (["map", "puma560", "--speeds", "0.1,1e300"], "--speeds: given 0.1,1e300; allowed: above"),
+        (["map", "puma560", "--speeds", "1e-300"], "--speeds: given 1e-300; allowed: from 8e-06"),
+        (["map", "puma560", "--speeds", "fast"], "--speeds: given fast; allowed: numbers"),
         (["calibrate", "--synthetic", "puma560", "--lens", "k1k3"], "did you mean k1k2?"),
         (["run", "puma560", "--set", "law.Q=abc"], "law.Q: given abc; allowed: a number"),
         (["calibrate", "nowhere"], "nowhere: no such folder; needed: a folder of images"),
         (["run", sys.executable], "not TOML"),
         (["goal", "ur5", "--out", "goal"], "--out: given goal; allowed: a file name that ends in"),
-        (["run", "puma560", "--out", sys.executable], "given a file; allowed: a folder"),
+        (["run", "puma560", "--out", sys.executable], "which is a file; allowed: a folder"),
+        (["new", "arm.urdf", "--out", sys.executable], "--out: given"),
+        (["map", "puma560", "--out", sys.executable], "--out: given"),
         (["run", "puma560", "--out", "/proc/none"], "no such file or folder; needed: one that"),
-        (["run", "ur5", "--goal", "."], "given a folder; allowed: a file"),
+        (["run", "ur5", "--goal", "."], "--goal: given .; allowed: an image file"),
+        (["run", "ur5", "--goal", sys.executable], "cannot be read; allowed: a whole image file"),
+        (["run", "ur5", "--goal", "g.png"], "--goal: given g.png; allowed: an image file that"),
+        (["run", "ur5", "--points", ""], "--points: given an empty text; allowed: pixels"),
+        (["run", "ur5", "--points", "9,9 -5,-5"], "inside the image of 640 x 480"),
+        (["reproduce", "honesty", "--imaging", "real"], "--imaging: given real; allowed"),
+        (["watch", "ur5", "--host", ""], "--host: given an empty text; allowed: 127.0.0.1"),
         (["plan", "gantry", "--planner", "none"], "vergence plan: --planner: given none; "),
     ],
 )
@@ -175,12 +187,28 @@ def test_a_mistake_is_one_message_and_exit_code_two(
     assert written.out == ""
 
 
-def test_a_driver_without_address_is_told_before_the_rehearsal(
-    command: Command, capsys: object, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["run", "watch"])
+@pytest.mark.parametrize(
+    ("driver", "words"),
+    [
+        ("ur", "ur:ADDRESS"),
+        ("none", "--driver: given none; allowed: franka"),
+        ("socket:localhost:99999", "given localhost:99999; allowed: HOST:PORT"),
+        ("ros2:no/python", "given no/python, which does not run"),
+        (f"ros2:{sys.executable}", "which has no rclpy"),
+    ],
+)
+def test_a_driver_that_cannot_be_opened_is_told_before_the_rehearsal(
+    command: Command,
+    capsys: object,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    driver: str,
+    words: str,
 ) -> None:
     monkeypatch.setattr("vergence.assembly.rehearse", lambda cell: pytest.fail("rehearsed"))
-    assert command("run", "ur5", "--driver", "ur") == 2
-    assert "ur:ADDRESS" in capsys.readouterr().err
+    assert command(name, "ur5", "--driver", driver) == 2
+    assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -164,6 +164,9 @@ def test_a_region_is_mapped_to_an_image_and_a_table(
     [
         (["compare", "puma560", "--laws", ","], "--laws"),
         (["compare", "puma560", "--laws", "imagebased"], "did you mean image_based"),
+        (["compare", "puma560", "--laws", "nope"], "vergence: --laws: given nope; allowed: "),
+        (["compare", "puma560", "--vary", "nope"], "vergence: --vary: given nope; allowed: "),
+        (["map", "gantry", "--over", "headings"], "vergence: --over: given headings, but the task"),
         (["map", "puma560", "--over", "starts"], "headings, places"),
         (["map", "puma560", "--speeds", "0,1"], "--speeds"),
         (["map", "no_such_cell"], "a built-in cell"),

@@ -25,6 +25,8 @@ from vergence.app.options import (
     RunOptions,
     TrackOptions,
     WatchOptions,
+    as_typed,
+    folder_to_write,
     takes,
 )
 from vergence.app.output import BAD_INPUT, SUCCESS, emit, say, warn
@@ -183,7 +185,10 @@ def export(
         typer.Argument(help="A run folder, or its recording.", autocompletion=names.recordings),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the bag. Default: bag, beside the recording.")
+        Path | None,
+        typer.Option(
+            help="Folder of the bag. Default: bag, beside the recording.", callback=folder_to_write
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -246,7 +251,8 @@ def reproduce(
     """Repeat a paper's experiments, with figures and a table of its claims and our results."""
     from vergence.app.reproduce import reproduce as command
 
-    raise typer.Exit(command(paper, quick, seed, seeds, imaging, out, as_json))
+    with as_typed({"imaging": "--imaging"}):
+        raise typer.Exit(command(paper, quick, seed, seeds, imaging, out, as_json))
 
 
 @app.command(

@@ -1,6 +1,5 @@
 """`vergence map`: where, how far and how fast a cell's law follows the target."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,7 +16,6 @@ from vergence.app.campaign import (
     write_table,
 )
 from vergence.app.output import SUCCESS, emit, say
-from vergence.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -68,17 +66,7 @@ def map_region(options: "MapOptions") -> int:
 
 def _region(options: "MapOptions") -> Region:
     laws = names_in("--laws", options.laws)
-    return Region(options.over, options.extent, options.steps, _speeds(options.speeds), laws)
-
-
-def _speeds(text: str) -> tuple[float, ...]:
-    try:
-        speeds = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        speeds = ()
-    if not speeds or not all(0 < speed < math.inf for speed in speeds):
-        raise InputError("--speeds", "", text, "numbers above zero, separated by commas, in m/s")
-    return speeds
+    return Region(options.over, options.extent, options.steps, options.speeds_m_s, laws)
 
 
 def _as_json(score: "Score") -> dict[str, object]:

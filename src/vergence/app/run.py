@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vergence.app.output import FAILURE, SUCCESS, emit, run_folder, say, warn
 from vergence.errors import InputError
 from vergence.places import RECORDING
@@ -44,12 +46,19 @@ def _loaded(options: "RunOptions") -> "Cell":
         raise InputError("--points", "", options.points, allowed)
     if options.goal is not None:
         from vergence.assembly import with_goal
+        from vergence.camera.image_file import read_image_file
 
+        if not options.goal.is_file():
+            raise InputError("--goal", "", options.goal, "an image file that exists")
+        read_image_file(options.goal)
+        if not options.images:
+            allowed = "only with images: the goal is recognised in them"
+            raise InputError("--goal", "", f"{options.goal} and --no-images", allowed)
         return with_goal(cell, options.goal)
     if options.points is not None:
         from vergence.assembly import with_points
 
-        return with_points(cell, _pixels(options.points))
+        return with_points(cell, _pixels(cell, options.points))
     return cell
 
 
@@ -79,13 +88,20 @@ def overrides(settings: Sequence[str] | None) -> dict[str, str]:
     return pairs
 
 
-def _pixels(text: str) -> list[tuple[float, float]]:
-    """Read points given as ``u,v u,v``."""
+def _pixels(cell: "Cell", text: str) -> list[tuple[float, float]]:
+    """Read points of the task's camera given as ``u,v u,v``."""
+    from vergence.simulation.build import intrinsics
+
+    camera = intrinsics(cell.cameras[cell.task.camera])
     try:
         pairs = [tuple(float(number) for number in pair.split(",")) for pair in text.split()]
-        return [(u, v) for u, v in pairs]
+        points = [(u, v) for u, v in pairs]
     except ValueError:
-        raise InputError("--points", "", text, "pixels as u,v u,v") from None
+        points = []
+    if not points or not camera.contains(np.array(points)).all():
+        allowed = f'pixels as "u,v u,v", inside the image of {camera.width} x {camera.height}'
+        raise InputError("--points", "", text, allowed)
+    return points
 
 
 def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | None = None) -> "Run":

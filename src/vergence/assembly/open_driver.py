@@ -57,7 +57,9 @@ def check_driver(cell: Cell, named: str) -> None:
     cls = find("driver", kind, folder=_folder(cell, kind), source="--driver", key="")
     settings, place = _settings(cell, kind)
     if hasattr(cls, "open"):
-        _made(cls, kind, settings | ({"address": address} if address else {}), place)
+        made = _made(cls, kind, settings | ({"address": address} if address else {}), place)
+        if hasattr(made, "check"):
+            made.check(str(cell.path))
     if package := getattr(cls, "package", None):
         optional_package(kind, *package)
     _sources(cell)

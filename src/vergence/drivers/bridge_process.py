@@ -23,6 +23,31 @@ _END_S = 5.0  # for the bridge to end in order, such as to brake an arm
 _CRASH_S = 0.5  # for the system to clear up after a process that has hung up already
 
 
+def check_python(python: str, module: str, place: tuple[str, str], install: str) -> None:
+    """Refuse an interpreter that does not run or has no such module, which is not imported.
+
+    Args:
+        python: the interpreter.
+        module: which the bridge needs.
+        place: source and key of the interpreter, for messages.
+        install: which Python has it, for messages.
+
+    Raises:
+        InputError: if it cannot run the bridge.
+    """
+    program = "import sys, importlib.util as i; sys.exit(i.find_spec(sys.argv[1]) is None)"
+    arguments = [str(Path(python).expanduser()), "-c", program, module]
+    try:
+        ended = subprocess.run(arguments, capture_output=True, timeout=_START_S, check=False)
+        fault = f"has no {module}" if ended.returncode else ""
+    except OSError as error:
+        fault = f"does not run ({error.strerror})"
+    except subprocess.TimeoutExpired:
+        fault = "does not start"
+    if fault:
+        raise InputError(*place, f"{python}, which {fault}", install)
+
+
 class BridgeProgram(NamedTuple):
     """A program of `vergence.drivers.bridges`."""
 

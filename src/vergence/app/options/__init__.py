@@ -17,8 +17,9 @@ from vergence.app.options.shared import (
     Overwrite,
     Seed,
     Settings,
+    folder_to_write,
 )
-from vergence.app.options.takes import takes
+from vergence.app.options.takes import as_typed, takes
 from vergence.app.options.track import TrackOptions
 from vergence.app.options.watch import WatchOptions
 
@@ -43,5 +44,7 @@ __all__ = [
     "Settings",
     "TrackOptions",
     "WatchOptions",
+    "as_typed",
+    "folder_to_write",
     "takes",
 ]

@@ -8,8 +8,11 @@ from typing import Annotated
 import typer
 
 from vergence.app import names
-from vergence.app.options.shared import CellName, Json, Settings
+from vergence.app.options.shared import CellName, Json, Settings, folder_to_write
 from vergence.errors import InputError, nearest
+
+# What a cell can say of a target that moves along a line.
+_FARTHEST_M, _FASTEST_M_S, _LONGEST_S = 500.0, 1000.0, 86_000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +30,9 @@ class CampaignOptions:
     ] = None
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Number of processes on this machine. Default: one per core."),
+        typer.Option(
+            min=1, max=1024, help="Number of processes on this machine. Default: one per core."
+        ),
     ] = None
     scheduler: Annotated[
         str | None,
@@ -43,7 +48,8 @@ class CampaignOptions:
         Path | None,
         typer.Option(
             help="Folder to write to, instead of runs/NAME-TIME. Runs already in it are "
-            "not repeated."
+            "not repeated.",
+            callback=folder_to_write,
         ),
     ] = None
     settings: Settings = None
@@ -63,7 +69,9 @@ class CompareOptions(CampaignOptions):
             autocompletion=names.laws,
         ),
     ] = None
-    starts: Annotated[int, typer.Option(min=1, help="Number of starts for each law.")] = 20
+    starts: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Number of starts for each law.")
+    ] = 20
     vary: Annotated[
         str,
         typer.Option(
@@ -81,7 +89,8 @@ class CompareOptions(CampaignOptions):
         ),
     ] = 0.2
     speed: Annotated[
-        float, typer.Option(min=0.0, help="Highest speed of the random motions, in m/s.")
+        float,
+        typer.Option(min=0.0, max=1000.0, help="Highest speed of the random motions, in m/s."),
     ] = 0.1
 
 
@@ -101,7 +110,10 @@ class MapOptions(CampaignOptions):
         typer.Option(min=0.0, help="Half the side of the square, or the length of the path, in m."),
     ] = 0.5
     steps: Annotated[
-        int, typer.Option(min=2, help="Number of points along a side, or number of directions.")
+        int,
+        typer.Option(
+            min=2, max=1000, help="Number of points along a side, or number of directions."
+        ),
     ] = 11
     speeds: Annotated[
         str,
@@ -118,5 +130,26 @@ class MapOptions(CampaignOptions):
         """Raise InputError if a value is not among those allowed."""
         if self.over not in names.OVER:
             raise InputError("--over", "", self.over, nearest(self.over, names.OVER))
-        if not 0 < self.extent < math.inf:
-            raise InputError("--extent", "", self.extent, "above zero, in m")
+        if not 0 < self.extent <= _FARTHEST_M:
+            raise InputError("--extent", "", self.extent, f"above 0 and up to {_FARTHEST_M:g} m")
+        if not all(0 < speed <= _FASTEST_M_S for speed in self.speeds_m_s):
+            allowed = f"above 0 and up to {_FASTEST_M_S:g} m/s, separated by commas"
+            raise InputError("--speeds", "", self.speeds, allowed)
+        slowest = math.sqrt(2.0) * self.extent / _LONGEST_S
+        if min(self.speeds_m_s) < slowest:
+            allowed = f"from {slowest:.1g} m/s on, to cover {self.extent:g} m within a day"
+            raise InputError("--speeds", "", self.speeds, allowed)
+
+    @property
+    def speeds_m_s(self) -> tuple[float, ...]:
+        """The speeds of the target.
+
+        Raises:
+            InputError: if they are no numbers.
+        """
+        try:
+            return tuple(float(word) for word in self.speeds.split(","))
+        except ValueError:
+            raise InputError(
+                "--speeds", "", self.speeds, "numbers separated by commas, in m/s"
+            ) from None

@@ -25,7 +25,9 @@ class GoalOptions:
     distance_m: Annotated[
         float | None,
         typer.Option(
-            help="Approximate distance from camera to object, in metres, if known.", min=1e-6
+            help="Approximate distance from camera to object, in metres, if known.",
+            min=1e-6,
+            max=1e3,
         ),
     ] = None
     settings: Settings = None

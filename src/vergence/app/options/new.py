@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vergence.app.options.shared import Json
+from vergence.app.options.shared import Json, folder_to_write
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,10 @@ class NewOptions:
         ),
     ] = ""
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write to. Default: the model's name.")
+        Path | None,
+        typer.Option(
+            help="Folder to write to. Default: the model's name.", callback=folder_to_write
+        ),
     ] = None
     camera: Annotated[
         Path | None, typer.Option(help="Camera file with the lens, as `calibrate` writes it.")

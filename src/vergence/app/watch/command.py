@@ -114,11 +114,12 @@ def _watch_robot(options: "WatchOptions", settings: Mapping[str, str]) -> Mappin
     from vergence.app.progress import working
     from vergence.app.watch.live_robot import LiveRobot
     from vergence.app.watch.server import listen
-    from vergence.assembly import open_driver, rehearse, servo_lag_s
+    from vergence.assembly import check_driver, open_driver, rehearse, servo_lag_s
     from vergence.cell import load_cell
 
     named = str(options.driver)
     cell = load_cell(options.source, settings, options.seed)
+    check_driver(cell, named)
     out = run_folder(options.out, options.overwrite, cell.name)
     with listen(options.host, options.port) as listener:
         with working("rehearsing in simulation"):

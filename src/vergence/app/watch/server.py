@@ -144,6 +144,9 @@ def listen(host: str, port: int | None) -> socket.socket:
     Raises:
         InputError: if it cannot be had.
     """
+    allowed = "127.0.0.1, or another address of this machine"
+    if not host:  # which would mean every address
+        raise InputError("vergence watch", "--host", host, allowed)
     ports = range(DEFAULT_PORT, DEFAULT_PORT + _OTHERS) if port is None else (port,)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in ports:
@@ -151,7 +154,6 @@ def listen(host: str, port: int | None) -> socket.socket:
             return socket.create_server((host, number), family=family)
         except (OSError, UnicodeError) as error:
             if getattr(error, "errno", None) not in (errno.EADDRINUSE, errno.EACCES):
-                allowed = "127.0.0.1, or another address of this machine"
                 raise InputError("vergence watch", "--host", host, allowed) from None
     given = f"{ports[0]} … {ports[-1]}" if port is None else port
     raise InputError("vergence watch", "--port", given, "a port that is free and that you may use")

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from vergence.camera import Camera
 from vergence.camera.encodings import PIXEL_BYTES
 from vergence.drivers import bridges
-from vergence.drivers.bridge_process import BridgeProcess, BridgeProgram
+from vergence.drivers.bridge_process import BridgeProcess, BridgeProgram, check_python
 from vergence.drivers.equipment import Equipment
 from vergence.drivers.ros2.camera_info import check_image, check_info
 from vergence.drivers.ros2.ros2_driver import Ros2Driver
@@ -62,6 +62,14 @@ class Ros2:
     # Time without joint states after which the robot counts as silent.
     timeout_s: float = knob(0.5, "s", above=0.0, upto=10.0)
     connect_s: float = knob(10.0, "s", above=0.0, upto=600.0)  # time to wait for topics to start
+
+    def check(self, source: str) -> None:
+        """Refuse a Python without rclpy.
+
+        Args:
+            source: the cell file, for messages.
+        """
+        check_python(self.address, "rclpy", (source, "driver.address"), _INSTALL)
 
     def open(self, equipment: Equipment) -> Driver:
         """Start the bridge and wait for the robot's topics; nothing moves before a set-point."""

@@ -19,12 +19,14 @@ class SocketRobot:
     timeout_s: float = knob(2.0, "s", above=0.0, upto=60.0)
     connect_s: float = knob(30.0, "s", above=0.0, upto=600.0)  # time to wait for the robot to start
 
+    def __post_init__(self) -> None:
+        """Refuse an address without a port."""
+        port = self.address.rpartition(":")[2]
+        if not port.isdecimal() or not 0 < int(port) < 1 << 16:
+            raise InputError("", "address", self.address, "HOST:PORT, such as localhost:5007")
+
     def open(self, equipment: Equipment) -> Driver:
         """Connect to the robot, whose rate is the cell's `inner_rate_hz`."""
         host, _, port = self.address.rpartition(":")
-        if not port.isdecimal() or not 0 < int(port) < 1 << 16:
-            raise InputError(
-                "--driver", "address", self.address, "HOST:PORT, such as localhost:5007"
-            )
         link = connect((host or "localhost", int(port)), _LONGEST, self.connect_s)
         return SocketDriver(link, equipment, self.timeout_s)
