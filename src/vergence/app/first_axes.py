@@ -19,7 +19,7 @@ _MIDDLE = 0.25  # of the image's width and height, from its centre: features are
 
 
 def poorly_measured(draft: "Draft", camera: "Camera") -> str:
-    """Return in words which directions of the camera four features hardly tell of; empty if none.
+    """Return in words which directions of the camera four features hardly show; empty if none.
 
     The features are as far apart as the target and the middle of the image, from which they are
     picked, allow. Their flow in the image tells which, as in [Nelson1995] section 2.2.
@@ -40,8 +40,8 @@ def poorly_measured(draft: "Draft", camera: "Camera") -> str:
     shift_mm = 1e3 * draft.distance_m * float(np.linalg.norm(worst[:3])) / rate_px
     turn_deg = float(np.rad2deg(np.linalg.norm(worst[3:]))) / rate_px
     return (
-        f"four features tell little of {_words(found.directions[poor])} (the camera's axes): "
-        f"1 px there is {shift_mm:.2g} mm and {turn_deg:.2g}°"
+        f"four features hardly show {_words(found.directions[poor])} (the camera's axes): "
+        f"an error of 1 px there is {shift_mm:.2g} mm and {turn_deg:.2g}°"
     )
 
 
@@ -76,4 +76,4 @@ def _words(poor: FloatArray) -> str:
 def _combined(names: list[str]) -> str:
     """Name motions that are made together."""
     first, *others = names
-    return f"{first} with {' and '.join(others)}" if others else first
+    return f"{first} combined with {' and '.join(others)}" if others else first
