@@ -1,6 +1,7 @@
 """Your own robot behind the driver protocol: vergence run CELL --driver my_robot:MyRobot
 
-Here a simulated cell stands for the controller and the cameras; put calls of your own in its place.
+Here a simulated cell takes the place of the controller and the cameras; replace it by your own
+calls.
 """
 
 import vergence as vg
@@ -21,11 +22,11 @@ class MyRobot(vg.Driver):
         return self._controller.read()
 
     def step(self, setpoints: dict[str, vg.Setpoint]) -> None:
-        """Hand set-points on, and return at the next inner tick."""
+        """Pass set-points on, and return at the next inner tick."""
         self._controller.step(setpoints)
 
     def close(self) -> None:
-        """Let go of the robot."""
+        """Release the robot."""
         self._controller.close()
 
 

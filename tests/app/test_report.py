@@ -10,6 +10,7 @@ import made_up_run
 import numpy as np
 import pytest
 
+from vergence.app import markup
 from vergence.app.report import make_report, report, write_report
 from vergence.app.table import arm_rows, camera_rows, constraint_rows, run_rows
 from vergence.errors import InputError
@@ -161,3 +162,9 @@ def test_a_report_can_be_made_where_the_run_was_moved(run_folder: Path, tmp_path
 def test_no_report_without_a_recording(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"recording\.mcap"):
         write_report(tmp_path)
+
+
+def test_an_arm_that_is_called_arm_is_no_arm_arm() -> None:
+    assert markup.titled("Arm", "puma") == "Arm puma"
+    assert markup.titled("Arm", "arm") == "Arm"
+    assert markup.titled("Camera", "camera") == "Camera"

@@ -69,6 +69,19 @@ def test_no_text_of_a_chart_is_cut_off_in_the_browser(browser: Browser) -> None:
     assert outside == []
 
 
+@pytest.mark.parametrize("width", [420, 700, 1280])
+def test_what_explains_a_number_has_a_line_of_its_own(browser: Browser, width: int) -> None:
+    browser.resize(width)
+    try:
+        shares = browser.value(
+            "[...document.querySelectorAll('.card .note:not(:empty)')]"
+            ".map((note) => note.clientWidth / note.closest('.card').clientWidth)"
+        )
+        assert min(shares) > 0.9
+    finally:
+        browser.resize(1000)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itself(
     browser: Browser, scheme: str

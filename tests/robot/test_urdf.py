@@ -66,6 +66,24 @@ def robots() -> list[Path]:
     return sorted(known.parents[2].rglob("*.urdf"))
 
 
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("ur5_robot.urd", "but no file of example-robot-data ends with that.*mean ur5_robot.urdf"),
+        ("urdf/ur5.urdf", "but no file of .* ends with that; .*TwoDofs.urdf, .*did you mean ur3"),
+        (
+            "README.md",
+            r"which \d+ files of .* end with; allowed: more of the path of one of them: ",
+        ),
+    ],
+)
+def test_a_file_that_a_package_does_not_have_is_refused_with_those_that_it_has(
+    path: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        locate_model(Path(f"package:example-robot-data/{path}"), Path(), "cell.toml", "model")
+
+
 @pytest.mark.parametrize("path", robots(), ids=lambda path: path.stem)
 def test_every_robot_at_hand_is_read_or_refused_with_the_reason(path: Path) -> None:
     urdf = Urdf(path)

@@ -150,6 +150,11 @@ def film(frames: Sequence[MarkedImage], name: str, caption: str) -> str:
     )
 
 
+def titled(kind: str, name: str) -> str:
+    """Return what a camera or an arm is called in a heading: "Arm puma", "Arm" if it is "arm"."""
+    return kind if name == kind.lower() else f"{kind} {name}"
+
+
 def table(title: str, rows: Sequence[Row]) -> str:
     """Return rows as a table under a title; empty without rows."""
     if not rows:

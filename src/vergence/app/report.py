@@ -118,9 +118,9 @@ def _header(run: Run) -> str:
 def _summary(run: Run) -> str:
     tables = [markup.table("Run", run_rows(run)), markup.table("Tasks", task_rows(run))]
     for name, camera in run.cameras.items():
-        tables.append(markup.table(f"Camera {name}", camera_rows(camera)))
+        tables.append(markup.table(markup.titled("Camera", name), camera_rows(camera)))
     for name, arm in run.arms.items():
-        tables.append(markup.table(f"Arm {name}", arm_rows(run.info.arms[name], arm)))
+        tables.append(markup.table(markup.titled("Arm", name), arm_rows(run.info.arms[name], arm)))
         tables.append(
             markup.table(f"Limits that shaped the motion of {name}", constraint_rows(arm))
         )
@@ -138,7 +138,7 @@ def _camera(run: Run, name: str) -> str:
         f"Feature trajectories in the image, {size.width} × {size.height} px.",
     )
     return markup.section(
-        f"Camera {name}",
+        markup.titled("Camera", name),
         markup.beside(film, robot),
         markup.beside(paths, key_frames),
         _chart(run, error_chart(trace), "Feature error over time."),
@@ -207,7 +207,7 @@ def _arm(run: Run, name: str) -> str:
         "the fixed camera as seen from the end effector" if fixed else "the camera in its own frame"
     )
     return markup.section(
-        f"Arm {name}",
+        markup.titled("Arm", name),
         _chart(run, joints_chart(arm, trace), "Joint positions and rates against their limits."),
         _chart(
             run,

@@ -92,10 +92,10 @@ def _summary(runs: Runs, cameras: Sequence[str], arms: Sequence[str]) -> str:
         tables.append(_table("Tasks", runs, tasks))
     for name in cameras:
         rows = [camera_rows(run.cameras[name]) for run in runs.values()]
-        tables.append(_table(f"Camera {name}", runs, rows))
+        tables.append(_table(markup.titled("Camera", name), runs, rows))
     for name in arms:
         rows = [arm_rows(run.info.arms[name], run.arms[name]) for run in runs.values()]
-        tables.append(_table(f"Arm {name}", runs, rows))
+        tables.append(_table(markup.titled("Arm", name), runs, rows))
     return markup.section("Summary", *tables)
 
 
@@ -145,13 +145,13 @@ def _camera(runs: Runs, name: str) -> str:
     ]
     traces = {label: run.cameras[name] for label, run in runs.items()}
     chart = markup.chart(errors_chart(traces), "Feature error over time.")
-    return markup.section(f"Camera {name}", markup.beside(*films), chart)
+    return markup.section(markup.titled("Camera", name), markup.beside(*films), chart)
 
 
 def _arm(runs: Runs, name: str) -> str:
     arms = {label: (run.info.arms[name], run.arms[name]) for label, run in runs.items()}
     caption = "Distance of the arm from its limits and from singularities."
-    return markup.section(f"Arm {name}", markup.chart(arms_chart(arms), caption))
+    return markup.section(markup.titled("Arm", name), markup.chart(arms_chart(arms), caption))
 
 
 def _footer(signals: Mapping[str, str]) -> str:

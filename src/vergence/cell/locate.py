@@ -3,9 +3,10 @@
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from vergence.errors import InputError
+from vergence.errors import InputError, nearest
 
 PACKAGE = "package:"
+_MOST_SHOWN = 8
 
 
 def locate_model(model: Path, folder: Path, source: str, key: str) -> Path:
@@ -37,7 +38,13 @@ def locate_model(model: Path, folder: Path, source: str, key: str) -> Path:
         install = f"an installed package; run: pip install {name}"
         raise InputError(source, key, f"{given}, but {name} is not installed", install) from None
     found = [file for file in files if f"/{file.as_posix()}".endswith(f"/{path}")]
-    if len(found) != 1:
-        given = f"{given}, which fits {len(found)} files of it"
-        raise InputError(source, key, given, f"the end of the path of one file of {name}")
+    if len(found) > 1:
+        shown = ", ".join(sorted(file.as_posix() for file in found)[:_MOST_SHOWN])
+        given = f"{given}, which {len(found)} files of {name} end with"
+        raise InputError(source, key, given, f"more of the path of one of them: {shown}")
+    if not found:
+        same = {file.name for file in files if file.suffix == model.suffix}
+        names = nearest(model.name, same or {file.name for file in files})
+        given = f"{given}, but no file of {name} ends with that"
+        raise InputError(source, key, given, f"the end of the path of a file: {names}")
     return Path(str(found[0].locate())).resolve()
