@@ -1,9 +1,18 @@
+from collections.abc import Iterator
 from pathlib import Path
 
 import made_up_run
 import pytest
 
 from vergence.runtime.recording import Recording
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Commands note how long they took; those of tests do so in a folder of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -64,6 +64,6 @@ def test_a_direction_that_the_arm_hardly_serves_is_named_with_its_speed(draft: D
 
 
 def test_several_motions_at_once_are_named_with_one_with() -> None:
-    named = "a move along x with a move along z and a turn about y"
+    named = "a move along x combined with a move along z and a turn about y"
     assert _words(np.array([[0.6, 0.0, 0.6, 0.0, 0.6, 0.0]])) == named
     assert _words(np.eye(6)[:2]) == "a move along x and a move along y"

@@ -12,6 +12,7 @@ from numba.core import event
 
 from vergence.app import heartbeat
 from vergence.app.compilations import Compilations
+from vergence.app.durations import remember_s, usual_s
 from vergence.app.progress import bar, working
 from vergence.experiments.workers import Workers
 
@@ -89,6 +90,48 @@ def test_an_estimate_counts_down_until_the_next_step_makes_a_new_one() -> None:
         assert (first, later) == ("1 s left", "0 s left")
         time.sleep(0.6)
         assert progress.rest(progress.tasks[0]) == "takes longer than estimated"
+
+
+def test_work_that_was_done_before_says_from_its_first_second_how_long_it_took(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert usual_s("writing it of one cell") is None
+    remember_s("writing it of one cell", 7.0)
+    with working("writing it", "of one cell"):
+        wait_for("writing it, 7 s the last time, 0 s so far", capsys)
+    assert usual_s("writing it of one cell") < 1.0
+    assert usual_s("writing it of another") is None
+
+
+def test_a_bar_estimates_by_the_last_time_until_that_is_over_and_by_its_pace_then() -> None:
+    with bar("") as progress:
+        task = progress.add_task("a study", total=100)
+        progress.expect(task, 0.9)
+        assert progress.rest(progress.tasks[0]) == "1 s left"
+        progress.update(task, advance=1)  # at its pace it would last for long
+        assert progress.rest(progress.tasks[0]) == "1 s left"
+        time.sleep(1.0)
+        assert progress.rest(progress.tasks[0]) == "takes longer than estimated"
+        progress.update(task, advance=1)
+        assert float(progress.rest(progress.tasks[0]).removesuffix(" s left")) > 40.0
+        progress.expect(task, 1e4)
+        assert progress.begin() > 1.0
+        assert float(progress.rest(progress.tasks[0]).removesuffix(" s left")) < 1e3
+
+
+def test_what_took_how_long_is_kept_of_the_newest_and_no_file_of_ours_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("vergence.app.durations._MOST", 2)
+    for number, name in enumerate(("first", "second", "third")):
+        remember_s(name, number)
+    assert [usual_s(name) for name in ("first", "second", "third")] == [None, 1.0, 2.0]
+    (tmp_path / "vergence" / "durations.json").write_text("[1, 2")
+    assert usual_s("third") is None
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "vergence" / "durations.json"))
+    remember_s("third", 1.0)
+    assert usual_s("third") is None
 
 
 def compile_twice(_: int) -> None:

@@ -16,8 +16,8 @@ class Bar(Progress):
 
     What compiling takes, and what came before `begin`, does not count in the pace by which the
     time that is left is estimated. Each step that is done makes a new estimate; until the next it
-    counts down. Rich's own estimate is the pace of the newest steps, which may have come all at
-    once.
+    counts down. If it is known how long the same work took the last time, that is the estimate.
+    Rich's own estimate is the pace of the newest steps, which may have come all at once.
 
     Args:
         words: the text beside the bar, as rich's `TextColumn` formats it.
@@ -25,7 +25,8 @@ class Bar(Progress):
 
     def __init__(self, words: str) -> None:
         self._words, self._set_up_s = words, 0.0
-        self._expected_s: dict[TaskID, float] = {}  # how long a task will have taken
+        self._expected_s: dict[TaskID, float] = {}  # by task: how long it takes at this pace
+        self._usual_s: dict[TaskID, float] = {}  # how long it took the last time
         self._compilations = Compilations()
         self._heartbeat = Heartbeat(lambda: "\n".join(map(self._line, self.tasks)))
         super().__init__(
@@ -50,10 +51,22 @@ class Bar(Progress):
         self._heartbeat.stop()
         self._compilations.__exit__(None, None, None)
 
-    def begin(self) -> None:
-        """Note that the work itself begins now."""
+    def expect(self, task_id: TaskID, seconds: float | None) -> None:
+        """Take a task to last so long, whatever its first steps take; unknown if None."""
+        if seconds is not None:
+            self._usual_s[task_id] = seconds
+
+    def begin(self) -> float:
+        """Note that the work itself begins now; return what came before without compiling, s."""
         elapsed = max(task.elapsed or 0.0 for task in self.tasks)
         self._set_up_s = elapsed - self._compilations.spent_s
+        self._usual_s.clear()
+        return self._set_up_s
+
+    @property
+    def worked_s(self) -> float:
+        """How long the work has taken so far, without compiling, s."""
+        return max(self._worked_s(task) for task in self.tasks)
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
         """Note how far a task is, as rich does, and how long it will take at this pace."""
@@ -68,9 +81,11 @@ class Bar(Progress):
         """Return what is waited for: kernels, or so many seconds; empty before anything is done."""
         if self._compilations.under_way:
             return self._compilations.words()
-        if task.id not in self._expected_s:
+        worked_s, usual_s = self._worked_s(task), self._usual_s.get(task.id, 0.0)
+        expected_s = usual_s if usual_s > worked_s else self._expected_s.get(task.id, usual_s)
+        if not expected_s:
             return ""
-        left_s = self._expected_s[task.id] - self._worked_s(task)
+        left_s = expected_s - worked_s
         return f"{left_s:.0f} s left" if left_s > 0.0 else "takes longer than estimated"
 
     def _worked_s(self, task: Any) -> float:

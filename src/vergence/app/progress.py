@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from vergence.app.compilations import Compilations
+from vergence.app.durations import remember_s, usual_s
 from vergence.app.heartbeat import Heartbeat
 from vergence.runtime import RunInfo, TickRecord
 from vergence.signals import Outcome
@@ -34,12 +35,19 @@ def bar(words: str) -> "Bar":
 
 
 @contextmanager
-def working(words: str) -> Iterator[None]:
-    """Show on stderr that something is being done, and what is compiled for it."""
+def working(words: str, about: str = "") -> Iterator[None]:
+    """Show on stderr that something is being done, how long it took last, and what is compiled.
+
+    Args:
+        words: what is done.
+        about: with what, such as the name of a cell, where that tells how long it takes.
+    """
     from rich.console import Console
 
-    began, said = time.perf_counter(), words
-    status = Console(stderr=True, quiet=not sys.stderr.isatty()).status(words)
+    began, name = time.perf_counter(), " ".join(filter(None, (words, about)))
+    usual = usual_s(name)
+    said = words if usual is None else f"{words}, {usual:.0f} s the last time"
+    status = Console(stderr=True, quiet=not sys.stderr.isatty()).status(said)
 
     def compiling(how_far: str) -> None:
         nonlocal said
@@ -49,17 +57,20 @@ def working(words: str) -> Iterator[None]:
     def line() -> str:
         return f"{said}, {time.perf_counter() - began:.0f} s so far"
 
-    with Heartbeat(line), Compilations(compiling), status:
+    compilations = Compilations(compiling)
+    with Heartbeat(line), compilations, status:
         yield
+    remember_s(name, time.perf_counter() - began - compilations.spent_s)
 
 
 class RunProgress:
     """A listener that shows the progress, the speed and the state of a run."""
 
-    def __init__(self, duration_s: float) -> None:
+    def __init__(self, cell: str, duration_s: float) -> None:
         self._bar = bar("{task.fields[state]}")
-        self._duration_s = duration_s
+        self._duration_s, self._name = duration_s, f"prepare {cell}"
         self._task: TaskID = self._bar.add_task("prepare", total=None, state="")
+        self._bar.expect(self._task, usual_s(self._name))
         self._began = self._shown = time.perf_counter()
 
     def __enter__(self) -> Self:
@@ -78,7 +89,7 @@ class RunProgress:
         """Start the clock: what came before was preparation."""
         self._began = time.perf_counter()
         self._bar.update(self._task, description=info.cell)
-        self._bar.begin()
+        remember_s(self._name, self._bar.begin())
 
     def tick(self, record: TickRecord) -> None:
         """Show a tick, unless one was shown just now."""

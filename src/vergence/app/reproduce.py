@@ -71,16 +71,19 @@ def _study(
     paper: str, folder: Path, quick: bool, seed: int, seeds: int, imaging: str | None
 ) -> "StudyResult":
     """Run the study with a progress bar."""
+    from vergence.app.durations import remember_s, usual_s
     from vergence.app.progress import bar
     from vergence.studies import reproduce
 
+    name = f"reproduce {paper}{' quick' if quick else ''} {seeds} {imaging or ''}"
     with bar("{task.percentage:3.0f} %") as progress:
         task = progress.add_task(paper, total=1.0)
+        progress.expect(task, usual_s(name))
 
         def show(part: str, share: float) -> None:
             progress.update(task, description=part, completed=share)
 
-        return reproduce(
+        result = reproduce(
             paper,
             quick=quick,
             seed=seed,
@@ -89,6 +92,8 @@ def _study(
             folder=folder,
             progress=show,
         )
+        remember_s(name, progress.worked_s)
+        return result
 
 
 def _tell(result: "StudyResult", report: Path, remark: str) -> None:

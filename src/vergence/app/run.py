@@ -68,7 +68,7 @@ def _reported(cell: "Cell", result: "Run", folder: Path) -> Path:
     from vergence.app.progress import working
     from vergence.app.report import write_report
 
-    with working("writing the report"):
+    with working("writing the report", cell.name):
         keep_goal(cell, folder, result.info.cameras[cell.task.camera])
         return write_report(folder)
 
@@ -118,10 +118,10 @@ def _recorded(cell: "Cell", recorder: "Recorder", images: bool, driver: str | No
 
     if driver is not None:
         check_driver(cell, driver)
-        with working("rehearsing in simulation"):
+        with working("rehearsing in simulation", cell.name):
             rehearse(cell)
     try:
-        with RunProgress(cell.duration_s) as progress:
+        with RunProgress(cell.name, cell.duration_s) as progress:
             if driver is None:
                 return run_cell(cell, (recorder, progress), images)
             opened = open_driver(cell, driver)

@@ -100,7 +100,7 @@ def _watch_cell(options: "WatchOptions") -> Mapping[str, object]:
     editor = LawEditor(options.source, settings, options.seed)
     out = run_folder(options.out, options.overwrite, editor.cell.name)
     with listen(options.host, options.port) as listener:
-        with working("setting up the cell"):
+        with working("setting up the cell", editor.cell.name):
             live = Live(editor, options.images, out, options.image_every)
         address, end = _serve(live, listener, options)
     _say(f"recorded: `vergence watch {live.folder}` shows it again", options)
@@ -122,7 +122,7 @@ def _watch_robot(options: "WatchOptions", settings: Mapping[str, str]) -> Mappin
     check_driver(cell, named)
     out = run_folder(options.out, options.overwrite, cell.name)
     with listen(options.host, options.port) as listener:
-        with working("rehearsing in simulation"):
+        with working("rehearsing in simulation", cell.name):
             rehearse(cell)
         driver = open_driver(cell, named)
         try:
