@@ -137,6 +137,9 @@ def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: o
     assert "unserved directions" in Path("here", "report.html").read_text()
 
 
+BOARD = ["calibrate", ".", "--board", "9x6", "--square-mm", "25"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -160,6 +163,11 @@ def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: o
         (["calibrate", "--synthetic", "puma560", "--lens", "k1k3"], "did you mean k1k2?"),
         (["run", "puma560", "--set", "law.Q=abc"], "law.Q: given abc; allowed: a number"),
         (["calibrate", "nowhere"], "nowhere: no such folder; needed: a folder of images"),
+        ([*BOARD, "--marker-mm", "1e-300"], "--marker-mm"),
+        ([*BOARD, "--square-mm", "inf"], "--square-mm"),
+        ([*BOARD, "--camera", "c.yaml"], "c.yaml: no such file; needed: a camera in a file"),
+        (["compare", "ur5", "--tolerance-px", "inf"], "--tolerance-px"),
+        (["goal", "ur5", "--distance-m", "inf"], "--distance-m"),
         (["run", sys.executable], "not TOML"),
         (["goal", "ur5", "--out", "goal"], "--out: given goal; allowed: a file name that ends in"),
         (["run", "puma560", "--out", sys.executable], "which is a file; allowed: a folder"),

@@ -90,6 +90,8 @@ def test_an_estimate_counts_down_until_the_next_step_makes_a_new_one() -> None:
         assert (first, later) == ("1 s left", "0 s left")
         time.sleep(0.6)
         assert progress.rest(progress.tasks[0]) == "takes longer than estimated"
+        progress.update(task, advance=1)
+        assert progress.rest(progress.tasks[0]) == ""  # all is done
 
 
 def test_work_that_was_done_before_says_from_its_first_second_how_long_it_took(

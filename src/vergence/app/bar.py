@@ -78,9 +78,11 @@ class Bar(Progress):
                 self._expected_s[task_id] = self._worked_s(task) * task.total / task.completed
 
     def rest(self, task: Any) -> str:
-        """Return what is waited for: kernels, or so many seconds; empty before anything is done."""
+        """Return what is waited for: kernels, or so many seconds; empty if that is not known."""
         if self._compilations.under_way:
             return self._compilations.words()
+        if task.total and task.completed >= task.total:
+            return ""
         worked_s, usual_s = self._worked_s(task), self._usual_s.get(task.id, 0.0)
         expected_s = usual_s if usual_s > worked_s else self._expected_s.get(task.id, usual_s)
         if not expected_s:

@@ -26,11 +26,14 @@ def calibrate(options: "CalibrateOptions") -> int:
     from vergence.app.calibration.sources import calibration_data
     from vergence.app.calibration.summary import answer, tell, tell_failure
     from vergence.app.progress import working
+    from vergence.camera import read_camera
     from vergence.camera.calibration import CalibrationFailure
 
     _require_one_source(options)
     _require_lens(options.lens)
     _require_deviation(options.square_deviation)
+    if options.camera is not None:
+        read_camera(options.camera)
     T_world_base = _base(options)
     name = options.synthetic or str(options.images or options.cell)
     folder = options.out or new_folder(f"calibrate-{Path(name).stem or 'images'}")

@@ -28,11 +28,16 @@ class CalibrateOptions:
         ),
     ] = None
     square_mm: Annotated[
-        float | None, typer.Option(help="Side of a square, or distance between circles, in mm.")
+        float | None,
+        typer.Option(
+            min=0.1, max=1e4, help="Side of a square, or distance between circles, in mm."
+        ),
     ] = None
     marker_mm: Annotated[
         float | None,
-        typer.Option(help="Side of a marker, in mm. Without it the board is a chessboard."),
+        typer.Option(
+            min=0.05, max=1e4, help="Side of a marker, in mm. Without it the board is a chessboard."
+        ),
     ] = None
     dictionary: Annotated[
         str | None, typer.Option(help="Dictionary of the markers. Default: aruco_5x5_250.")
@@ -106,14 +111,17 @@ class CalibrateOptions:
     image_count: Annotated[
         int,
         typer.Option(
-            "--images", min=1, help="Number of images to render, or to take from a robot."
+            "--images",
+            min=1,
+            max=10_000,
+            help="Number of images to render, or to take from a robot.",
         ),
     ] = 30
     projected: Annotated[
         bool, typer.Option("--projected", help="Project corners instead of rendering images.")
     ] = False
     noise_px: Annotated[
-        float, typer.Option(min=0, help="Noise of the projected corners, in pixels.")
+        float, typer.Option(min=0, max=100, help="Noise of the projected corners, in pixels.")
     ] = 0.1
     latency: Annotated[
         str | None,
@@ -150,5 +158,5 @@ class CalibrateOptions:
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a calibration that is in --out.")
     ] = False
-    seed: Annotated[int, typer.Option(help="Random seed.")] = 0
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0
     as_json: Json = False

@@ -24,6 +24,7 @@ class CampaignOptions:
         float | None,
         typer.Option(
             min=0.0,
+            max=10_000.0,
             help="Largest final feature error of a converged run, in pixels. Default: 2, and 5 "
             "for `compare` if the target moves.",
         ),
