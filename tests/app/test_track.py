@@ -235,6 +235,11 @@ def test_points_of_a_small_flat_object_begin_with_both_its_poses(tmp_path: Path)
         ({"contrast": "-1"}, "--contrast: given -1"),
         ({"share": "1.5"}, "--share: given 1.5"),
         ({"scale": "0"}, "scale: given 0"),
+        ({"scale": "1e-9"}, "scale: given 1e-09, which makes it"),
+        ({"scale": "1e300"}, "scale: given 1e+300, which makes it"),
+        ({"rate": "1e300"}, "--rate: given 1e+300; allowed: from 0.001"),
+        ({"jolt": "1e300"}, "--jolt: given 1e+300; allowed: from 0.01 to 1000"),
+        ({"contrast": "1e300"}, "--contrast: given 1e+300; allowed: from 0.01 to 255"),
     ],
 )
 def test_bad_input_is_named_with_what_is_allowed(

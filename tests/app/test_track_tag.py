@@ -82,7 +82,7 @@ def test_what_is_seen_instead_is_told() -> None:
         (["--tag", "apriltag_36h11:700:0.05"], "0 to 586 in apriltag_36h11"),
         (["--tag", "circle49h12:7:0.05"], "a family of AprilTag 3 that OpenCV does not find"),
         (["--tag", "apriltag_36h11:7:0"], "size_m: given 0.0; allowed: at least 0.001"),
-        (["--tag", "apriltag_36h11:7:0.05", "--model", "a.obj"], "nothing together with --tag"),
+        (["--tag", "apriltag_36h11:7:0.05", "--model", "a.obj"], "only without --tag"),
         (["--model", "a.obj"], "--start: missing"),
         ([], "--model with --start, --tag, or --curve"),
     ],

@@ -119,9 +119,8 @@ def _prepare(options: "TrackOptions") -> "Start":
     for key, field in type(options).__dataclass_fields__.items():
         given = getattr(options, key)
         if key not in _ALWAYS | own | {named} and given != field.default:
-            raise InputError(
-                "vergence track", f"--{key}", given, f"nothing together with --{named}"
-            )
+            shown = ", ".join(given) if isinstance(given, list) else given
+            raise InputError("vergence track", f"--{key}", shown, f"only without --{named}")
     start: Start = import_module(f"vergence.app.tracking.{module}").prepare(options)
     return start
 

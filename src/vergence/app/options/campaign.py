@@ -12,7 +12,8 @@ from vergence.app.options.shared import CellName, Json, Settings, folder_to_writ
 from vergence.errors import InputError, nearest
 
 # What a cell can say of a target that moves along a line.
-_FARTHEST_M, _FASTEST_M_S, _LONGEST_S = 500.0, 1000.0, 86_000.0
+_NEAREST_M, _FARTHEST_M = 1e-3, 500.0
+_FASTEST_M_S, _LONGEST_S = 1000.0, 86_000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,8 +132,9 @@ class MapOptions(CampaignOptions):
         """Raise InputError if a value is not among those allowed."""
         if self.over not in names.OVER:
             raise InputError("--over", "", self.over, nearest(self.over, names.OVER))
-        if not 0 < self.extent <= _FARTHEST_M:
-            raise InputError("--extent", "", self.extent, f"above 0 and up to {_FARTHEST_M:g} m")
+        if not _NEAREST_M <= self.extent <= _FARTHEST_M:
+            allowed = f"from {_NEAREST_M:g} to {_FARTHEST_M:g} m"
+            raise InputError("--extent", "", self.extent, allowed)
         if not all(0 < speed <= _FASTEST_M_S for speed in self.speeds_m_s):
             allowed = f"above 0 and up to {_FASTEST_M_S:g} m/s, separated by commas"
             raise InputError("--speeds", "", self.speeds, allowed)

@@ -91,7 +91,7 @@ def _start(named: Sequence[_Named], _footage: Footage, first: FootageFrame) -> C
         if reason:
             given = f"{one.text}: {reason} in the first image"
             raise InputError(
-                "vergence track", "--curve", given, f"{one.kind.points} of the {one.name}"
+                "vergence track", "--curve", given, f"for {one.name}: {one.kind.points}"
             )
         followers.append(follower)
     return CurveSubject(followers)

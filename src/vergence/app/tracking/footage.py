@@ -17,6 +17,7 @@ from vergence.runtime.bags import COMPRESSED, IMAGE, Bag, is_bag
 
 VIDEOS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
 DEFAULT_RATE_HZ = 25.0
+_SLOWEST_HZ, _FASTEST_HZ = 1e-3, 1e4
 _TIMED = 100  # images of a bag that tell its rate
 _Stamped: TypeAlias = Iterator[tuple[str, float, np.ndarray]]  # name, s, pixels
 
@@ -79,8 +80,9 @@ def open_footage(
     where = Path(path)
     if topic is not None and not is_bag(where):
         raise InputError("vergence track", "--topic", topic, "only with a ROS 2 bag")
-    if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise InputError("vergence track", "--rate", rate_hz, "images a second, above zero")
+    if rate_hz is not None and not _SLOWEST_HZ <= rate_hz <= _FASTEST_HZ:
+        allowed = f"from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} images a second"
+        raise InputError("vergence track", "--rate", rate_hz, allowed)
     if is_bag(where):
         return _open_bag(where, rate_hz, topic)
     if where.is_dir():

@@ -3,8 +3,6 @@
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from vergence.app.options.track import Modality, TrackOptions
 from vergence.app.tracking.footage import Footage, FootageFrame
 from vergence.app.tracking.intrinsics import camera_of_options
@@ -50,9 +48,12 @@ def _start(
     camera = camera_of_options(options, first)
     contrast = _CONTRAST if options.contrast is None else options.contrast
     jolt_px = _JOLT_PX if options.jolt is None else options.jolt
-    for key, value in (("--contrast", contrast), ("--jolt", jolt_px)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError("vergence track", key, value, "a number above zero")
+    for key, value, low, high in (
+        ("--contrast", contrast, 0.01, 255),
+        ("--jolt", jolt_px, 0.01, 1e3),
+    ):
+        if not low <= value <= high:
+            raise InputError("vergence track", key, value, f"from {low:g} to {high:g}")
     share = options.share
     if share is not None and not LEAST_SHARE <= share <= 1.0:
         reason = "with less, an object cannot be distinguished from its background"

@@ -14,6 +14,7 @@ from vergence.vision.known_object.primitives import box, capsule, cylinder, elli
 
 MESHES = (".obj", ".stl")
 SCENES = (".xml", ".mjcf")
+_SMALLEST_M, _LARGEST_M = 1e-4, 1e3  # length of an object that a camera could see
 SEEN_GROUPS = 3  # MuJoCo draws geoms of groups 0, 1, 2
 _ELEMENT = "Element name 'object', id 0"  # how MuJoCo names the only one of a mesh file
 _SHAPES = ("mesh", "box", "cylinder", "sphere", "ellipsoid", "capsule")
@@ -43,6 +44,11 @@ def load_object_model(
         raise InputError(str(path), "scale", scale, "positive metres per unit of the file")
     compiled = _compile_mesh(file) if kind in MESHES else _compile_scene(file)
     vertices, triangles = _joined(compiled, str(path))
+    size_m = scale * float(np.ptp(vertices, axis=0).max())
+    if not _SMALLEST_M <= size_m <= _LARGEST_M:
+        given = f"{scale:g}, which makes it {size_m:.1g} m long"
+        allowed = f"metres per unit of the file, so that it is {_SMALLEST_M:g} to {_LARGEST_M:g} m"
+        raise InputError(str(path), "scale", given, allowed)
     return ObjectModel.from_mesh(str(path), vertices * scale, triangles, sharp_rad)
 
 
