@@ -4,7 +4,14 @@ from pathlib import Path
 import made_up_run
 import pytest
 
+from vergence.app import heartbeat
 from vergence.runtime.recording import Recording
+
+
+@pytest.fixture(autouse=True)
+def no_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a slow computer a command says how far it is; tests of messages want only those."""
+    monkeypatch.setattr(heartbeat, "FIRST_S", 600.0)
 
 
 @pytest.fixture(scope="session", autouse=True)
