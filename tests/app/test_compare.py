@@ -81,7 +81,7 @@ def test_laws_are_compared_in_one_table(command: Command, capsys: object) -> Non
     assert {"ending", "time_s", "path_m", "reason"} <= rows[0].keys()
     page = Path(answer["report"]).read_text(encoding="utf-8")
     assert page.count("<img") == 2
-    assert "image_based" in page
+    assert "2 laws from 2 starts" in page
 
 
 def test_a_second_run_in_the_same_folder_continues_and_says_the_same(

@@ -122,5 +122,6 @@ def _write_page(
         ),
         markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),
     ]
-    title = f"{cell.name}: {len(found.scores)} laws from {found.scores[0].trials} starts"
+    laws, starts = len(found.scores), found.scores[0].trials
+    title = f"{cell.name}: {laws} law{'s' * (laws > 1)} from {starts} start{'s' * (starts > 1)}"
     return write_page(how.folder, "vergence compare", title, remark, parts)

@@ -25,6 +25,7 @@ from vergence.signals import ImagePoints
 
 CAMERA = "camera"
 LEAST_SHARE = 0.2  # below this fraction, an object cannot be distinguished from its background
+_HALF_TURN_DEG = 180.0  # a larger deviation of a rotation means nothing more
 _SURPRISING = 10.0  # of χ² with six degrees of freedom: one in eight
 _USED = (Verdict.USED, Verdict.RECOVERED)
 
@@ -289,10 +290,11 @@ class ObjectFollower:
         place, turn = self._deviation()
         distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
         if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
+            turn_deg = np.rad2deg(turn)
+            turned = f"{turn_deg:.2g}°" if turn_deg < _HALF_TURN_DEG else "more than half a turn"
             return (
-                f"what is seen of {self._tracker.sought} does not determine the pose: "
-                f"{place:.3g} m and "
-                f"{np.rad2deg(turn):.2g} degrees of standard deviation"
+                f"what is seen of {self._tracker.sought} does not determine the pose: standard "
+                f"deviations of {place:.3g} m and {turned}"
             )
         return ""
 
