@@ -21,6 +21,7 @@ from vergence.estimation.object_rivals import (
     compare_poses,
     covered,
     is_new_view,
+    neighbours,
 )
 from vergence.estimation.object_search import AT_ONCE, ObjectSearch, SearchPace
 from vergence.estimation.object_tracker import ObjectTracker
@@ -86,6 +87,7 @@ class HypothesisFollower:
         self._searching = False
         self._undecided = ""  # what the last round of the search left open
         self._compared = not self._by_edges
+        self._settled = not self._by_edges  # whether poses nearby have been compared
         self.note = ""  # which pose replaced the given one
 
     @property
@@ -127,6 +129,8 @@ class HypothesisFollower:
         if self.was_seen and step.sighting is not Sighting.SEEN:
             self._lost = self._lost or step.sighting is Sighting.LOST
             step = self._sought(image, time, step)
+        if not self._settled and step.sighting is Sighting.SEEN:
+            self._settle(image, time, step)
         step = self._beside_rivals(image, time, step)
         if step.sighting in (Sighting.SEEN, Sighting.AMBIGUOUS):
             self._last, self._last_time = step.T_camera_target, time
@@ -154,6 +158,16 @@ class HypothesisFollower:
             self._main = self._begin(chosen, time, memory)
         self._rivals = [Rival(self._begin(T, time, memory), Evidence()) for T in rivals]
         self._evidence, self._compared, self._others = Evidence(), True, ()
+
+    def _settle(self, image: ImageArray, time: float, step: Step) -> None:
+        """Track beside the pose those nearby that cannot be distinguished from it."""
+        near = neighbours(
+            self._tracker, image, self._camera, step, self._main.start_covariance,
+            self._rule.least_of_all,
+        )  # fmt: skip
+        memory = self._tracker.elsewhere(self._main.memory)
+        self._rivals += [Rival(self._begin(T, time, memory), Evidence()) for T in near]
+        self._settled = True
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
         """Search for the object; return the step that says it is not seen if it is not found."""
@@ -189,7 +203,7 @@ class HypothesisFollower:
             self._undecided = f"{len(rivals) + 1} poses explain the image equally well"
             return replace(step, reason=self._undecided)
         self._main, self._lost, self._evidence = main, False, Evidence()
-        self._compared_at = None
+        self._compared_at, self._settled = None, not self._by_edges
         self._rivals = [Rival(self._begin(T, time, memory, deviation), Evidence()) for T in rivals]
         return found
 

@@ -16,7 +16,7 @@ from vergence.estimation.object_follower import ObjectFollower, Step
 from vergence.estimation.object_search import Fit
 from vergence.estimation.object_tracker import ObjectTracker
 from vergence.estimation.unseen_turns import pose_error
-from vergence.geometry import se3_compose
+from vergence.geometry import se3, se3_compose, so3_exp
 from vergence.vision.known_object.look_alikes import (
     Turn,
     apart_rad,
@@ -31,6 +31,8 @@ _IMAGES_ALIKE = 5.0  # and consecutive images
 _NEW_VIEW_RAD, _NEW_VIEW = 0.03, 0.02  # turn and motion, relative to the distance, of a new view
 _SAME_RAD = 0.1
 _SAME = 0.05  # relative to the distance
+_TILT_RAD = 0.1  # shows a face that was seen edge-on, or hides it: more than `LEAST_COSINE`
+_TILTS = 8  # directions
 _OF_BEST = 0.85  # fraction of the best share below which a pose is no rival
 _COVERED = 16.8  # χ² with six degrees of freedom: 99 of 100
 
@@ -139,7 +141,12 @@ def is_new_view(T: FloatArray, T_before: FloatArray | None) -> bool:
 
 def covered(step: Step, T: FloatArray) -> bool:
     """Return whether the covariance that is stated with a pose covers another pose (4, 4)."""
-    error = pose_error(T, step.T_camera_target)
+    return _covers(step, T, step.T_camera_target)
+
+
+def _covers(step: Step, T: FloatArray, T_other: FloatArray) -> bool:
+    """Return whether two poses (4, 4) are the same within the stated covariance."""
+    error = pose_error(T, T_other)
     return float(error @ np.linalg.solve(step.covariance[:6, :6], error)) < _COVERED
 
 
@@ -190,6 +197,43 @@ def compare_poses(
         )
     near = [fit.T_camera_target for fit in fits if chosen.evidence.over(fit.evidence) < DECIDED]
     return chosen.T_camera_target, _distinct([chosen.T_camera_target], near, alike), note
+
+
+def neighbours(
+    tracker: ObjectTracker,
+    image: ImageArray,
+    camera: Camera,
+    step: Step,
+    covariance: FloatArray,
+    least_share: float,
+) -> list[FloatArray]:
+    """Return poses (4, 4) nearby that explain an image as well as the one found.
+
+    A face seen edge-on has two edges beside each other. Which of them the image shows decides
+    whether the face is just visible or just hidden: poses a few degrees apart, each of which fits
+    the edges within the noise. The pose is therefore fitted again after tilts in all directions.
+
+    Args:
+        tracker: of the object's edges.
+        image: grey, (height, width).
+        camera: the camera's model.
+        step: what was found in the image.
+        covariance: (6, 6), size of the search around each pose.
+        least_share: fraction of what should be visible, required of any pose.
+    """
+    T, found = step.T_camera_target, []
+    own = Evidence().and_seen(step.share, len(step.samples_found))
+    for k in range(_TILTS):
+        angle = 2.0 * np.pi * k / _TILTS
+        tilt = so3_exp(_TILT_RAD * np.array((np.cos(angle), np.sin(angle), 0.0)))
+        start = se3(np.ascontiguousarray(tilt @ T[:3, :3]), T[:3, 3].copy())
+        seen = tracker.measure(image, camera, start, covariance, tracker.blank())
+        evidence = Evidence().and_seen(seen.share, seen.expected)
+        if seen.share < least_share or own.over(evidence) > DECIDED:
+            continue
+        if not any(_covers(step, seen.T_camera_target, other) for other in (T, *found)):
+            found.append(seen.T_camera_target)
+    return found
 
 
 def _distinct(
