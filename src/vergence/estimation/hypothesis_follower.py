@@ -20,6 +20,8 @@ from vergence.estimation.object_rivals import (
     choose_pose,
     compare_poses,
     covered,
+    covering,
+    is_near,
     is_new_view,
     neighbours,
 )
@@ -234,11 +236,15 @@ class HypothesisFollower:
             kept = [each for each in kept if taken.evidence.over(each[0].evidence) < DECIDED]
             kept = [each for each in kept if each[0] is not taken]
         self._rivals = [rival for rival, _ in kept]
-        found = [seen for _, seen in kept if seen.sighting is Sighting.SEEN]
-        if not found or step.sighting is not Sighting.SEEN:
+        if step.sighting is not Sighting.SEEN:
             return step
-        poses = tuple(seen.T_camera_target for seen in found)
-        turns = " or ".join(str(between(step.T_camera_target, pose)) for pose in poses)
+        own = step.T_camera_target
+        found = [seen.T_camera_target for _, seen in kept if seen.sighting is Sighting.SEEN]
+        step = covering(step, [T for T in found if is_near(T, own)])
+        poses = tuple(T for T in found if not is_near(T, own))
+        if not poses:
+            return step
+        turns = " or ".join(str(between(own, pose)) for pose in poses)
         reason = (
             f"turned by {turns} it explains the images equally well; an image from "
             "another direction would decide"

@@ -6,6 +6,7 @@ compared by the number of independent places.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -197,6 +198,24 @@ def compare_poses(
         )
     near = [fit.T_camera_target for fit in fits if chosen.evidence.over(fit.evidence) < DECIDED]
     return chosen.T_camera_target, _distinct([chosen.T_camera_target], near, alike), note
+
+
+def is_near(T: FloatArray, T_other: FloatArray) -> bool:
+    """Return whether two poses (4, 4) are so close that a wider covariance can cover both."""
+    return _same(T, T_other)
+
+
+def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
+    """Return the step with a covariance that covers equally likely poses (4, 4) nearby, too."""
+    if not poses:
+        return step
+    errors = np.array([pose_error(T, step.T_camera_target) for T in poses])
+    added = errors.T @ errors / (len(poses) + 1)
+    covariance = step.covariance.copy()
+    covariance[:6, :6] += added
+    place, turn = np.sqrt(np.diag(added).reshape(2, 3).max(axis=1))
+    deviation = float(np.hypot(step.deviation[0], place)), float(np.hypot(step.deviation[1], turn))
+    return replace(step, covariance=covariance, deviation=deviation)
 
 
 def neighbours(

@@ -107,7 +107,7 @@ def _seen_samples(
     samples = sample_edges(
         T, lens, geometry.edges, geometry.normals, geometry.surface, geometry.places
     )
-    return without_doubles(samples, apart_px)
+    return without_doubles(T, samples, geometry.normals, apart_px)
 
 
 @njit(cache=True)

@@ -8,7 +8,13 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH, pixel_of
 from vergence.vision.known_object.profiles import SHARP_WIDTH, find_steps, read_profile
-from vergence.vision.known_object.projection import edge_faces_camera, face_table, hidden, in_camera
+from vergence.vision.known_object.projection import (
+    edge_faces_camera,
+    face_cosines,
+    face_table,
+    hidden,
+    in_camera,
+)
 
 TEMPLATE = 4  # remembered samples on each side of an edge
 LEAST_HALF = 17  # samples of a profile to each side, to follow blurred edges
@@ -93,20 +99,28 @@ def sample_edges(
 
 
 @njit(cache=True)
-def without_doubles(samples: EdgeSamples, apart_px: float) -> EdgeSamples:
+def without_doubles(
+    T: FloatArray, samples: EdgeSamples, edge_normals: FloatArray, apart_px: float
+) -> EdgeSamples:
     """Drop the places that have another edge beside them, since the two could be confused.
 
-    This happens where a face is seen at a grazing angle. If fewer than half of the places would
-    remain, all of them are kept.
+    This happens where a face is seen at a grazing angle. Whether a face that is nearly edge-on is
+    visible depends on a small error of the pose, so its edges are dropped in either case. If fewer
+    than half of the places would remain, all of them are kept.
 
     Args:
+        T: pose of the object in the camera, (4, 4).
         samples: on the edges, those of each edge consecutive.
+        edge_normals: of the faces at each edge, (E, 2, 3).
         apart_px: smallest lateral distance of another edge.
     """
     count = len(samples.edge)
-    alone = np.ones(count, dtype=np.bool_)
-    runs, boxes = _edge_runs(samples, 1.5 * apart_px)
+    alone = np.empty(count, dtype=np.bool_)
     for n in range(count):
+        first, second = face_cosines(T, samples.points[n], edge_normals[samples.edge[n]])
+        alone[n] = min(abs(first), abs(second)) > LEAST_COSINE
+    runs, boxes = _edge_runs(samples, 1.5 * apart_px)
+    for n in np.flatnonzero(alone):
         u, v = samples.points_px[n, 0], samples.points_px[n, 1]
         for r in range(len(runs)):
             if runs[r, 0] <= n < runs[r, 1]:

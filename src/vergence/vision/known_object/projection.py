@@ -114,12 +114,24 @@ def edge_faces_camera(
         normals: of the faces, object's frame, (2, 3).
         least_cosine: of the angle between a normal and the line of sight.
     """
+    first, second = face_cosines(T, point, normals)
+    return first > least_cosine or second > least_cosine
+
+
+@njit(cache=True)
+def face_cosines(T: FloatArray, point: FloatArray, normals: FloatArray) -> tuple[float, float]:
+    """Return the cosines between the normals of the faces at an edge and the line of sight.
+
+    Args:
+        T: pose of the object in the camera, (4, 4).
+        point: on the edge, object's frame, (3,).
+        normals: of the faces, object's frame, (2, 3).
+    """
     x, y, z = in_camera(T, point)
-    least = least_cosine * np.sqrt(x * x + y * y + z * z)
-    for k in range(2):
-        facing = 0.0
-        for j in range(3):
-            facing -= normals[k, j] * (T[0, j] * x + T[1, j] * y + T[2, j] * z)
-        if facing > least:
-            return True
-    return False
+    distance = np.sqrt(x * x + y * y + z * z)
+    first, second = 0.0, 0.0
+    for j in range(3):
+        ahead = (T[0, j] * x + T[1, j] * y + T[2, j] * z) / distance
+        first -= normals[0, j] * ahead
+        second -= normals[1, j] * ahead
+    return first, second
