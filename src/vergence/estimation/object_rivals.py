@@ -240,7 +240,8 @@ def neighbours(
         covariance: (6, 6), size of the search around each pose.
         least_share: fraction of what should be visible, required of any pose.
     """
-    T, found = step.T_camera_target, []
+    T = step.T_camera_target
+    found: list[FloatArray] = []
     own = Evidence().and_seen(step.share, len(step.samples_found))
     for k in range(_TILTS):
         angle = 2.0 * np.pi * k / _TILTS

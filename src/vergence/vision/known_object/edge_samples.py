@@ -120,7 +120,9 @@ def without_doubles(
         first, second = face_cosines(T, samples.points[n], edge_normals[samples.edge[n]])
         alone[n] = min(abs(first), abs(second)) > LEAST_COSINE
     runs, boxes = _edge_runs(samples, 1.5 * apart_px)
-    for n in np.flatnonzero(alone):
+    for n in range(count):
+        if not alone[n]:
+            continue
         u, v = samples.points_px[n, 0], samples.points_px[n, 1]
         for r in range(len(runs)):
             if runs[r, 0] <= n < runs[r, 1]:
