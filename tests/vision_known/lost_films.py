@@ -40,12 +40,18 @@ def hidden_for_a_second(name: str, seed: int, after: int) -> Iterator[Shown]:
         yield Shown(np.clip(np.rint(noisy), 0, 255).astype(np.uint8), T, k / RATE_HZ)
 
 
-def moved(T: FloatArray, centre: FloatArray, random: np.random.Generator) -> FloatArray:
+def moved(
+    T: FloatArray,
+    centre: FloatArray,
+    random: np.random.Generator,
+    by_m: float = MOVED_M,
+    by_rad: float = TURNED_RAD,
+) -> FloatArray:
     """Return a pose 5 cm aside and turned by 30° about any axis."""
     axis, aside = random.normal(size=3), random.normal(size=3) * (1.0, 1.0, 0.3)
-    turn = so3_exp(TURNED_RAD * axis / np.linalg.norm(axis))
+    turn = so3_exp(by_rad * axis / np.linalg.norm(axis))
     R = np.ascontiguousarray(turn @ T[:3, :3])
-    place = T[:3, :3] @ centre + T[:3, 3] + MOVED_M * aside / np.linalg.norm(aside)
+    place = T[:3, :3] @ centre + T[:3, 3] + by_m * aside / np.linalg.norm(aside)
     return se3(R, place - R @ centre)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
+from vergence.estimation.half_hidden import enough_seen
 from vergence.estimation.object_follower import (
     FollowRule,
     ObjectFollower,
@@ -25,7 +26,7 @@ from vergence.estimation.object_rivals import (
     is_new_view,
     neighbours,
 )
-from vergence.estimation.object_search import AT_ONCE, ObjectSearch, SearchPace
+from vergence.estimation.object_search import AT_ONCE, Near, ObjectSearch, SearchPace
 from vergence.estimation.object_tracker import ObjectTracker
 from vergence.geometry import se3_compose
 from vergence.vision.known_object import EdgeTracker
@@ -131,6 +132,8 @@ class HypothesisFollower:
         if self.was_seen and step.sighting is not Sighting.SEEN:
             self._lost = self._lost or step.sighting is Sighting.LOST
             step = self._sought(image, time, step)
+        if self._missed >= _MISSED:  # the prediction is vague
+            self._settled = not self._by_edges
         if not self._settled and step.sighting is Sighting.SEEN:
             self._settle(image, time, step)
         step = self._beside_rivals(image, time, step)
@@ -182,11 +185,17 @@ class HypothesisFollower:
             self._searching, self._undecided = True, ""
         if not search.promising:
             self._hidden_until = time
-        fits = search.look(image)
+        near = Near(step.T_camera_target, step.covariance[:6, :6]) if self._by_edges else None
+        fits = search.look(image, near)
         if fits is None:
             return replace(step, reason=self._undecided or step.reason)
         self._undecided = ""
-        if fits[0].share < self._rule.found_again:
+        enough = enough_seen(fits, near, self._rule.found_again) if near else fits
+        if isinstance(enough, str):
+            self._undecided = enough
+            return replace(step, reason=enough)
+        fits = enough
+        if near is None and fits[0].share < self._rule.found_again:
             return step
         most_rad = _TURN_RAD + _TURN_RATE * (self._hidden_until - self._last_time)
         chosen = choose_pose(fits, self._last, self._turns, search.free_axes, most_rad)

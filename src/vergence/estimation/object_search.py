@@ -13,7 +13,7 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.estimation.object_tracker import Measurement, ObjectTracker
-from vergence.geometry import se3, se3_compose, so3_exp
+from vergence.geometry import se3, se3_compose, skew, so3_exp
 from vergence.vision.known_object.contour_maps import Maps
 from vergence.vision.known_object.contour_vote import directions_of, vote_place
 from vergence.vision.known_object.look_alikes import centre_of, tried_turns, turns_of
@@ -21,6 +21,7 @@ from vergence.vision.known_object.look_alikes import centre_of, tried_turns, tur
 _CELLS = 24.0  # across the object
 _MOST_COLUMNS = 160  # of the coarse image
 _SCALES = (0.87, 1.0, 1.15)  # of the distance
+_REACH = 3.0  # deviations of the prediction within which places are examined
 _PLACE, _TURN_RAD = 0.12, 0.3  # deviation of a voted pose: relative to the size, and rotation
 
 
@@ -36,12 +37,20 @@ AT_ONCE = SearchPace(1_000_000, 1_000_000, 1_000_000)
 IN_A_LOOP = SearchPace(20, 130, 2)
 
 
+class Near(NamedTuple):
+    """Where the prediction has an object."""
+
+    T_camera_target: FloatArray  # (4, 4)
+    covariance: FloatArray  # (6, 6) of (δp, δθ) along camera axes, grown since it was seen
+
+
 class Fit(NamedTuple):
     """A pose of the object in an image."""
 
     T_camera_target: FloatArray  # (4, 4)
     share: float  # fraction of what should be visible that was found
     expected: int  # places that should be visible
+    seen: Measurement | None = None  # the whole measurement
 
 
 class _Template(NamedTuple):
@@ -125,11 +134,16 @@ class ObjectSearch:
         self._templates: list[_Template] = []
         self._start(seen=False)
 
-    def look(self, image: ImageArray) -> list[Fit] | None:
+    def look(self, image: ImageArray, near: Near | None = None) -> list[Fit] | None:
         """Examine an image further.
 
-        An object may appear in the middle of a round, when some rotations have been examined
-        already; the first promising pose therefore begins another round.
+        Places beyond three deviations of the prediction are left out. An object may appear in the
+        middle of a round, when some rotations have been examined already; the first promising pose
+        therefore begins another round.
+
+        Args:
+            image: of the camera's size.
+            near: where the object is predicted; None if it may be anywhere.
 
         Returns:
             The poses that fit best, best first, at the end of a round; until then None.
@@ -139,6 +153,7 @@ class ObjectSearch:
         """
         maps = self._tracker.maps(image, self._shape, self._memory)
         self._images += 1
+        self._window = self._window_of(near)
         drawn, voted, fits = self._pace
         while True:
             now = self._round
@@ -152,8 +167,10 @@ class ObjectSearch:
                 return None
             if now.left or now.examined < len(now.turns):
                 return None
+            if near is not None and now.turns is not self._alike:
+                now.fits.append(self._fit(image, near.T_camera_target))
             self._found += now.fits
-            if not promising or now.turns is self._alike:
+            if now.turns is self._alike or not (promising or near):
                 found = sorted(self._found, key=lambda fit: -fit.share)
                 self._start(seen=False)
                 return found
@@ -207,12 +224,35 @@ class ObjectSearch:
     def _vote(self, maps: Maps, template: _Template, scales: tuple[float, ...]) -> _Hit:
         """Return the best place of a contour at some distances."""
         votes = [
-            vote_place(maps, np.rint(template.cells / scale).astype(np.int64), template.directions)
+            vote_place(
+                maps,
+                np.rint(template.cells / scale).astype(np.int64),
+                template.directions,
+                self._window,
+            )
             for scale in scales
         ]
         k = int(np.argmax([vote.score for vote in votes]))
         cell = np.array((votes[k].column, votes[k].row))
         return _Hit(votes[k].score, template, scales[k], (cell + 0.5) * self._cell_px - 0.5)
+
+    def _window_of(self, near: Near | None) -> IntArray:
+        """Return the cells at which the centre may lie: first column and row, last + 1, (4,)."""
+        rows, columns = self._shape
+        if near is None:
+            return np.array((0, 0, columns, rows))
+        T, covariance = near
+        turn = skew(np.ascontiguousarray(T[:3, :3] @ self._centre))
+        J = np.hstack((np.eye(3), -turn))
+        place = self._place(T)
+        reach_m = _REACH * np.sqrt(np.diag(J @ covariance @ J.T)[:2])
+        if not place[2] > 0.0:
+            return np.array((0, 0, columns, rows))
+        cell = self._camera.project(place[None])[0] / self._cell_px
+        reach = reach_m * (self._camera.fx, self._camera.fy) / place[2] / self._cell_px + 1.0
+        first = np.clip(np.floor(cell - reach), 0, (columns - 1, rows - 1)).astype(np.int64)
+        last = np.clip(np.ceil(cell + reach), first + 1, (columns, rows)).astype(np.int64)
+        return np.concatenate((first, last))
 
     def _fit(self, image: ImageArray, T: FloatArray) -> Fit:
         seen: Measurement = self._tracker.measure(
@@ -220,7 +260,7 @@ class ObjectSearch:
         )
         T = seen.T_camera_target
         share = min(seen.share, seen.usual) if len(seen.points) and T[2, 3] > 0.0 else 0.0
-        return Fit(T, share, seen.expected)
+        return Fit(T, share, seen.expected, seen)
 
     def _place(self, T: FloatArray) -> FloatArray:
         """Return where the object's centre is, (3,)."""

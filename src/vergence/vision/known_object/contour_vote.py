@@ -44,7 +44,7 @@ def directions_of(normals: FloatArray) -> IntArray:
 
 
 @njit(cache=True)
-def vote_place(maps: Maps, cells: IntArray, directions: IntArray) -> Vote:
+def vote_place(maps: Maps, cells: IntArray, directions: IntArray, window: IntArray) -> Vote:
     """Return the shift of a contour under which the maps show it best.
 
     Places outside the image count as not shown.
@@ -53,18 +53,23 @@ def vote_place(maps: Maps, cells: IntArray, directions: IntArray) -> Vote:
         maps: by direction, (16, rows, columns).
         cells: column and row of each place relative to the centre, (N, 2), `MOST_PLACES` at most.
         directions: of the normals, (N,).
+        window: first column and row at which the centre may lie, and last + 1 of each, (4,).
     """
     rows, columns = maps.shape[1:]
     total = np.zeros((rows, columns), dtype=np.uint16)
+    left, top, right, bottom = window
     for n in range(len(cells)):
         x, y = cells[n, 0], cells[n, 1]
         shown = maps[directions[n]]
-        first, last = max(0, -x), min(columns, columns - x)
-        for row in range(max(0, -y), min(rows, rows - y)):
+        first, last = max(left, -x), min(right, columns - x)
+        for row in range(max(top, -y), min(bottom, rows - y)):
             sums = total[row, first:last]
             added = shown[row + y, first + x : last + x]
             for k in range(len(sums)):  # whole slices become vector instructions
                 sums[k] += added[k]
-    best = int(np.argmax(total))
-    row, column = divmod(best, columns)
+    row, column = top, left
+    for r in range(top, bottom):
+        for c in range(left, right):
+            if total[r, c] > total[row, column]:
+                row, column = r, c
     return Vote(total[row, column] / (255.0 * max(len(cells), 1)), column, row)

@@ -1,0 +1,54 @@
+"""The pose of a lost object that is partly hidden, if the image and the prediction decide it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vergence.estimation.object_rivals import is_near
+from vergence.estimation.object_search import Fit, Near
+from vergence.estimation.unseen_turns import pose_error
+from vergence.vision.known_object.edge_measurement import EdgeMeasurement
+from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
+
+# Log likelihood ratios. A search reaches about 10⁷ poses that differ, and chance may win one in a
+# thousand times. Four edges never suffice: many things are rectangles.
+_SURE = float(np.log(1e7) + np.log(1e3))
+_DECIDED = float(np.log(1e3))  # over every other pose
+_PREDICTED = 22.5  # χ² with six degrees of freedom: 999 of 1000
+
+
+def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit] | str:
+    """Return the poses that explain what is seen of a lost object, or why there is none.
+
+    What is seen must be too much for chance. Of an object that is partly hidden, the part that is
+    visible beside what hides it must be found as completely as a whole object, it must not fit at
+    another place or turned, and the pose must agree with the prediction.
+
+    Args:
+        fits: poses fitted to the edges of an image, at least one.
+        near: where the object is predicted.
+        least_share: fraction of the visible part that must be found.
+
+    Returns:
+        The poses, the likeliest first, from which the image does not tell it; or the reason.
+    """
+    chance = float(np.median([fit.share for fit in fits]))
+    views = [
+        partial_view(fit.seen, chance) if isinstance(fit.seen, EdgeMeasurement) else NOT_SEEN
+        for fit in fits
+    ]
+    nats = np.array([view.nats for view in views])
+    best = int(np.argmax(nats))
+    T = fits[best].T_camera_target
+    if nats[best] < _SURE or views[best].share < least_share:
+        return "what is seen of the object may be something else"
+    order = np.argsort(-nats, kind="stable")
+    alike = [fits[k] for k in order if nats[k] > nats[best] - _DECIDED]
+    if fits[best].share >= least_share:
+        return alike
+    if not all(is_near(fit.T_camera_target, T) for fit in alike):
+        return "several poses explain what is seen of the object"
+    error = pose_error(T, near.T_camera_target)
+    if float(error @ np.linalg.solve(near.covariance, error)) > _PREDICTED:
+        return "what is seen of the object is not where it was predicted"
+    return [fits[best]]

@@ -1,0 +1,78 @@
+"""How strongly the edges in an image support a pose of an object of which a part may be hidden.
+
+What hides an object covers one side of it, or a band across it: the edges that are missing lie
+together. Beside it all edges must be found, and where the pose predicts them. Places that are found
+by chance, in clutter or on what hides the object, lie anywhere within the tolerance instead.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vergence.arrays import BoolArray, FloatArray
+from vergence.vision.known_object.edge_measurement import EdgeMeasurement
+
+_FOUND = 0.95  # fraction of the places found on visible edges
+_PRECISE_PX = 0.5  # standard deviation of their residuals
+_TOLERANCE_PX = 1.5  # within which others are found by chance
+_ALIKE, _MOST_OF_EDGE = (
+    4.0,
+    3.0,
+)  # places that count as one; and of one edge, which may lie on a line
+_DIRECTIONS, _BOUNDS = 12, 24  # of the borders that are tried, and their places along each
+_LEAST_CHANCE, _MOST_CHANCE = 0.3, 0.9
+
+
+class PartialView(NamedTuple):
+    """The part of an object that is visible, if it has a pose."""
+
+    nats: float  # log likelihood ratio of the pose to chance
+    visible: BoolArray  # (N,) which of the places are not hidden
+    share: float  # fraction of these that was found
+
+
+NOT_SEEN = PartialView(0.0, np.zeros(0, dtype=np.bool_), 0.0)
+
+
+def partial_view(seen: EdgeMeasurement, chance: float) -> PartialView:
+    """Return the visible part under which the pose is most likely.
+
+    For each place that is visible, the log likelihood ratio of the pose to chance is
+    log(s N(r; 0, σ) / (c U(r))) with a residual r if it was found, and log((1 - s) / (1 - c)) if
+    it was not; a hidden place tells nothing. Neighbouring places are not independent, and an edge
+    may coincide with another line, so that an edge counts as three places at most.
+
+    Args:
+        seen: the measurement at the pose.
+        chance: fraction of the places that is found at wrong poses.
+    """
+    count, found = len(seen.samples_px), seen.samples_found
+    if not found.any():
+        return PartialView(0.0, np.zeros(count, dtype=np.bool_), 0.0)
+    chance = float(np.clip(chance, _LEAST_CHANCE, _MOST_CHANCE))
+    residuals = np.where(found, seen.fit.residuals, 0.0)
+    precise = np.exp(-0.5 * (residuals / _PRECISE_PX) ** 2) / (_PRECISE_PX * np.sqrt(2.0 * np.pi))
+    of_found = np.log(_FOUND * precise / (chance / (2.0 * _TOLERANCE_PX)))
+    nats = np.where(found, of_found, np.log((1.0 - _FOUND) / (1.0 - chance)))
+    _, edge, places = np.unique(seen.samples.edge, return_inverse=True, return_counts=True)
+    nats *= (np.minimum(places / _ALIKE, _MOST_OF_EDGE) / places)[edge]
+    visible = _visible(np.asarray(seen.samples_px), nats)
+    share = float(np.mean(found[visible])) if visible.any() else 0.0
+    return PartialView(float(nats[visible].sum()), visible, share)
+
+
+def _visible(points_px: FloatArray, nats: FloatArray) -> BoolArray:
+    """Return the places outside the band, or the half plane, that leaves the highest sum."""
+    best, visible = float(nats.sum()), np.ones(len(nats), dtype=np.bool_)
+    for k in range(_DIRECTIONS):
+        angle = np.pi * k / _DIRECTIONS
+        order = np.argsort(points_px @ (np.cos(angle), np.sin(angle)), kind="stable")
+        sums = np.append(0.0, np.cumsum(nats[order]))
+        bounds = np.linspace(0, len(nats), _BOUNDS + 1).round().astype(np.int64)
+        hidden = sums[bounds][None, :] - sums[bounds][:, None]  # from one border to another
+        first, last = np.unravel_index(np.argmin(np.triu(hidden)), hidden.shape)
+        if sums[-1] - hidden[first, last] > best:
+            best = float(sums[-1] - hidden[first, last])
+            visible = np.ones(len(nats), dtype=np.bool_)
+            visible[order[bounds[first] : bounds[last]]] = False
+    return visible
