@@ -10,9 +10,10 @@ from vergence.estimation.unseen_turns import pose_error
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
 
-# Log likelihood ratios. A search reaches about 10⁷ poses that differ, and chance may win one in a
-# thousand times. Four edges never suffice: many things are rectangles.
-_SURE = float(np.log(1e7) + np.log(1e3))
+# Log likelihood ratios. A search reaches about 10⁵ poses that differ, and chance may win one in a
+# thousand times. Of a hidden object four edges never suffice: many things are rectangles.
+_SURE = float(np.log(1e5) + np.log(1e3))
+_SURE_HALF = _SURE + float(np.log(1e2))
 _DECIDED = float(np.log(1e3))  # over every other pose
 _PREDICTED = 22.5  # χ² with six degrees of freedom: 999 of 1000
 
@@ -40,11 +41,12 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
     nats = np.array([view.nats for view in views])
     best = int(np.argmax(nats))
     T = fits[best].T_camera_target
-    if nats[best] < _SURE or views[best].share < least_share:
+    whole = fits[best].share >= least_share
+    if nats[best] < (_SURE if whole else _SURE_HALF) or views[best].share < least_share:
         return "what is seen of the object may be something else"
     order = np.argsort(-nats, kind="stable")
     alike = [fits[k] for k in order if nats[k] > nats[best] - _DECIDED]
-    if fits[best].share >= least_share:
+    if whole:
         return alike
     if not all(is_near(fit.T_camera_target, T) for fit in alike):
         return "several poses explain what is seen of the object"
