@@ -31,7 +31,7 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
         least_share: fraction of the visible part that must be found.
 
     Returns:
-        The poses, the likeliest first, from which the image does not tell it; or the reason.
+        The likeliest pose and those as likely; or why there is none, empty if too little is seen.
     """
     chance = float(np.median([fit.share for fit in fits]))
     views = [
@@ -43,7 +43,7 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
     T = fits[best].T_camera_target
     whole = fits[best].share >= least_share
     if nats[best] < (_SURE if whole else _SURE_HALF) or views[best].share < least_share:
-        return "what is seen of the object may be something else"
+        return ""
     order = np.argsort(-nats, kind="stable")
     alike = [fits[k] for k in order if nats[k] > nats[best] - _DECIDED]
     if whole:

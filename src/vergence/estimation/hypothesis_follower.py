@@ -193,7 +193,7 @@ class HypothesisFollower:
         enough = enough_seen(fits, near, self._rule.found_again) if near else fits
         if isinstance(enough, str):
             self._undecided = enough
-            return replace(step, reason=enough)
+            return replace(step, reason=enough or step.reason)
         fits = enough
         if near is None and fits[0].share < self._rule.found_again:
             return step
