@@ -12,7 +12,7 @@ from test_hypothesis_follower import drawn, wedge
 
 from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
-from vergence.estimation.object_search import AT_ONCE, IN_A_LOOP, ObjectSearch, SearchPace
+from vergence.estimation.object_search import AT_ONCE, IN_A_LOOP, Fit, ObjectSearch, SearchPace
 from vergence.estimation.unseen_turns import pose_error
 from vergence.geometry import se3, so3_exp
 from vergence.studies.region_objects import OBJECTS
@@ -50,16 +50,52 @@ def reappearing(name: str, seed: int) -> Step:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("name", ["can", "bottle", "banana", "duck"])
+@pytest.mark.parametrize("name", ["can", "bottle", "duck"])
 def test_a_smooth_object_is_found_where_it_reappears_turned(name: str, seed: int) -> None:
     step = reappearing(name, seed)
     assert step.sighting is Sighting.SEEN, step.reason
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_mug_whose_handle_may_be_hidden_is_found_or_several_poses_are_told(seed: int) -> None:
-    step = reappearing("mug", seed)
+@pytest.mark.parametrize("name", ["mug", "banana"])
+def test_what_looks_alike_from_two_sides_is_found_or_several_poses_are_told(
+    name: str, seed: int
+) -> None:
+    step = reappearing(name, seed)
     assert step.sighting is Sighting.SEEN or "equally well" in step.reason
+
+
+def beside_a_look_alike(aside: float) -> list[tuple[Step, Any]]:
+    """Return steps and poses of a banana that is hidden beside a block as green as it is.
+
+    The block is at the border of the image; seen from its end a banana fits what is visible of it.
+    """
+    tracker = SilhouetteTracker(ObjectModel.from_mesh("banana", *OBJECTS["banana"]()))
+    shown = list(hidden_for_a_second("banana", 1, after=45))
+    start = shown[0].T_camera_target
+    assert start is not None
+    start = start.copy()
+    start[0, 3] += aside  # rounding decides what is found first
+    follower = HypothesisFollower(
+        tracker, CAMERA, [start], 0.0, 1.0 / RATE_HZ, OUTLINE_RULE, pace=IN_A_LOOP
+    )
+    return [(follower.follow(one.image, one.time), one.T_camera_target) for one in shown]
+
+
+@pytest.mark.parametrize("aside", [0.0, 1e-12, -1e-12, -1e-8])
+def test_what_is_mostly_outside_the_image_is_not_taken_for_a_hidden_object(aside: float) -> None:
+    steps = [(step, T) for step, T in beside_a_look_alike(aside) if step.sighting is Sighting.SEEN]
+    assert all(T is not None and deviations(step, T) < WRONG for step, T in steps)
+
+
+def test_what_looked_like_a_hidden_object_gives_way_when_it_reappears(monkeypatch) -> None:
+    monkeypatch.setattr(Fit, "whole", property(lambda fit: fit.share))  # as if all were in view
+    steps = beside_a_look_alike(1e-12)
+    assert any(step.sighting is Sighting.SEEN for step, T in steps[10:] if T is None)
+    step, T = steps[-1]
+    poses = [step.T_camera_target, *step.alternatives]
+    assert min(np.linalg.norm(pose[:3, 3] - T[:3, 3]) for pose in poses) < 0.1
+    assert step.sighting is Sighting.AMBIGUOUS or deviations(step, T) < WRONG
 
 
 def edge_film(cut: float, after: Any, seed: int, hidden: int, count: int) -> Iterator[Any]:

@@ -26,7 +26,7 @@ from vergence.estimation.object_rivals import (
     is_new_view,
     neighbours,
 )
-from vergence.estimation.object_search import AT_ONCE, Near, ObjectSearch, SearchPace
+from vergence.estimation.object_search import AT_ONCE, Fit, Near, ObjectSearch, SearchPace
 from vergence.estimation.object_tracker import ObjectTracker
 from vergence.geometry import se3_compose
 from vergence.vision.known_object import EdgeTracker
@@ -48,7 +48,8 @@ class HypothesisFollower:
 
     A lost object is searched for in whole images, at all places and many rotations. It counts as
     found when these have been compared, wherever it is; what the images do not distinguish is
-    ambiguous.
+    ambiguous. Where the object may be anywhere, images are searched once more after it was found:
+    what looked like it while it was hidden must not keep it from being found.
 
     Args:
         tracker: finds the object's edges, or its outline.
@@ -88,6 +89,7 @@ class HypothesisFollower:
         self._lost = False  # until rotated poses have been compared
         self._search = ObjectSearch(tracker, camera, pace, self._rule.found_again)
         self._searching = False
+        self._checking = False  # whether images are searched for it elsewhere, since it was found
         self._undecided = ""  # what the last round of the search left open
         self._compared = not self._by_edges
         self._settled = not self._by_edges  # whether poses nearby have been compared
@@ -132,6 +134,8 @@ class HypothesisFollower:
         if self.was_seen and step.sighting is not Sighting.SEEN:
             self._lost = self._lost or step.sighting is Sighting.LOST
             step = self._sought(image, time, step)
+        elif self._checking:
+            self._look_elsewhere(image, time, step)
         if self._missed >= _MISSED:  # the prediction is vague
             self._settled = not self._by_edges
         if not self._settled and step.sighting is Sighting.SEEN:
@@ -182,7 +186,7 @@ class HypothesisFollower:
             return step
         if not self._searching or apart_rad(search.T_last, self._last) > _STALE_RAD:
             search.begin(self._last, self._main.memory)
-            self._searching, self._undecided = True, ""
+            self._searching, self._checking, self._undecided = True, False, ""
         if not search.promising:
             self._hidden_until = time
         near = Near(step.T_camera_target, step.covariance[:6, :6]) if self._by_edges else None
@@ -190,15 +194,14 @@ class HypothesisFollower:
         if fits is None:
             return replace(step, reason=self._undecided or step.reason)
         self._undecided = ""
-        enough = enough_seen(fits, near, self._rule.found_again) if near else fits
+        enough = enough_seen(fits, near, self._rule.found_again) if near else self._whole(fits)
         if isinstance(enough, str):
             self._undecided = enough
             return replace(step, reason=enough or step.reason)
-        fits = enough
-        if near is None and fits[0].share < self._rule.found_again:
+        if not enough:
             return step
         most_rad = _TURN_RAD + _TURN_RATE * (self._hidden_until - self._last_time)
-        chosen = choose_pose(fits, self._last, self._turns, search.free_axes, most_rad)
+        chosen = choose_pose(enough, self._last, self._turns, search.free_axes, most_rad)
         return step if chosen is None else self._found(image, time, step, chosen)
 
     def _found(self, image: ImageArray, time: float, step: Step, chosen: Chosen) -> Step:
@@ -215,8 +218,30 @@ class HypothesisFollower:
             return replace(step, reason=self._undecided)
         self._main, self._lost, self._evidence = main, False, Evidence()
         self._compared_at, self._settled = None, not self._by_edges
+        self._checking = not self._by_edges
         self._rivals = [Rival(self._begin(T, time, memory, deviation), Evidence()) for T in rivals]
         return found
+
+    def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Return the poses of which enough is found; what is outside the image is not."""
+        return [fit for fit in fits if fit.whole >= self._rule.found_again]
+
+    def _look_elsewhere(self, image: ImageArray, time: float, step: Step) -> None:
+        """Search on; track beside the pose what explains the images as well elsewhere."""
+        fits = self._search.look(image)
+        if fits is None:
+            return
+        self._checking = False
+        own = Evidence().and_seen(step.share, len(step.samples_found))
+        memory = self._tracker.elsewhere(self._main.memory)
+        for fit in self._whole(fits):
+            known = [step.T_camera_target, *(r.follower.T_camera_target for r in self._rivals)]
+            elsewhere = not any(is_near(fit.T_camera_target, T) for T in known)
+            worse = own.over(Evidence().and_seen(fit.share, fit.expected)) > DECIDED
+            if elsewhere and not worse and len(self._rivals) < _MOST_RIVALS:
+                rival = self._begin(fit.T_camera_target, time, memory, self._search.deviation)
+                self._rivals.append(Rival(rival, Evidence()))
+                self._evidence, self._compared_at = Evidence(), None
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
         """Track the rotated poses too; drop worse ones, adopt one that explains more."""
