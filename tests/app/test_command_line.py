@@ -304,7 +304,7 @@ def test_ctrl_c_ends_a_run_with_a_whole_recording(tmp_path: Path) -> None:
     run.send_signal(signal.SIGINT)
     said, error = run.communicate(timeout=60)
     assert run.returncode == 1
-    progress = re.compile(r"(prepare:|puma560: [\d.]+ / 30\.0 s) .*so far.*")
+    progress = re.compile(r"(prepare:|writing the report|puma560: [\d.]+ / 30\.0 s).*so far.*")
     assert all(progress.fullmatch(line) for line in error.splitlines()), error
     assert said.startswith("stopped at")
     assert "stopped by the user" in said

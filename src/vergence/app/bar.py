@@ -10,6 +10,8 @@ from rich.text import Text
 from vergence.app.compilations import Compilations
 from vergence.app.heartbeat import Heartbeat
 
+_LATE, _LATE_S = 1.2, 2.0  # up to so many times an estimate, and so much more, it counts as right
+
 
 class Bar(Progress):
     """A progress bar on stderr; where that is no terminal, a line after a second, then every ten.
@@ -87,8 +89,9 @@ class Bar(Progress):
         expected_s = usual_s if usual_s > worked_s else self._expected_s.get(task.id, usual_s)
         if not expected_s:
             return ""
-        left_s = expected_s - worked_s
-        return f"{left_s:.0f} s left" if left_s > 0.0 else "takes longer than estimated"
+        if worked_s > _LATE * expected_s + _LATE_S:
+            return "takes longer than estimated"
+        return f"{max(expected_s - worked_s, 0.0):.0f} s left"
 
     def _worked_s(self, task: Any) -> float:
         return max((task.elapsed or 0.0) - self._set_up_s - self._compilations.spent_s, 0.0)
