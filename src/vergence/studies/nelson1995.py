@@ -36,7 +36,7 @@ def reproduce(
     for i, (strategy, law) in enumerate(STRATEGIES.items()):
         for j, sign in enumerate((1, -1)):
             progress(
-                f"{strategy.replace('_', ' ')}, {'+x' if sign > 0 else '-x'}", (2 * i + j) / 20
+                f"{strategy.replace('_', ' ')}, {'+x' if sign > 0 else '-x'}", (2 * i + j) / 50
             )
             trials[strategy, sign] = run(moving(cell.replace(law=law), sign), quick)
     checks = [
@@ -49,7 +49,7 @@ def reproduce(
         headings(cell, quick, progress),
         *speed(cell, quick, progress),
     ]
-    progress("figures", 0.97)
+    progress("figures", 0.9)
     drawn = figures.draw(out, cell, trials)
     return StudyResult(TITLE, tuple(checks), drawn, seed)
 

@@ -56,11 +56,11 @@ def stability(cell: Cell, quick: bool, progress: Progress) -> list[Check]:
         return trial.outcome.succeeded and _dies_out(trial)
 
     def with_Q(factor: float) -> bool:
-        progress(f"stability at {factor:.2f} Q", 0.4)
+        progress(f"stability at {factor:.2f} Q", 0.13)
         return stable(base.replace(law={"Q": law.Q * factor}))
 
     def with_R(factor: float) -> bool:
-        progress(f"stability at R = {R / factor:.1f}", 0.45)
+        progress(f"stability at R = {R / factor:.1f}", 0.21)
         return stable(base.replace(law={"R": R / factor}))
 
     factor = bisect_threshold(with_Q, 1.0, 10.0, 0.02)
@@ -100,7 +100,7 @@ def headings(cell: Cell, quick: bool, progress: Progress) -> Check:
     """Move the object in twelve directions; see whether something hides it where it is lost."""
     failed, unexplained = {}, []
     for heading in range(0, 360, 30):
-        progress(f"heading {heading} degrees", 0.5 + 0.02 * heading / 30)
+        progress(f"heading {heading} degrees", 0.28 + 0.3 * heading / 360)
         trial = run(moving(cell, 1, heading=np.deg2rad(heading), extra_s=1.0), quick)
         if not kept(trial):
             failed[heading] = str(trial.outcome)
@@ -126,7 +126,7 @@ def speed(cell: Cell, quick: bool, progress: Progress) -> list[Check]:
     """Find how fast the object may move: 2.5 m with avoidance, and by the axes that track."""
 
     def tracked(fast: float) -> bool:
-        progress(f"{fast:.3f} m/s", 0.8)
+        progress(f"{fast:.3f} m/s", 0.6)
         return all(
             kept(run(moving(cell, sign, fast, extra_s=1.0), quick), error_px=None)
             for sign in (1, -1)
@@ -136,7 +136,7 @@ def speed(cell: Cell, quick: bool, progress: Progress) -> list[Check]:
         changed = cell.replace(law=dict(STRATEGIES[strategy]))
 
         def held(fast: float) -> bool:
-            progress(f"{strategy.replace('_', ' ')}, {fast:.3f} m/s", 0.9)
+            progress(f"{strategy.replace('_', ' ')}, {fast:.3f} m/s", 0.7)
             runs = (moving(changed, sign, fast, 0.0, 0.5, SHORT_M) for sign in (1, -1))
             return all(kept(run(one, quick)) for one in runs)
 
