@@ -29,17 +29,21 @@ _FARTHEST_ASIDE = 0.5  # of its distance: largest camera motion at which an obje
 _OFF_PLANE = -2.0  # log₁₀ NFA of the matches off a plane that prove an object not flat
 
 
-def agreements(views: Views) -> list[Agreement]:
+def agreements(views: Views, matrices: FloatArray) -> list[Agreement]:
     """Return the sets of matches that agree on a plane's motion and on any motion, best first.
 
     Two matches off a plane determine the epipole, so some motion always fits them: only agreement
     beyond those two is evidence that the object is not flat [Chum2005].
+
+    Args:
+        views: the matches.
+        matrices: essential matrices of samples of them, (K, 3, 3).
     """
     plane = find_plane(views.m_star, views.m, views.noise)
     found = [plane] if plane.log_alarms <= _TRIED else []
     if len(views) < FEWEST_GENERAL:
         return found
-    general = find_motion(views.m_star, views.m, views.noise)
+    general = find_motion(views.m_star, views.m, views.noise, matrices)
     if general.size < FEWEST_GENERAL or general.log_alarms > _TRIED:
         return found
     near = plane.errors <= _CLEARLY * plane.error

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vergence.arrays import BoolArray
+from vergence.arrays import BoolArray, FloatArray
 from vergence.geometry.chi_square import chi_square_quantile
 from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION
 from vergence.vision.two_view.consensus import (
@@ -24,6 +24,7 @@ from vergence.vision.two_view.fit import (
     compare_models,
     hinging_on_one,
 )
+from vergence.vision.two_view.search import sampled_motions
 
 _GATE = 3.7  # standard deviations within which a match agrees (99.9 % of two coordinates)
 FLAT_CHANCE = -4.0  # log₁₀ of the NFA above which a plane is attributed to chance
@@ -40,6 +41,7 @@ class Explanation:
     fits: list[Fit]  # the best first
     scale: float  # variance of the noise over the stated one, at least 1
     views: Views  # all usable matches, agreeing or not
+    matrices: FloatArray  # (K, 3, 3) essential matrices of samples of five of these matches
     turned: int = 0  # number of other matches, explained by a pure rotation of the camera
 
 
@@ -77,10 +79,13 @@ def explain(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoVie
 def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | TwoViewFailure:
     """Return the first acceptable explanation, or why the most likely one is not acceptable."""
     tried = views.take(usable)
+    solid = len(tried) >= FEWEST_GENERAL
+    matrices = sampled_motions(tried.m_star, tried.m) if solid else np.empty((0, 3, 3))
     if len(tried) == 4 and flat:
         sets = [np.ones(4, dtype=np.bool_)]
     else:
-        sets = [agreement.kept for agreement in agreements(tried)] if len(tried) > 4 else []
+        found = agreements(tried, matrices) if len(tried) > 4 else []
+        sets = [agreement.kept for agreement in found]
     failure: TwoViewFailure | None = None
     perhaps_flat: list[Fit] = []
     for k, kept in enumerate(sets):
@@ -92,7 +97,8 @@ def _explain_once(views: Views, usable: BoolArray, flat: bool) -> Explanation | 
             others = hinging_on_one(best.views, best, scale) if few else []
             if few and best.model == PLANE:
                 others += _solid_rivals(best, tried, sets[k + 1 :], flat)
-            return Explanation([*perhaps_flat, *comparison.fits, *others], scale, tried)
+            fits = [*perhaps_flat, *comparison.fits, *others]
+            return Explanation(fits, scale, tried, matrices)
         failure = doubt if failure is None else failure
         if comparison.fits[0].model == PLANE and doubt.problem is TwoViewProblem.TOO_FEW:
             perhaps_flat.append(comparison.fits[0])

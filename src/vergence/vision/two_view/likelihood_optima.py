@@ -31,12 +31,13 @@ from vergence.vision.two_view.small import (
 )
 
 UNLIKELY = 25.0  # χ² above the best up to which motions are of interest
-_OPTIMA = 16  # largest number of local optima
+_OPTIMA = 24  # largest number of local optima
 _REFINEMENTS = 3  # of an optimum, and of the matches that agree with it
-_DISTINCT = 4.0  # χ² between two optima
+_DISTINCT = 4.0  # χ² between two optima, by the information of either
 _HINGE = 0.7  # leverage of a match on which the motion hinges
 NOISIER = float(np.log(4.0))  # largest ratio of the noise to the stated one
-_NOISES = np.array([0.15, 0.3, 0.5])  # log noise above the estimate
+_ROUNDS = 3  # of estimating the noise of right matches
+_FACTORS = 16  # likelihoods multiplied before their logarithm is taken
 _MANY = 16  # matches from which the noise can be estimated
 _FEWEST = 6  # matches that determine a motion with one to spare
 
@@ -71,22 +72,42 @@ def unlikelihood(likelihood: Likelihood, E: FloatArray, log_noise: float) -> flo
         E: the matrix, (3, 3).
         log_noise: logarithm of the noise over the stated one.
     """
-    deviation = likelihood.noise * np.exp(log_noise)
-    total = 0.0
-    for residual in sampson_residuals(E, likelihood.m_star, likelihood.m):
-        right = np.exp(-0.5 * (residual / deviation) ** 2) / deviation
-        total -= 2.0 * np.log(right + likelihood.wrong)
-    return total
+    residuals = sampson_residuals(E, likelihood.m_star, likelihood.m)
+    return unlikelihood_of(residuals, likelihood.wrong, likelihood.noise * np.exp(log_noise))[0]
+
+
+@njit(cache=True)
+def unlikelihood_of(residuals: FloatArray, wrong: float, deviation: float) -> tuple[float, float]:
+    """Return −2 log of the likelihood of residuals (N,), and the deviation of right ones."""
+    total, product, squares, weights = 0.0, 1.0, 0.0, 0.0
+    for j in range(len(residuals)):
+        square = residuals[j] ** 2
+        right = np.exp(-0.5 * square / deviation**2) / deviation
+        share = right / (right + wrong)
+        squares += share * square
+        weights += share
+        product *= right + wrong
+        if j % _FACTORS == _FACTORS - 1:
+            total -= 2.0 * np.log(product)
+            product = 1.0
+    return total - 2.0 * np.log(product), np.sqrt(squares / max(weights, 1e-300))
 
 
 @njit(cache=True)
 def least_unlikelihood(likelihood: Likelihood, E: FloatArray, log_noise: float) -> float:
-    """Return the least unlikelihood of an essential matrix over the possible noises."""
-    least = unlikelihood(likelihood, E, log_noise)
+    """Return the least unlikelihood of an essential matrix over the possible noises.
+
+    Few matches do not tell their noise; for many, it is that of the matches that are right, which
+    is found by expectation maximisation.
+    """
+    residuals = sampson_residuals(E, likelihood.m_star, likelihood.m)
+    deviation = likelihood.noise * np.exp(log_noise)
+    least, told = unlikelihood_of(residuals, likelihood.wrong, deviation)
     if len(likelihood.m) >= _MANY:
-        for more in _NOISES:
-            if log_noise + more <= NOISIER:
-                least = min(least, unlikelihood(likelihood, E, log_noise + more))
+        for _ in range(_ROUNDS):
+            deviation = likelihood.noise * min(max(told / likelihood.noise, 1.0), np.exp(NOISIER))
+            here, told = unlikelihood_of(residuals, likelihood.wrong, deviation)
+            least = min(least, here)
     return least
 
 
@@ -180,11 +201,13 @@ def local_optima(
     masks = np.empty((_OPTIMA, count), dtype=np.bool_)
     best = likely_matches(likelihood, essential(R, t), log_noise)
     rotations[0], translations[0], masks[0], k = R, t, best, 1
-    information = information_of(likelihood, R, t, best, log_noise)
+    information = np.empty((_OPTIMA, 5, 5))
+    information[0] = information_of(likelihood, R, t, best, log_noise)
     for right in without_one(likelihood, R, t, best, log_noise):
         if np.sum(right) >= _FEWEST and k < _OPTIMA:
             R_k, t_k, _ = refine_essential(R, t, likelihood.m_star[right], likelihood.m[right], 6)
             rotations[k], translations[k], masks[k] = R_k, t_k, right
+            information[k] = information_of(likelihood, R_k, t_k, right, log_noise)
             k += 1
     highest = unlikelihood(likelihood, essential(R, t), log_noise) + UNLIKELY
     unlikely = np.array([unlikelihood(likelihood, E, log_noise + np.log(2.0)) for E in matrices])
@@ -196,13 +219,14 @@ def local_optima(
             continue
         if unlikelihood(likelihood, essential(R_k, t_k), log_noise) > highest:
             continue
+        rotations[k], translations[k], masks[k] = R_k, t_k, right
+        information[k] = information_of(likelihood, R_k, t_k, right, log_noise)
         new = True
         for i in range(k):
             d = step_between(rotations[i], translations[i], R_k, t_k)
-            new = new and dot(d, apply(information, d)) > _DISTINCT
-        if new:
-            rotations[k], translations[k], masks[k] = R_k, t_k, right
-            k += 1
+            for j in (i, k):
+                new = new and dot(d, apply(information[j], d)) > _DISTINCT
+        k += new
     return Optima(rotations[:k], translations[:k], masks[:k])
 
 

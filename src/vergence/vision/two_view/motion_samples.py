@@ -2,8 +2,9 @@
 
 The error of a motion has narrow, curved valleys, since rotation and sideways translation look
 alike, which the covariance at the minimum does not show. The valley through each local optimum of
-the likelihood is therefore followed both ways, motions are drawn about the points on the way, and
-the covariance is widened to contain each of them.
+the likelihood is therefore followed both ways, and over the surface that it is if two directions
+are weak; motions are drawn about the points on the way, and the covariance is widened to contain
+each of them. Valleys bend, so steps and draws are short, and there are many of them.
 """
 
 import numpy as np
@@ -27,15 +28,24 @@ from vergence.vision.two_view.likelihood_optima import (
 from vergence.vision.two_view.linear import homogeneous
 from vergence.vision.two_view.motions import essential
 from vergence.vision.two_view.sampson import sampson_jacobian, sampson_residuals
-from vergence.vision.two_view.search import sampled_motions
 from vergence.vision.two_view.small import apply, dot, symmetric_eigen, transposed_apply
-from vergence.vision.two_view.widening import upsilon_between, widen
+from vergence.vision.two_view.widening import SLACK, upsilon_between, widen
 
-_STEPS = 6  # along a valley, each way
-_DRAWS = 1.3 * np.random.default_rng(0).normal(size=(6, 5))  # about each point of a valley
-_NOISE = 1.3 * np.random.default_rng(1).normal(size=211)  # of the reference plane's distance
+_STEPS = 12  # along a valley, each way
+_HALF = np.sqrt(0.5)
+_HEADINGS = np.array(  # along the two weakest directions of a valley, deviations
+    [
+        *((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)),
+        *((_HALF, _HALF), (-_HALF, -_HALF), (_HALF, -_HALF), (-_HALF, _HALF)),
+    ]
+)
+_BENT = 0.05  # rad: deviation beyond which a direction bends
+_DRAWS = 1.3 * np.random.default_rng(0).normal(size=(40, 5))  # about each point of a valley
+# Of the distance of the reference plane, in deviations, at the bottom of a valley.
+_NOISES = np.array([0.0, -2.0, -1.0, 1.0, 2.0])
+_RARE = 14.0  # χ² of noise and place in the valley together that one in a thousand exceeds
 _FARTHEST = 1e-4  # smallest inverse depth, relative to that of the translation
-_SHORTEST = 4.0  # least information: half a radian is a deviation at most
+_LEAST_INFORMATION = 1.0 / 0.15**2  # rad⁻²: valleys bend, so no step is longer than 0.15 rad
 _STEP = 1e-6  # of a numerical derivative
 _FAR = 30.0  # χ² above which a motion is ignored
 _ASIDE = 1.33  # factor on χ² of what is drawn
@@ -50,11 +60,12 @@ def along_valley(
     right: BoolArray,
     log_noise: float,
     highest: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return motions along the valley of the error through an optimum, both ways, the given first.
+) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Return motions along the valley of the error through an optimum, the given first.
 
     Each step goes by a deviation along the weakest direction, which turns on the way, then back to
-    the bottom of the valley by a step along the others.
+    the bottom of the valley by a step along the others. Where a second direction is so weak that
+    the valley is a bent surface, it is followed along both, and between them.
 
     Args:
         likelihood: of all matches.
@@ -65,21 +76,24 @@ def along_valley(
         highest: unlikelihood at which the valley ends.
 
     Returns:
-        R (K, 3, 3), t (K, 3), and the deviations of (ω, τ) about each, the weakest first, by
-        columns (K, 5, 5).
+        R (K, 3, 3), t (K, 3), the deviations of (ω, τ) about each, the weakest first, by columns
+        (K, 5, 5), and the number of weak directions.
     """
-    rotations, translations = np.empty((2 * _STEPS + 1, 3, 3)), np.empty((2 * _STEPS + 1, 3))
-    spreads = np.empty((2 * _STEPS + 1, 5, 5))
+    most = len(_HEADINGS) * _STEPS + 1
+    rotations, translations = np.empty((most, 3, 3)), np.empty((most, 3))
+    spreads = np.empty((most, 5, 5))
     rotations[0], translations[0], found = R, t, 1
     spreads[0] = local_spread(likelihood, R, t, right, log_noise)
-    for sign in (1.0, -1.0):
-        R_k, t_k, heading = R, t, sign * spreads[0, :, 0].copy()
+    second = spreads[0, :, 1].copy()
+    weak = 2 if dot(second, second) > _BENT**2 else 1
+    for course in _HEADINGS if weak > 1 else _HEADINGS[:2]:
+        R_k, t_k, heading = R, t, apply(spreads[0, :, :2].copy(), course)
         for _ in range(_STEPS):
             R_k, t_k = motion_at(R_k, t_k, heading)
             spread = local_spread(likelihood, R_k, t_k, right, log_noise)
             gradient = gradient_of(likelihood, R_k, t_k, right, log_noise)
             step = np.zeros(5)
-            for k in range(1, 5):
+            for k in range(weak, 5):
                 v = spread[:, k].copy()
                 step -= v * dot(v, gradient)
             R_k, t_k = motion_at(R_k, t_k, step)
@@ -87,10 +101,22 @@ def along_valley(
                 break
             spread = local_spread(likelihood, R_k, t_k, right, log_noise)
             rotations[found], translations[found], spreads[found] = R_k, t_k, spread
-            ahead = spread[:, 0].copy()
-            heading = ahead if dot(ahead, heading) > 0.0 else -ahead
+            heading = ahead(heading, spread[:, :weak].copy())
             found += 1
-    return rotations[:found], translations[:found], spreads[:found]
+    return rotations[:found], translations[:found], spreads[:found], weak
+
+
+@njit(cache=True)
+def ahead(heading: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return the step of one deviation along axes (5, K) that turns least from a heading (5,)."""
+    step, square = np.zeros(5), 0.0
+    for k in range(axes.shape[1]):
+        v = axes[:, k].copy()
+        share = dot(v, heading) / dot(v, v)
+        step += share * v
+        square += share**2
+    ahead: FloatArray = step / np.sqrt(max(square, 1e-300))
+    return ahead
 
 
 @njit(cache=True)
@@ -100,7 +126,7 @@ def local_spread(
     """Return deviations along the axes of the error of right matches, weakest first, (5, 5)."""
     values, vectors = symmetric_eigen(information_of(likelihood, R, t, right, log_noise))
     for k in range(5):
-        vectors[:, k] /= np.sqrt(max(values[k], _SHORTEST))
+        vectors[:, k] /= np.sqrt(max(values[k], _LEAST_INFORMATION))
     return vectors
 
 
@@ -149,28 +175,28 @@ def widen_for_likely(
     least = least_unlikelihood(likelihood, essential(R, t), log_noise)
     covariances, differences = covariance.reshape(1, 6, 6), np.empty((1, 6))
     steepest = likelihood.noise * np.exp(log_noise) * steepest_noise(R, t, m_star, m)
-    drawn = 0
     for k in range(len(optima.t)):
-        R_way, t_way, spreads = along_valley(
+        R_way, t_way, spreads, weak = along_valley(
             likelihood, optima.R[k], optima.t[k], optima.right[k], log_noise, least + UNLIKELY
         )
+        draws = _DRAWS[: len(_DRAWS) // weak**2]
         for i in range(len(R_way)):
-            for j in range(len(_DRAWS) + 1):
-                R_j, t_j = R_way[i], t_way[i]
-                if j < len(_DRAWS):
-                    R_j, t_j = motion_at(R_j, t_j, apply(spreads[i], _DRAWS[j]))
+            for j in range(len(draws) + 1):
+                R_j, t_j, noises = R_way[i], t_way[i], _NOISES
+                if j < len(draws):
+                    R_j, t_j = motion_at(R_j, t_j, apply(spreads[i], draws[j]))
+                    noises = _NOISES[:1]
                 above = least_unlikelihood(likelihood, essential(R_j, t_j), log_noise) - least
-                if above > _FAR:
-                    continue
-                noise = _NOISE[drawn % len(_NOISE)]
-                drawn += 1
-                t_d, behind = translation_over_distance(
-                    R_j, t_j, m_star + noise * steepest[:, :2], m + noise * steepest[:, 2:]
-                )
-                if not behind:
-                    differences[0] = upsilon_between(upsilon, R_j.T.copy(), t_d)
-                    aside = _ASIDE * above + noise**2
-                    widen(covariances, differences, max(aside, _LEAST))
+                for noise in noises:
+                    if above + noise**2 > (_FAR if noise == 0.0 else _RARE):
+                        continue
+                    t_d, behind = translation_over_distance(
+                        R_j, t_j, m_star + noise * steepest[:, :2], m + noise * steepest[:, 2:]
+                    )
+                    if not behind:
+                        differences[0] = upsilon_between(upsilon, R_j.T.copy(), t_d)
+                        aside = max(_ASIDE * above + noise**2, _LEAST)
+                        widen(covariances, differences, SLACK * aside)
     return True
 
 
@@ -203,6 +229,7 @@ def covariance_of_likely(
     R: FloatArray,
     t: FloatArray,
     scale: float,
+    matrices: FloatArray,
     m_star: FloatArray,
     m: FloatArray,
 ) -> FloatArray | None:
@@ -214,6 +241,7 @@ def covariance_of_likely(
         R: of the best motion, (3, 3).
         t: of the best motion, unit, (3,).
         scale: variance of the noise over the stated one.
+        matrices: essential matrices near which there may be optima, (K, 3, 3).
         m_star: points of the reference plane in the desired view, normalized, (P, 2).
         m: the same points in the current view, (P, 2).
 
@@ -221,7 +249,6 @@ def covariance_of_likely(
         The covariance, or None if the reference plane lies behind a camera.
     """
     log_noise = min(0.5 * float(np.log(scale)), NOISIER)
-    matrices = sampled_motions(likelihood.m_star, likelihood.m)
     optima = local_optima(likelihood, R, t, log_noise, matrices)
     widened = covariance.copy()
     in_front = widen_for_likely(widened, likelihood, R, t, log_noise, optima, m_star, m)

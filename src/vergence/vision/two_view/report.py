@@ -135,6 +135,7 @@ class Report(NamedTuple):
             np.ascontiguousarray(state.R),
             state.t,
             found.scale,
+            found.matrices,
             fit.views.m_star[chosen],
             fit.views.m[chosen],
         )

@@ -59,15 +59,15 @@ def find_plane(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
     )
 
 
-def find_motion(m_star: FloatArray, m: FloatArray, noise: float) -> Agreement:
-    """Return the matches that agree on one motion of an object of any shape, from samples of five.
+def find_motion(m_star: FloatArray, m: FloatArray, noise: float, matrices: FloatArray) -> Agreement:
+    """Return the matches that agree on one motion of an object of any shape.
 
     Args:
         m_star: points in the desired view, normalized, (N, 2), N ≥ 8.
         m: the same points in the current view, (N, 2).
         noise: stated standard deviation of a normalized coordinate.
+        matrices: `sampled_motions` of the points, (K, 3, 3).
     """
-    matrices = sampled_motions(m_star, m)
     _, band = log_densities(m_star, m)
     return _agreement(
         *_best_motion(matrices, m_star, m, band, _FLOOR * noise, ceiling(len(m)) * noise)

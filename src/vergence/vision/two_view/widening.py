@@ -40,15 +40,14 @@ def upsilon_between(upsilon: FloatArray, R: FloatArray, t_d: FloatArray) -> Floa
 
 
 @njit(cache=True)
-def widen(covariances: FloatArray, differences: FloatArray, chi_square: float) -> None:
+def widen(covariances: FloatArray, differences: FloatArray, level: float) -> None:
     """Let the motion to which another is nearest contain it, in place.
 
     Args:
         covariances: of each motion, (K, 6, 6).
         differences: of the other motion from each, (K, 6).
-        chi_square: what the other costs more than the best.
+        level: largest dᵀC⁻¹d of the other's difference d.
     """
-    level = SLACK * max(chi_square, _LEAST)
     nearest, least = 0, np.inf
     for k in range(len(covariances)):
         weighed = cholesky_solve(covariances[k], differences[k].copy().reshape(6, 1))[:, 0]
@@ -130,7 +129,7 @@ def widen_for_plane(
             Rt = rotations[k].T.copy()
             for a in range(len(upsilons)):
                 differences[a] = upsilon_between(upsilons[a], Rt, -apply(Rt, translations[k]))
-            widen(covariances, differences, chi_square)
+            widen(covariances, differences, SLACK * max(chi_square, _LEAST))
 
 
 @njit(cache=True)
