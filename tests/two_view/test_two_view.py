@@ -144,6 +144,18 @@ def test_deviations_cover_what_valleys_and_wrong_matches_leave_open(kind: str, s
     assert answer.deviations < 5.0
 
 
+# Two directions of the motion are so weak that the likely motions are a bent surface; optima of one
+# valley, sharp by a wrong match that agrees with them, are taken for many and hide the true one.
+@pytest.mark.parametrize(
+    ("kind", "scene"),
+    [("near plane", 2291), ("general", 5302), ("plane", 11160), ("near plane", 11581)],
+)
+def test_deviations_cover_bent_surfaces_of_likely_motions(kind: str, scene: int) -> None:
+    (answer,) = try_scene(np.random.default_rng([7001, 0, scene]), KINDS.index(kind))
+    assert answer.explanations > 0
+    assert answer.deviations < 5.0
+
+
 # Seven of eight or nine points happen to lie on the plane of a motion far longer than theirs.
 @pytest.mark.parametrize("scene", [1257, 2527])
 def test_a_plane_by_chance_does_not_hide_the_motion_of_all_points(scene: int) -> None:
