@@ -135,6 +135,20 @@ def test_no_motion_changes_a_distance_by_more_than_the_reach_of_the_joints(model
         assert (changed <= clearance.reach @ np.abs(then - q) + 1e-9).all()
 
 
+def test_no_motion_of_another_arm_changes_a_distance_by_more_than_its_reach(model):
+    rng, arm = np.random.default_rng(83), model.arms["other"]
+    nearer = 0
+    for _ in range(200):
+        q, there, then = rng.uniform(arm.q_min, arm.q_max, (3, 3))
+        then = there + rng.uniform(0.0, 0.3) * (then - there)
+        before, after = (clearance_of(model, states=other_at(o)) for o in (there, then))
+        changed = np.abs(after.distances(q) - before.distances(q))
+        bound = before.reach_of_others @ np.abs(then - there)
+        assert (changed <= bound + 1e-9).all()
+        nearer += (changed > 0.3 * bound + 1e-6).sum()
+    assert nearer > 10  # it is no empty bound
+
+
 def test_pairs_are_what_the_arm_can_bring_together(model, caplog):
     clearance = clearance_of(model)
     pairs = {clearance.name(k) for k in range(len(clearance.margin))}

@@ -68,6 +68,7 @@ class Wall:
 
     def __init__(self, at: float, n: int) -> None:
         self.at, self.margin, self.reach = at, np.array([0.02]), np.eye(n)[:1]
+        self.reach_of_others = np.empty((1, 0))
 
     def distances(self, q: np.ndarray) -> np.ndarray:
         return np.array([self.at - q[0]])

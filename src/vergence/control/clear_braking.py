@@ -28,7 +28,7 @@ class ClearBraking:
         self._kept = SHARE * clearance.margin
         self._q: FloatArray | None = None  # where the distances are known, (n,)
         self._room = np.empty(0)  # (P,) m, beyond what is kept there
-        self._others = np.empty(0)
+        self._others = np.empty(0)  # where the other arms' joints were then, (k,)
 
     def hindrance(self, setpoint: Setpoint) -> str:
         """Return which bodies would come how near if the arm braked from here; else nothing."""
@@ -73,9 +73,12 @@ class ClearBraking:
 
     def _known_clear(self, q: FloatArray, most: FloatArray) -> bool:
         """Return whether the distances known are large enough for all that the joints may move."""
-        if self._q is None or (self._clearance.others() != self._others).any():
+        if self._q is None:
             return False
         changed = self._clearance.reach @ (np.abs(q - self._q) + most)
+        if len(self._others):
+            moved = np.abs(self._clearance.others() - self._others)
+            changed += self._clearance.reach_of_others @ moved
         return bool((changed < self._room).all())
 
     def _rooms(self, q: FloatArray) -> FloatArray:

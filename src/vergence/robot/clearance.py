@@ -21,10 +21,12 @@ class Clearance(Protocol):
     Attributes:
         margin: (P,) the distance to keep for each pair, m.
         reach: (P, n) the largest rate at which a joint can change the distance, m/rad or 1.
+        reach_of_others: (P, k) the same for the joints of `others`.
     """
 
     margin: FloatArray
     reach: FloatArray
+    reach_of_others: FloatArray
 
     def near(self, q: FloatArray) -> NearPairs:
         """Return the pairs that are close to each other at joint positions q (n,)."""

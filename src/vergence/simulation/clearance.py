@@ -76,7 +76,10 @@ class CellClearance:
         self._states = states if others else None
         self._q = _NONE  # of the arm, as it was placed last among things that do not move
         self._measured: _Measured | None = None  # there
+        moving = [self._axes[name] for name in others] if states else []
         self.reach = _reach(m, self._axes[arm], self.geoms)
+        by_joint = [_reach(m, axes, self.geoms) for axes in moving]
+        self.reach_of_others = np.hstack([np.empty((len(self.geoms), 0)), *by_joint])
 
     def twin(self) -> "CellClearance":
         """Return the same with a state of its own, for another thread."""
