@@ -20,9 +20,9 @@ from vergence.estimation import (
     predict_visibility,
 )
 from vergence.estimation.information import compress, joseph_update
-from vergence.estimation.motion import predict_covariance, predict_pose
+from vergence.estimation.motion import predict_covariance
 from vergence.estimation.pose_filter import correct
-from vergence.geometry import se3, se3_compose, se3_inverse, transform_points
+from vergence.geometry import moved_pose, se3, se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, ImagePoints
 
 PERIOD = 1.0 / 26.0
@@ -83,7 +83,7 @@ def whole_steps(count, T, velocity, P, C, points, measured, covariance):  # type
     """The same with motion on SE(3), projection, Jacobian, gates and correction of the pose."""
     total = 0.0
     for _ in range(count):
-        pose = predict_pose(T, velocity, PERIOD)
+        pose = moved_pose(T, PERIOD * velocity)
         predicted = predict_covariance(P, velocity, PERIOD, DENSITY)
         found = correct(pose, velocity, predicted, C, points, measured, covariance, GATE)
         total += found.T_world_target[0, 3]

@@ -35,8 +35,8 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import Sighting
+from vergence.geometry import pose_difference
 from vergence.vision.known_object import EdgeTracker, ObjectModel
-from vergence.vision.known_object.pose_fit import pose_difference
 from visp_tracker import PROGRAM, VispTracker
 
 RIGHT_PX = 4.0

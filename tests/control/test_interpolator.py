@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vergence.control import MovingPose, moved, pose_difference
+from vergence.control import MovingPose, moved
 from vergence.control.objectives._interpolator import interpolate
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import pose_difference, se3, so3_exp
 
 DT = 1 / 500
 OMEGA = 2 * np.pi * 5

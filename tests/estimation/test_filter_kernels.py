@@ -4,8 +4,8 @@ from estimation_scene import BOX, CAMERA, HAND, WALL, moving, pose_error, projec
 
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
-from vergence.estimation.motion import correct_pose, predict_covariance, predict_pose
-from vergence.geometry import se3_inverse
+from vergence.estimation.motion import predict_covariance
+from vergence.geometry import moved_pose, se3_inverse
 
 STEP = 1e-6
 
@@ -28,8 +28,8 @@ def test_measurement_jacobian_matches_finite_differences(T_world_camera):
     rows = whitened_rows(T, of_each(T_world_camera), BOX, measured, unit)
     numeric = np.empty((2 * len(BOX), 6))
     for i, d in enumerate(np.eye(12)[:6] * STEP):
-        ahead = project(T_world_camera, correct_pose(T, d))
-        behind = project(T_world_camera, correct_pose(T, -d))
+        ahead = project(T_world_camera, moved_pose(T, d))
+        behind = project(T_world_camera, moved_pose(T, -d))
         numeric[:, i] = ((ahead - behind) / (2 * STEP)).ravel()
     np.testing.assert_allclose(rows[:, :6], numeric, atol=1e-8)
     np.testing.assert_allclose(rows[:, 6], -project(T_world_camera, T).ravel(), atol=1e-14)
@@ -131,8 +131,8 @@ def test_prediction_jacobian_matches_finite_differences():
     T, velocity, dt = moving(0.4), rng.standard_normal(6), 0.13
     F = np.empty((12, 12))
     for i, d in enumerate(np.eye(12) * STEP):
-        ahead = predict_pose(correct_pose(T, d), velocity + d[6:], dt)
-        behind = predict_pose(correct_pose(T, -d), velocity - d[6:], dt)
+        ahead = moved_pose(moved_pose(T, d), dt * (velocity + d[6:]))
+        behind = moved_pose(moved_pose(T, -d), dt * (velocity - d[6:]))
         F[:6, i] = pose_error(behind, ahead) / (2 * STEP)
         F[6:, i] = d[6:] / STEP
     P = random_covariance(rng)
@@ -144,9 +144,9 @@ def test_prediction_jacobian_matches_finite_differences():
 def test_two_half_steps_are_one_step():
     rng = np.random.default_rng(4)
     T, velocity, density = moving(0.4), rng.standard_normal(6), np.array([0.3, 0.5])
-    once = predict_pose(T, velocity, 0.2)
+    once = moved_pose(T, 0.2 * velocity)
     np.testing.assert_allclose(
-        predict_pose(predict_pose(T, velocity, 0.1), velocity, 0.1), once, atol=1e-14
+        moved_pose(moved_pose(T, 0.1 * velocity), 0.1 * velocity), once, atol=1e-14
     )
     still, P = np.zeros(6), random_covariance(rng)
     half = predict_covariance(P, still, 0.1, density)

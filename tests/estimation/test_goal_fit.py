@@ -11,9 +11,8 @@ from vergence.estimation.goal_fit import (
     arm_image,
     fit_goal,
     points_in,
-    pose_difference,
 )
-from vergence.geometry import se3, se3_inverse, so3_exp, transform_points
+from vergence.geometry import pose_difference, se3, se3_inverse, so3_exp, transform_points
 
 CAMERA = Camera(640, 480, focal_px=600)
 NOISE_PX = 0.2

@@ -6,9 +6,9 @@ from estimation_scene import BOX, HAND, WALL, moving, pose_error, view
 
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, Verdict
-from vergence.estimation.motion import correct_pose, predict_pose
 from vergence.estimation.target_filter import state_of
 from vergence.estimation.view import together
+from vergence.geometry import moved_pose
 
 SMALL_START = np.diag(np.repeat([0.01, 0.03, 0.05, 0.1], 3) ** 2)
 
@@ -45,13 +45,13 @@ def test_target_that_moves_as_modelled_is_estimated_with_an_honest_covariance():
     for _ in range(runs):
         start = np.linalg.cholesky(SMALL_START) @ rng.standard_normal(12)
         estimate, velocity = moving(0.0), np.zeros(6)
-        truth, velocity = correct_pose(estimate, start), velocity + start[6:]
+        truth, velocity = moved_pose(estimate, start), velocity + start[6:]
         belief = filter_.start(0.0, estimate, covariance=SMALL_START)
         for k in range(1, steps + 1):
             a, b = rng.standard_normal((2, 6))
             change = root * np.sqrt(dt) * a
             shift = root * dt**1.5 * (a / 2 + b / np.sqrt(12))
-            truth = correct_pose(predict_pose(truth, velocity, dt), shift)
+            truth = moved_pose(moved_pose(truth, dt * velocity), shift)
             velocity = velocity + change
             pose = WALL if k % 2 else HAND
             belief = filter_.update(belief, view(rng, k * dt, truth, pose)).belief
@@ -89,7 +89,7 @@ def test_one_fifth_wrong_matches_do_no_harm():
 def test_bad_start_is_overruled_by_the_images():
     rng = np.random.default_rng(3)
     filter_ = PoseFilter()
-    wrong = correct_pose(moving(0.0), np.array([0.1, -0.1, 0.05, 0.2, 0.3, -0.2] + 6 * [0.0]))
+    wrong = moved_pose(moving(0.0), np.array([0.1, -0.1, 0.05, 0.2, 0.3, -0.2] + 6 * [0.0]))
     start = filter_.start(0.0, wrong, covariance=1e-6 * np.eye(12))
     verdicts = []
     *steps, (_, belief, _) = track(filter_, rng, 2.0, belief=start)

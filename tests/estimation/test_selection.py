@@ -198,12 +198,12 @@ def test_windows_hold_the_feature_as_often_as_they_promise():
     P, rule = A @ A.T, WindowRule(deviations=3.0, border_px=0.0, least_px=1.0)
     T, C = moving(0.4), se3_inverse(HAND)
     half = rule.half_sizes(innovation_spread(T, C, BOX, P), CAMERA.focal_px, 1.0)
-    from vergence.estimation.motion import correct_pose
+    from vergence.geometry import moved_pose
 
     places = CAMERA.project(transform_points(C @ T, BOX))
     inside = total = 0
     for _ in range(500):
-        moved = correct_pose(T, np.concatenate((A @ rng.standard_normal(6), np.zeros(6))))
+        moved = moved_pose(T, np.concatenate((A @ rng.standard_normal(6), np.zeros(6))))
         seen = CAMERA.project(transform_points(C @ moved, BOX)) + rng.standard_normal((len(BOX), 2))
         inside += (np.abs(seen - places) <= half).sum()
         total += half.size

@@ -13,8 +13,8 @@ from vergence.estimation import (
     with_unseen,
     without_unseen,
 )
-from vergence.estimation.unseen_turns import MOST_RAD, UNKNOWN_RAD, pose_error
-from vergence.geometry import se3, so3_exp
+from vergence.estimation.unseen_turns import MOST_RAD, UNKNOWN_RAD
+from vergence.geometry import pose_difference, se3, so3_exp
 
 
 def turning(rng: np.random.Generator) -> tuple[Belief, np.ndarray]:
@@ -37,7 +37,7 @@ def test_a_turn_that_does_not_show_is_not_corrected_and_the_rest_is() -> None:
         moved = se3(so3_exp(step[3:].copy()) @ T[:3, :3], T[:3, 3] + step[:3])
         updated = replace(without_unseen(belief, motions), T_world_target=moved)
         after = with_unseen(belief, updated, motions)
-        change = pose_error(after.T_world_target, T)
+        change = pose_difference(after.T_world_target, T)
         expected = step - motions[:, 0] * (motions[3:, 0] @ step[3:])
         assert change == pytest.approx(expected, abs=2e-5)
 

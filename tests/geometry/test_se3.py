@@ -1,7 +1,11 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from vergence.geometry import (
+    moved_pose,
+    pose_difference,
     se3,
     se3_adjoint,
     se3_compose,
@@ -84,3 +88,19 @@ def test_distance_weighs_angle_by_length():
     assert se3_distance(T_a, T_b, 2.0) == pytest.approx(np.hypot(0.5, 1.0), abs=1e-13)
     assert se3_distance(T_a, T_a, 2.0) == pytest.approx(0.0, abs=1e-7)
     assert se3_distance(T_a, T_b, 2.0) == pytest.approx(se3_distance(T_b, T_a, 2.0))
+
+
+def test_a_pose_moved_by_its_difference_to_another_is_the_other():
+    poses = [se3_exp(twist) for twist in twists(20)]
+    for T_from, T_to in pairwise(poses):
+        step = pose_difference(T_to, T_from)
+        np.testing.assert_allclose(moved_pose(T_from, step), T_to, atol=1e-13)
+        np.testing.assert_allclose(pose_difference(T_from, T_to), -step, atol=1e-13)
+
+
+def test_a_step_moves_and_turns_about_the_axes_of_the_frame_the_pose_is_in():
+    T, step = se3_exp(twists(12)[-1]), np.array([0.1, -0.2, 0.3, 0.02, 0.5, -0.1])
+    moved = moved_pose(T, step)
+    np.testing.assert_allclose(moved[:3, 3], T[:3, 3] + step[:3], atol=1e-15)
+    np.testing.assert_allclose(moved[:3, :3], so3_exp(step[3:]) @ T[:3, :3], atol=1e-15)
+    np.testing.assert_array_equal(moved[3], [0.0, 0.0, 0.0, 1.0])

@@ -4,12 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence.geometry import (
+    angle_between,
     matrix_to_quaternion,
     matrix_to_rpy,
     quaternion_to_matrix,
     rpy_rates_to_omega,
     rpy_to_matrix,
     skew,
+    so3_angle,
     so3_exp,
     so3_left_jacobian,
     so3_left_jacobian_inverse,
@@ -138,3 +140,23 @@ def test_rpy_rates_give_the_angular_velocity():
         omega = so3_log(ahead @ behind.T) / (2 * step)
         np.testing.assert_allclose(rpy_rates_to_omega(rpy) @ rates, omega, atol=1e-8)
         assert np.linalg.det(rpy_rates_to_omega(rpy)) == pytest.approx(-np.cos(rpy[1]))
+
+
+@pytest.mark.parametrize("angle", ANGLES + NEAR_HALF_TURN)
+def test_the_angle_between_orientations_is_that_of_the_turn_between_them(angle):
+    R = so3_exp(np.array([0.4, -1.1, 0.3]))
+    for axis in axes(5):
+        turn = so3_exp(angle * axis)
+        assert so3_angle(turn) == pytest.approx(angle, abs=1e-12)
+        for other in (R @ turn, turn @ R):
+            assert angle_between(R, other) == pytest.approx(angle, abs=1e-12)
+            assert angle_between(other, R) == pytest.approx(angle, abs=1e-12)
+
+
+def test_the_angle_of_a_pose_is_that_of_its_rotation_in_any_memory():
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = so3_exp(np.array([0.0, 0.7, 0.0])), 5.0
+    T.flags.writeable = False
+    for pose in (T, np.asfortranarray(T), T[:3, :3]):
+        assert so3_angle(pose) == pytest.approx(0.7)
+        assert angle_between(pose, np.eye(4)) == pytest.approx(0.7)

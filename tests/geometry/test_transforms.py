@@ -18,6 +18,12 @@ def test_every_kernel_has_its_function() -> None:
         assert getattr(transforms, name) is not getattr(kernels, name)
 
 
+def test_every_public_name_is_there() -> None:
+    assert {"angle_between", "so3_angle", "flat_normal", "se3_log"} <= set(transforms.__all__)
+    for name in transforms.__all__:
+        assert callable(getattr(transforms, name))
+
+
 def test_lists_and_arrays_of_any_type_and_order_are_taken() -> None:
     pose = np.array(TURNED)
     expected = kernels.se3_inverse(pose)

@@ -7,7 +7,7 @@ import pytest
 
 import vergence as vg
 from vergence.errors import InputError
-from vergence.runtime.results import angle_between
+from vergence.geometry import angle_between
 
 
 class _Watched:

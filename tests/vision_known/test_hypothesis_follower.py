@@ -15,9 +15,9 @@ from vergence.estimation.object_follower import (
     Sighting,
     Step,
 )
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import angle_between, se3, so3_exp
 from vergence.vision.known_object import EdgeTracker, ObjectModel
-from vergence.vision.known_object.look_alikes import apart_rad, symmetries
+from vergence.vision.known_object.look_alikes import symmetries
 
 FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 BOTTOM = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)])
@@ -68,7 +68,7 @@ def test_an_object_that_begins_turned_by_half_a_turn_is_never_believed_to_be(axi
     assert "turned by 1" in follower.note
     for k, step in enumerate(steps):
         if step.sighting is Sighting.SEEN:
-            assert apart_rad(step.T_camera_target, pose(k / RATE_HZ)) < 0.03
+            assert angle_between(step.T_camera_target, pose(k / RATE_HZ)) < 0.03
     assert steps[-1].sighting is Sighting.SEEN
 
 
@@ -78,7 +78,7 @@ def test_what_the_image_does_not_decide_is_ambiguous_and_both_poses_are_told() -
         assert step.sighting is Sighting.AMBIGUOUS
         assert "turned by" in step.reason
         poses = (step.T_camera_target, *step.alternatives)
-        assert min(apart_rad(T, pose(k / RATE_HZ)) for T in poses) < 0.03
+        assert min(angle_between(T, pose(k / RATE_HZ)) for T in poses) < 0.03
 
 
 def test_a_right_start_stays_and_nothing_is_said() -> None:

@@ -13,17 +13,15 @@ from test_hypothesis_follower import drawn, wedge
 from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
 from vergence.estimation.object_search import AT_ONCE, IN_A_LOOP, Fit, ObjectSearch, SearchPace
-from vergence.estimation.unseen_turns import pose_error
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import angle_between, pose_difference, se3, so3_exp
 from vergence.studies.region_objects import OBJECTS
 from vergence.vision.known_object import EdgeTracker, ObjectModel, SilhouetteTracker
-from vergence.vision.known_object.look_alikes import apart_rad
 
 WRONG = 5.0  # deviations
 
 
 def deviations(step: Step, T: Any) -> float:
-    error = pose_error(step.T_camera_target, T)
+    error = pose_difference(step.T_camera_target, T)
     return float(np.sqrt(error @ np.linalg.solve(step.covariance[:6, :6], error)))
 
 
@@ -124,7 +122,7 @@ def test_an_object_with_edges_is_found_where_it_reappears_turned(
         if step.sighting is Sighting.SEEN:
             assert T is not None
             assert np.linalg.norm(step.T_camera_target[:3, 3] - T[:3, 3]) < 0.004
-            assert apart_rad(step.T_camera_target, T) < 0.04
+            assert angle_between(step.T_camera_target, T) < 0.04
             assert deviations(step, T) < WRONG
     assert step.sighting is Sighting.SEEN, step.reason
 
@@ -169,7 +167,7 @@ def test_a_turned_look_alike_is_not_answered_with_certainty(axis: int, cut: floa
             assert deviations(step, T) < WRONG
         if step.sighting is Sighting.AMBIGUOUS:
             poses = (step.T_camera_target, *step.alternatives)
-            assert min(apart_rad(each, T) for each in poses) < 0.05
+            assert min(angle_between(each, T) for each in poses) < 0.05
         found.append(step.sighting)
     assert {Sighting.SEEN, Sighting.AMBIGUOUS} & set(found)
 
@@ -213,4 +211,4 @@ def test_a_search_does_for_each_image_no_more_than_its_pace_and_then_agrees_with
     assert rounds[0][0] == 1
     assert rounds[1][0] > 10
     np.testing.assert_allclose(rounds[0][1][0].T_camera_target, rounds[1][1][0].T_camera_target)
-    assert apart_rad(rounds[0][1][0].T_camera_target, pose(0.4)) < 0.02
+    assert angle_between(rounds[0][1][0].T_camera_target, pose(0.4)) < 0.02

@@ -8,11 +8,10 @@ from known_scene import CAMERA, box_model
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
-from vergence.geometry import se3, so3_exp
+from vergence.geometry import moved_pose, se3, so3_exp
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, free_axes, shown_by_edges
 from vergence.vision.known_object.contour_fit import fit_contour, outline_motion
 from vergence.vision.known_object.contour_lines import BEYOND, REACH, ContourLines, read_lines
-from vergence.vision.known_object.pose_fit import moved_pose
 from vergence.vision.known_object.primitives import cylinder, ellipsoid
 from vergence.vision.known_object.silhouette import Outline, outline_of
 from vergence.vision.known_object.weak_turns import ELLIPSOID, USUAL, least_shown_of

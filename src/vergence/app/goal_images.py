@@ -9,11 +9,10 @@ from vergence.app import markup
 from vergence.arrays import ImageArray
 from vergence.camera import Camera
 from vergence.camera.grey_levels import grey_levels, grey_values
-from vergence.camera.image_file import read_image_file
+from vergence.camera.image_file import as_jpeg, read_image_file
 from vergence.camera.photograph import read_photograph
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable
-from vergence.errors import InputError
 from vergence.runtime.recording import Recording
 
 GOAL = "goal.png"  # in the run's folder; goal-2.png for the second of several tasks
@@ -124,7 +123,4 @@ def _jpeg(drawn: ImageArray) -> bytes:
     scale = min(1.0, 2 * _WIDTH_PX / width)
     size = (round(scale * width), round(scale * height))
     small = cv2.resize(drawn, size, interpolation=cv2.INTER_AREA)
-    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    if not done:
-        raise InputError(GOAL, "", "an image that cannot be drawn", "an image")
-    return bytes(data)
+    return as_jpeg(np.asarray(small, np.uint8), _QUALITY)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.app.overlay import Marks, draw
-from vergence.arrays import ImageArray
+from vergence.camera.image_file import as_jpeg
 from vergence.runtime.recording import Recording
 
 FILM_FRAMES = 160  # at most
@@ -48,10 +48,10 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
         number = number_at[time]
         marks = [Marks.at(trace, time) for trace in traces]
         if number in film:
-            jpeg = _jpeg(image, marks, FILM_WIDTH_PX, FILM_QUALITY)
+            jpeg = as_jpeg(draw(image, marks, FILM_WIDTH_PX), FILM_QUALITY)
             frames.append(MarkedImage(time, jpeg))
         if number in key:
-            jpeg = _jpeg(image, marks, KEY_FRAME_WIDTH_PX, KEY_FRAME_QUALITY)
+            jpeg = as_jpeg(draw(image, marks, KEY_FRAME_WIDTH_PX), KEY_FRAME_QUALITY)
             key_frames.append(MarkedImage(time, jpeg))
     return CameraImages(thinned(frames, FILM_BYTES / len(recording.cameras)), tuple(key_frames))
 
@@ -70,14 +70,3 @@ def thinned(frames: Sequence[MarkedImage], most: float) -> tuple[MarkedImage, ..
 def film_numbers(count: int) -> range:
     """Return which of so many images a film shows."""
     return range(0, count, max(1, -(-count // FILM_FRAMES)))
-
-
-def _jpeg(image: ImageArray, marks: Sequence[Marks], width: int, quality: int) -> bytes:
-    return jpeg_of(draw(image, marks, width), quality)
-
-
-def jpeg_of(image: ImageArray, quality: int) -> bytes:
-    """Return an image as a JPEG file."""
-    import cv2
-
-    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1])

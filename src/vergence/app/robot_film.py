@@ -9,6 +9,7 @@ from vergence.app.recorded_images import MarkedImage
 from vergence.app.recorded_poses import RecordedPoses
 from vergence.app.recorded_world import RecordedWorld
 from vergence.arrays import FloatArray
+from vergence.camera.image_file import as_jpeg
 from vergence.runtime.recording import Recording
 from vergence.simulation.build import under_a_sky
 from vergence.simulation.renderer import offscreen
@@ -65,6 +66,5 @@ def _drawn(model: Any, states: list[FloatArray], view: Any) -> list[bytes]:
             mujoco.mj_camlight(model, data)
             renderer.update_scene(data, view)
             drawn = cv2.cvtColor(renderer.render(), cv2.COLOR_RGB2BGR)
-            coded = cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
-            jpegs.append(bytes(coded))
+            jpegs.append(as_jpeg(drawn, _QUALITY))
     return jpegs

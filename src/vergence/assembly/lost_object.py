@@ -9,10 +9,9 @@ from vergence.camera import Camera
 from vergence.estimation import Measure
 from vergence.estimation.object_rivals import choose_pose
 from vergence.estimation.object_search import ObjectSearch, SearchPace
-from vergence.geometry import transform_points
+from vergence.geometry import angle_between, transform_points
 from vergence.signals import Frame, ImagePoints
 from vergence.vision.known_object import EdgeTracker, ObjectModel
-from vergence.vision.known_object.look_alikes import apart_rad
 
 _PACE = SearchPace(40, 130, 6)  # about 12 ms an image
 _LEAST_SHARE = 0.85  # of the edges
@@ -81,4 +80,4 @@ class ObjectFinder:
 
 
 def _turned(search: ObjectSearch, T_camera_target: FloatArray) -> bool:
-    return apart_rad(search.T_last, T_camera_target) > _STALE_RAD
+    return angle_between(search.T_last, T_camera_target) > _STALE_RAD

@@ -9,7 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.cell import Cell
 from vergence.cell.written_keys import lines_of
 from vergence.errors import InputError
-from vergence.geometry import matrix_to_rpy, se3_inverse, so3_log
+from vergence.geometry import matrix_to_rpy, se3_inverse, so3_angle
 from vergence.simulation.motion import placement_pose
 
 _APART_M, _APART_DEG = 5e-3, 1.0  # by which two descriptions of a mounting may differ
@@ -28,7 +28,7 @@ def check_mountings(cell: Cell, mountings: Mapping[str, FloatArray]) -> None:
     for name, told in mountings.items():
         apart = se3_inverse(placement_pose(cell.cameras[name])) @ told
         apart_m = float(np.linalg.norm(apart[:3, 3]))
-        apart_deg = float(np.rad2deg(np.linalg.norm(so3_log(np.ascontiguousarray(apart[:3, :3])))))
+        apart_deg = float(np.rad2deg(so3_angle(apart)))
         if apart_m > _APART_M or apart_deg > _APART_DEG:
             given = (
                 f"a mounting {1e3 * apart_m:.0f} mm and {apart_deg:.1f}° from what the robot says"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vergence.arrays import ImageArray
 from vergence.errors import InputError
 
 IMAGES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff", ".webp")
@@ -33,6 +34,18 @@ def natural_order(name: str) -> tuple[list[str | int], str]:
     parts = re.split("([0-9]+)", name)  # words and numbers in turns
     words: list[str | int] = [int(p) if n % 2 else p.lower() for n, p in enumerate(parts)]
     return words, name
+
+
+def as_jpeg(image: ImageArray, quality: int) -> bytes:
+    """Return an image (height, width), or (height, width, 3) BGR, as a JPEG file.
+
+    Args:
+        image: 8 bits a value.
+        quality: 1 to 100.
+    """
+    import cv2
+
+    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1])
 
 
 def read_image_file(path: Path) -> np.ndarray:

@@ -24,7 +24,7 @@ from vergence.control.law import Law
 from vergence.control.law_part import LawPart, LawSetting
 from vergence.control.limits import Limit, Limits, TargetView
 from vergence.control.mounting import CameraMounting
-from vergence.control.moving_pose import MovingPose, moved, pose_difference
+from vergence.control.moving_pose import MovingPose, moved
 from vergence.control.objectives import (
     AXES,
     AdaptiveGain,
@@ -122,7 +122,6 @@ __all__ = [
     "optimal_tracking_tick",
     "pack_setup",
     "unpack_chain",
-    "pose_difference",
     "resolve_redundant",
     "singular_fault",
     "stoppable_speed",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.geometry import se3, so3_exp, so3_log
+from vergence.geometry import se3, so3_angle, so3_exp
 
 REST_S = 0.4  # over which a camera at rest is watched
 _REST = 0.03  # share of a tolerance that it may move in that time
@@ -29,8 +29,7 @@ class Displacement(NamedTuple):
     @property
     def angle_rad(self) -> float:
         """Angle between the camera's orientation and its goal."""
-        R = np.ascontiguousarray(self.T_goal_camera[:3, :3])
-        return float(np.linalg.norm(so3_log(R)))
+        return so3_angle(self.T_goal_camera)
 
     def at_most(self, deviations: float = 3.0) -> tuple[float, float]:
         """Return the largest distance, m, and angle, rad, within the confidence region."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
-from vergence.geometry import se3_inverse, skew, so3_exp
+from vergence.geometry import moved_pose, pose_difference, se3_inverse, skew
 
 _ITERATIONS = 12
 _ENOUGH = 1e-4  # step relative to deviations, below which the adjustment has converged
@@ -92,7 +92,7 @@ def fit_goal(
         return None
     for _ in range(_ITERATIONS):
         step, dX = system.solve(max(damping, _FLOOR))
-        T_new, X_new = _moved(T, step), X + dX
+        T_new, X_new = moved_pose(T, step), X + dX
         new = _System.at(T_new, X_new, goal, images, prior)
         if not new.cost < system.cost:
             damping = max(10.0 * damping, 1e-4)
@@ -108,14 +108,6 @@ def fit_goal(
     covariance: FloatArray = np.linalg.inv(S).astype(np.float64)
     fit = GoalFit(T, covariance, X, system.agrees, system.chi_square, freedom)
     return fit._replace(covariance=fit.scale * fit.covariance)
-
-
-def _moved(T: FloatArray, step: FloatArray) -> FloatArray:
-    """Return a pose moved by (6,): translation along world axes and rotation about them."""
-    moved = T.copy()
-    moved[:3, 3] += step[:3]
-    moved[:3, :3] = so3_exp(np.ascontiguousarray(step[3:])) @ T[:3, :3]
-    return moved
 
 
 class _System(NamedTuple):
@@ -208,14 +200,6 @@ class _System(NamedTuple):
         right = -self.g + np.einsum("jai,ji->a", self.W, by_points)
         step = np.linalg.lstsq(S, right, rcond=None)[0]
         return step, -by_points - np.einsum("jia,a->ji", Y, step)
-
-
-def pose_difference(T: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the difference in position and rotation of two poses, (6,), world axes, m and rad."""
-    from vergence.geometry import so3_log
-
-    turn = so3_log(np.ascontiguousarray(T[:3, :3] @ other[:3, :3].T))
-    return np.concatenate((T[:3, 3] - other[:3, 3], turn))
 
 
 def _projection(

@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.estimation.object_rivals import is_near
 from vergence.estimation.object_search import Fit, Near
-from vergence.estimation.unseen_turns import pose_error
+from vergence.geometry import pose_difference
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
 
@@ -50,7 +50,7 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
         return alike
     if not all(is_near(fit.T_camera_target, T) for fit in alike):
         return "several poses explain what is seen of the object"
-    error = pose_error(T, near.T_camera_target)
+    error = pose_difference(T, near.T_camera_target)
     if float(error @ np.linalg.solve(near.covariance, error)) > _PREDICTED:
         return "what is seen of the object is not where it was predicted"
     return [fits[best]]

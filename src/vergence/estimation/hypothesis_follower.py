@@ -28,9 +28,9 @@ from vergence.estimation.object_rivals import (
 )
 from vergence.estimation.object_search import AT_ONCE, Fit, Near, ObjectSearch, SearchPace
 from vergence.estimation.object_tracker import ObjectTracker
-from vergence.geometry import se3_compose
+from vergence.geometry import angle_between, se3_compose
 from vergence.vision.known_object import EdgeTracker
-from vergence.vision.known_object.look_alikes import Turn, apart_rad, between
+from vergence.vision.known_object.look_alikes import Turn, between
 
 _MISSED = 2  # consecutive images without the object, after which it is searched for elsewhere
 _MOST_RIVALS = 3  # that are tracked in parallel
@@ -184,7 +184,7 @@ class HypothesisFollower:
         search = self._search
         if self._missed + 1 < _MISSED:
             return step
-        if not self._searching or apart_rad(search.T_last, self._last) > _STALE_RAD:
+        if not self._searching or angle_between(search.T_last, self._last) > _STALE_RAD:
             search.begin(self._last, self._main.memory)
             self._searching, self._checking, self._undecided = True, False, ""
         if not search.promising:

@@ -14,7 +14,7 @@ from vergence.estimation.pose_minima import APART_RAD, PoseMinimum, pose_minima
 from vergence.estimation.recovery import LEAST_POINTS, RIVAL
 from vergence.estimation.rig import CameraRig
 from vergence.estimation.view import Seen, together, view_of
-from vergence.geometry import so3_log
+from vergence.geometry import angle_between, pose_difference
 from vergence.signals import Frame, Observation, TargetState
 
 _MOST = 2.0 * RIVAL  # limit on the accumulated evidence
@@ -118,20 +118,13 @@ def _two_poses(seen: Seen, believed: FloatArray) -> tuple[PoseMinimum | None, Po
     minima = pose_minima(seen, believed)
     if not minima:
         return None, None
-    own = min(minima, key=lambda minimum: _turned(minimum.pose, believed))
-    others = [m for m in minima if m is not own and _turned(m.pose, own.pose) > APART_RAD]
+    own = min(minima, key=lambda minimum: angle_between(minimum.pose, believed))
+    others = [m for m in minima if m is not own and angle_between(m.pose, own.pose) > APART_RAD]
     return own, others[0] if others else None
-
-
-def _turned(T_a: FloatArray, T_b: FloatArray) -> float:
-    """Return the angle between the orientations of two poses, rad."""
-    return float(np.linalg.norm(so3_log(np.ascontiguousarray(T_a[:3, :3] @ T_b[:3, :3].T))))
 
 
 def _reaching(target: TargetState, other: FloatArray) -> TargetState:
     """Return a state whose covariance has a pose (4, 4) within one standard deviation."""
-    T = target.T_world_target
     away = np.zeros(len(target.covariance))
-    away[:3] = other[:3, 3] - T[:3, 3]
-    away[3:6] = so3_log(np.ascontiguousarray(other[:3, :3] @ T[:3, :3].T))
+    away[:6] = pose_difference(other, target.T_world_target)
     return replace(target, covariance=target.covariance + np.outer(away, away))

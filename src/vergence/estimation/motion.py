@@ -9,22 +9,8 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.geometry import so3_exp, so3_left_jacobian
+from vergence.geometry import so3_left_jacobian
 from vergence.kernels.scratch import scratch
-
-
-@njit(cache=True)
-def predict_pose(T_world_target: FloatArray, velocity: FloatArray, dt: float) -> FloatArray:
-    """Return the pose (4, 4) after dt seconds of constant velocity (v, ω), world axes."""
-    E = so3_exp(velocity[3:] * dt)
-    T = np.zeros((4, 4))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                T[i, j] += E[i, k] * T_world_target[k, j]
-        T[i, 3] = T_world_target[i, 3] + velocity[i] * dt
-    T[3, 3] = 1.0
-    return T
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -88,9 +74,3 @@ def _advance(P: FloatArray, E: FloatArray, J: FloatArray, dt: float, out: FloatA
         out[5, j] = e20 * x + e21 * y + e22 * z + b20 * u + b21 * v + b22 * w
         out[6, j], out[7, j], out[8, j] = P[6, j], P[7, j], P[8, j]
         out[9, j], out[10, j], out[11, j] = u, v, w
-
-
-@njit(cache=True)
-def correct_pose(T_world_target: FloatArray, correction: FloatArray) -> FloatArray:
-    """Return the pose moved by an error (δp, δθ): p + δp, exp(δθ) R."""
-    return predict_pose(T_world_target, correction[:6], 1.0)

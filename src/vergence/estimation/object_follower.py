@@ -20,7 +20,7 @@ from vergence.estimation import (
     without_unseen,
 )
 from vergence.estimation.object_tracker import Measurement, ObjectTracker
-from vergence.geometry import se3_compose, so3_log
+from vergence.geometry import pose_difference, se3_compose
 from vergence.signals import ImagePoints
 
 CAMERA = "camera"
@@ -301,13 +301,7 @@ class ObjectFollower:
 
 def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:
     """Return the squared Mahalanobis distance of a pose from the prediction."""
-    turn = T_camera_target[:3, :3] @ belief.T_world_target[:3, :3].T
-    error = np.concatenate(
-        (
-            T_camera_target[:3, 3] - belief.T_world_target[:3, 3],
-            so3_log(np.ascontiguousarray(turn)),
-        )
-    )
+    error = pose_difference(T_camera_target, belief.T_world_target)
     return float(error @ np.linalg.solve(belief.honest_covariance[:6, :6], error))
 
 

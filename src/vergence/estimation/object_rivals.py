@@ -16,11 +16,9 @@ from vergence.camera import Camera
 from vergence.estimation.object_follower import ObjectFollower, Step
 from vergence.estimation.object_search import Fit
 from vergence.estimation.object_tracker import ObjectTracker
-from vergence.estimation.unseen_turns import pose_error
-from vergence.geometry import se3, se3_compose, so3_exp
+from vergence.geometry import angle_between, pose_difference, se3, se3_compose, so3_exp
 from vergence.vision.known_object.look_alikes import (
     Turn,
-    apart_rad,
     axes_apart_rad,
     between,
     turns_of,
@@ -137,7 +135,7 @@ def is_new_view(T: FloatArray, T_before: FloatArray | None) -> bool:
     if T_before is None:
         return True
     moved = float(np.linalg.norm(T[:3, 3] - T_before[:3, 3]))
-    return apart_rad(T, T_before) > _NEW_VIEW_RAD or moved > _NEW_VIEW * abs(float(T[2, 3]))
+    return angle_between(T, T_before) > _NEW_VIEW_RAD or moved > _NEW_VIEW * abs(float(T[2, 3]))
 
 
 def covered(step: Step, T: FloatArray) -> bool:
@@ -147,7 +145,7 @@ def covered(step: Step, T: FloatArray) -> bool:
 
 def _covers(step: Step, T: FloatArray, T_other: FloatArray) -> bool:
     """Return whether two poses (4, 4) are the same within the stated covariance."""
-    error = pose_error(T, T_other)
+    error = pose_difference(T, T_other)
     return float(error @ np.linalg.solve(step.covariance[:6, :6], error)) < _COVERED
 
 
@@ -209,7 +207,7 @@ def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
     """Return the step with a covariance that covers equally likely poses (4, 4) nearby, too."""
     if not poses:
         return step
-    errors = np.array([pose_error(T, step.T_camera_target) for T in poses])
+    errors = np.array([pose_difference(T, step.T_camera_target) for T in poses])
     added = errors.T @ errors / (len(poses) + 1)
     covariance = step.covariance.copy()
     covariance[:6, :6] += added
@@ -268,7 +266,7 @@ def _distinct(
 
 
 def _same(T: FloatArray, T_other: FloatArray) -> bool:
-    return apart_rad(T, T_other) < _SAME_RAD and _near(T, T_other)
+    return angle_between(T, T_other) < _SAME_RAD and _near(T, T_other)
 
 
 def _near(T: FloatArray, T_other: FloatArray) -> bool:

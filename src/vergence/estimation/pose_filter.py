@@ -10,7 +10,7 @@ from vergence.arrays import BoolArray, FloatArray
 from vergence.estimation.belief import Belief
 from vergence.estimation.information import compress, joseph_update, keep_rows
 from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
-from vergence.estimation.motion import correct_pose, predict_covariance, predict_pose
+from vergence.estimation.motion import predict_covariance
 from vergence.estimation.target_filter import (
     Update,
     Verdict,
@@ -19,6 +19,7 @@ from vergence.estimation.target_filter import (
     unused,
 )
 from vergence.estimation.view import Seen
+from vergence.geometry import moved_pose
 from vergence.parts import knob, part
 
 MEDIAN = 2.0 * np.log(2.0)  # of χ² with the two degrees of freedom of a point
@@ -77,7 +78,7 @@ def correct(
             break
         kept[worst] = False
     return Correction(
-        correct_pose(T_world_target, correction),
+        moved_pose(T_world_target, correction[:6]),
         velocity + correction[6:],
         updated,
         square + rest,
@@ -96,7 +97,7 @@ def predict(
     densities: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray]:
     """Return pose (4, 4) and covariance (12, 12) after dt seconds; see `motion`."""
-    pose = predict_pose(T_world_target, velocity, dt)
+    pose = moved_pose(T_world_target, dt * velocity)
     return pose, predict_covariance(P, velocity, abs(dt), np.array(densities))
 
 

@@ -15,9 +15,8 @@ from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.estimation.measurement import POSE, whitened_rows
-from vergence.estimation.motion import correct_pose
 from vergence.estimation.view import Seen
-from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
+from vergence.geometry import moved_pose, se3, se3_compose, se3_inverse, so3_exp, so3_log
 
 STEPS = 30  # largest number of steps of a descent
 APART_RAD = 0.05  # rotations closer than this are the same minimum
@@ -105,7 +104,7 @@ def is_apart(T_a: FloatArray, T_b: FloatArray, T_camera_world: FloatArray) -> bo
     for i in range(3):
         depth += T_camera_world[2, i] * T_a[i, 3]
         distance += between[i, 3] ** 2
-    turned = np.sqrt(np.sum(so3_log(np.ascontiguousarray(between[:3, :3])) ** 2))
+    turned = np.sqrt(np.sum(so3_log(between) ** 2))
     return bool(turned > APART_RAD or np.sqrt(distance) > APART * abs(depth))
 
 
@@ -162,7 +161,7 @@ def descend(
             A[k, k] *= 1.0 + damping
             A[k, k] += 1e-9
         correction[:POSE] = np.linalg.solve(A, g)
-        T_new = correct_pose(T, correction)
+        T_new = moved_pose(T, correction[:6])
         rows_new = whitened_rows(T_new, poses, points, measured, covariance)
         square_new = np.sum(rows_new[:, POSE] ** 2)
         if square_new < square:

@@ -7,7 +7,6 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.estimation.measurement import POSE, mahalanobis_squared, whitened_rows
-from vergence.estimation.motion import correct_pose
 from vergence.estimation.pose_minima import (
     PoseMinimum,
     is_apart,
@@ -15,7 +14,14 @@ from vergence.estimation.pose_minima import (
     with_linear_translation,
 )
 from vergence.estimation.view import Seen, View, chosen_points, together
-from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
+from vergence.geometry import (
+    angle_between,
+    moved_pose,
+    se3,
+    se3_compose,
+    se3_inverse,
+    so3_exp,
+)
 
 GATE = 13.8  # χ² with 2 degrees of freedom, one in a thousand
 LEAST_POINTS = 4  # in the image from which the search starts
@@ -131,8 +137,7 @@ def settle(
     )
     if len(fits) == 1:
         return fits[0]
-    turn = fits[0].T_world_target[:3, :3].T @ fits[1].T_world_target[:3, :3]
-    angle = np.rad2deg(np.linalg.norm(so3_log(np.ascontiguousarray(turn))))
+    angle = np.rad2deg(angle_between(fits[0].T_world_target, fits[1].T_world_target))
     return NoPose(
         f"{_NUMBERS.get(len(fits), 'several')} different poses explain the points, the likeliest "
         f"{angle:.0f}° apart with odds of {odds[0] / odds[1]:.2g} to 1; another camera, a nearer "
@@ -241,5 +246,5 @@ def _refine(T_world_target: FloatArray, seen: Seen, rounds: int = 8) -> _Fit | N
         if k < rounds:
             correction = np.zeros(2 * POSE)
             correction[:POSE] = np.linalg.solve(information, H.T @ r)
-            pose = correct_pose(pose, correction)
+            pose = moved_pose(pose, correction[:6])
     return _Fit(pose, kept, float(r @ r))

@@ -6,7 +6,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.camera import Camera
-from vergence.geometry import se3, so3_exp, so3_log
+from vergence.geometry import se3, so3_angle, so3_exp, so3_log
 from vergence.robot import Arm
 
 NAMES = ("latency_s", "rotation_x", "rotation_y", "rotation_z", "x_m", "y_m", "z_m", "focal")
@@ -38,7 +38,7 @@ class SelfCalibration(NamedTuple):
     @property
     def rotation_rad(self) -> float:
         """Angle between the true and the believed orientation of the camera."""
-        return float(np.linalg.norm(so3_log(self.T_believed_camera[:3, :3].copy())))
+        return so3_angle(self.T_believed_camera)
 
     @property
     def distance_m(self) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.estimation.belief import Belief
-from vergence.geometry import se3, so3_exp, so3_log
+from vergence.geometry import moved_pose, pose_difference
 
 UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of a uniformly distributed angle
 MOST_RAD = 0.3  # up to which an unobservable rotation is represented by its growing deviation
@@ -47,16 +47,14 @@ def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Beli
     if not motions.shape[1]:
         return updated
     turns: FloatArray = motions[3:]
-    ahead = turns.T @ pose_error(updated.T_world_target, predicted.T_world_target)[3:]
+    ahead = turns.T @ pose_difference(updated.T_world_target, predicted.T_world_target)[3:]
     back = motions @ -ahead
-    T = updated.T_world_target
-    R = so3_exp(np.ascontiguousarray(back[3:])) @ T[:3, :3]
     speed = turns.T @ updated.velocity[3:]
     kept = np.minimum(unseen_variance(predicted, motions), _MOST[:, None])
     P = _projected(updated.covariance, motions) + _along(motions, kept)
     return replace(
         updated,
-        T_world_target=se3(np.ascontiguousarray(R), T[:3, 3] + back[:3]),
+        T_world_target=moved_pose(updated.T_world_target, back),
         velocity=updated.velocity - (1.0 - _DAMPING) * motions @ speed,
         covariance=np.ascontiguousarray(P),
     )
@@ -107,12 +105,6 @@ def unseen_variance(belief: Belief, motions: FloatArray) -> FloatArray:
     turns, P = motions[3:], belief.covariance
     blocks = np.stack((P[3:6, 3:6], P[9:12, 9:12]))
     return np.asarray(np.einsum("ik,nij,jk->nk", turns, blocks, turns))
-
-
-def pose_error(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
-    """Return (δp, δθ) that moves pose b to a: t_a - t_b, log(R_a R_bᵀ)."""
-    turn = so3_log(np.ascontiguousarray(T_a[:3, :3] @ T_b[:3, :3].T))
-    return np.concatenate((T_a[:3, 3] - T_b[:3, 3], turn))
 
 
 def _projected(covariance: FloatArray, motions: FloatArray) -> FloatArray:

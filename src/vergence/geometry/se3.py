@@ -106,6 +106,38 @@ def transform_points(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
+def moved_pose(T: FloatArray, step: FloatArray) -> FloatArray:
+    """Return a pose moved by (Δp, Δθ) along the axes of the frame it is in: p + Δp, exp(Δθ) R.
+
+    Args:
+        T: the pose, (4, 4).
+        step: (6,), m and rad.
+    """
+    E = so3_exp(step[3:6])
+    moved = np.zeros((4, 4))
+    for i in range(3):
+        for j in range(3):
+            moved[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
+        moved[i, 3] = T[i, 3] + step[i]
+    moved[3, 3] = 1.0
+    return moved
+
+
+@njit(cache=True)
+def pose_difference(T_to: FloatArray, T_from: FloatArray) -> FloatArray:
+    """Return (Δp, Δθ), (6,), by which `moved_pose` moves one pose to another: log(R_to R_fromᵀ)."""
+    difference, turn = np.empty(6), np.empty((3, 3))
+    for i in range(3):
+        difference[i] = T_to[i, 3] - T_from[i, 3]
+        for j in range(3):
+            turn[i, j] = (
+                T_to[i, 0] * T_from[j, 0] + T_to[i, 1] * T_from[j, 1] + T_to[i, 2] * T_from[j, 2]
+            )
+    difference[3:] = so3_log(turn)
+    return difference
+
+
+@njit(cache=True)
 def se3_distance(T_a: FloatArray, T_b: FloatArray, length: float) -> float:
     """Return √(|t_a - t_b|² + (length · angle)²), m, angle being that of R_aᵀ R_b.
 

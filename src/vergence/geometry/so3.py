@@ -106,6 +106,16 @@ def so3_log(R: FloatArray) -> FloatArray:
     return w
 
 
+def so3_angle(R: FloatArray) -> float:
+    """Return the angle of a rotation (3, 3), or of that of a pose (4, 4), rad."""
+    return float(np.linalg.norm(so3_log(np.array(R, order="C"))))
+
+
+def angle_between(R_a: FloatArray, R_b: FloatArray) -> float:
+    """Return the angle of R_aᵀ R_b, rad, for rotations (3, 3) or poses (4, 4)."""
+    return so3_angle(R_a[:3, :3].T @ R_b[:3, :3])
+
+
 @njit(cache=True)
 def so3_left_jacobian(w: FloatArray) -> FloatArray:
     """Return J with exp(w + dw) = exp(J dw) exp(w) to first order.

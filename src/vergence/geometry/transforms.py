@@ -18,9 +18,10 @@ from vergence.arrays import FloatArray, as_floats
 
 def _checked(kernel: Any, *shapes: tuple[int | None, ...]) -> Callable[..., Any]:
     """Return a kernel wrapped in a check of its arguments: float64, C order, these shapes."""
-    takes = signature(kernel.py_func)
+    written = getattr(kernel, "py_func", kernel)
+    takes = signature(written)
 
-    @wraps(kernel.py_func)
+    @wraps(written)
     def function(*args: Any, **kwargs: Any) -> Any:
         given = takes.bind(*args, **kwargs).arguments.items()
         pairs = zip(given, shapes, strict=True)
@@ -33,9 +34,12 @@ def _checked(kernel: Any, *shapes: tuple[int | None, ...]) -> Callable[..., Any]
 
 _VECTOR, _TWIST, _ROTATION, _POSE = (3,), (6,), (3, 3), (4, 4)
 
+angle_between = _checked(kernels.angle_between, _ROTATION, _ROTATION)
 matrix_to_quaternion = _checked(kernels.matrix_to_quaternion, _ROTATION)
 matrix_to_rpy = _checked(kernels.matrix_to_rpy, _ROTATION)
+moved_pose = _checked(kernels.moved_pose, _POSE, _TWIST)
 nearest_rotation = _checked(kernels.nearest_rotation, (3, 3))
+pose_difference = _checked(kernels.pose_difference, _POSE, _POSE)
 quaternion_to_matrix = _checked(kernels.quaternion_to_matrix, (4,))
 rpy_rates_to_omega = _checked(kernels.rpy_rates_to_omega, _VECTOR)
 rpy_to_matrix = _checked(kernels.rpy_to_matrix, _VECTOR)
@@ -47,6 +51,7 @@ se3_exp = _checked(kernels.se3_exp, _TWIST)
 se3_inverse = _checked(kernels.se3_inverse, _POSE)
 se3_log = _checked(kernels.se3_log, _POSE)
 skew = _checked(kernels.skew, _VECTOR)
+so3_angle = _checked(kernels.so3_angle, _ROTATION)
 so3_exp = _checked(kernels.so3_exp, _VECTOR)
 so3_left_jacobian = _checked(kernels.so3_left_jacobian, _VECTOR)
 so3_left_jacobian_inverse = _checked(kernels.so3_left_jacobian_inverse, _VECTOR)
@@ -60,4 +65,4 @@ def flat_normal(points: ArrayLike) -> FloatArray | None:
     return normal
 
 
-__all__ = list(kernels.__all__)
+__all__ = [name for name in kernels.__all__ if name in globals()]

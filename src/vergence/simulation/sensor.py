@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import Float32Array, ImageArray
+from vergence.camera.image_file import as_jpeg
 from vergence.cell.schema import CameraTable, ImagingTable
 
 _NOISE_POOL = 256  # rows and columns by which the noise pool is larger than the image
@@ -99,7 +100,7 @@ class Sensor:
         quality = self._imaging.jpeg_quality
         if not quality:
             return grey
-        _, data = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, quality])
+        data = np.frombuffer(as_jpeg(grey, quality), np.uint8)
         return np.asarray(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), dtype=np.uint8)
 
 

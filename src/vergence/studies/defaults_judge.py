@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.geometry import se3_exp, se3_inverse, so3_log, transform_points
+from vergence.geometry import se3_exp, se3_inverse, so3_angle, transform_points
 from vergence.studies.reach_scene import Scene
 
 REACHED_PX, REACHED_M, REACHED_DEG = 1.0, 1e-3, 0.1
@@ -76,7 +76,7 @@ class TrueScene:
         error = float(np.linalg.norm(px - self._scene.goal_px, axis=1).max())
         off = se3_inverse(self._scene.T_world_goal.copy()) @ self._scene.arm.forward_kinematics(q)
         m = float(np.linalg.norm(off[:3, 3]))
-        deg = float(np.degrees(np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))))
+        deg = float(np.degrees(so3_angle(off)))
         alike = m < self._tolerance_m and deg < self._tolerance_deg
         close = error < REACHED_PX and alike
         if close and end in (End.STALLED, End.UNNAMED, End.OFF, End.LATE):

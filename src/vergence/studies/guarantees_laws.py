@@ -20,7 +20,7 @@ from vergence.control import (
     Servo,
     Situation,
 )
-from vergence.geometry import flat_normal, se3_inverse, so3_log, transform_points
+from vergence.geometry import flat_normal, se3_inverse, so3_angle, transform_points
 from vergence.planning import FixedReference, OptimisedPlanner, Path, PlanningProblem, Trajectory
 from vergence.runtime import Loop, Timeouts
 from vergence.runtime.stages import Planner
@@ -214,7 +214,7 @@ def _run(
         assert truth is not None
         error = np.linalg.norm(truth.points_px - scene.goal_px, axis=1).max()
         off = se3_inverse(scene.T_world_goal.copy()) @ truth.T_world_camera
-        angle = np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))
+        angle = so3_angle(off)
         there = np.linalg.norm(off[:3, 3]) < ARRIVED_M and np.degrees(angle) < ARRIVED_DEG
         return Ending.ARRIVED if error < ARRIVED_PX and there else Ending.SHORT
     return {OutcomeKind.IMAGE_LATE: Ending.VIEW, OutcomeKind.JOINT_LIMIT: Ending.JOINT}[

@@ -14,9 +14,9 @@ from vergence.assembly.run_cell import run_driver
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.target_geometry import target_shape
 from vergence.cell import Cell
-from vergence.geometry import se3_inverse
+from vergence.geometry import angle_between, se3_inverse
 from vergence.runtime import DriverWrapper, Run
-from vergence.runtime.results import PoseErrors, angle_between
+from vergence.runtime.results import PoseErrors
 from vergence.signals import Outcome, Sample
 from vergence.simulation import SimulatedDriver
 from vergence.simulation.as_built import as_built

@@ -14,7 +14,7 @@ from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
 from vergence.errors import VergenceError
-from vergence.geometry import se3_inverse, so3_log
+from vergence.geometry import se3_inverse, so3_angle
 from vergence.planning import Path, PlanFailure, PotentialFieldPlanner, Trajectory
 from vergence.runtime import Run
 from vergence.runtime.results import ArmTrace, CameraTrace
@@ -75,8 +75,7 @@ class Realised:
     def final_pose_error(self) -> tuple[float, float]:
         """How far the camera ends from where the desired image was taken, m and rad."""
         missing = se3_inverse(self.scene.T_world_goal.copy()) @ self.camera.T_world_camera[-1]
-        turn = so3_log(np.ascontiguousarray(missing[:3, :3]))
-        return float(np.linalg.norm(missing[:3, 3])), float(np.linalg.norm(turn))
+        return float(np.linalg.norm(missing[:3, 3])), so3_angle(missing)
 
 
 @dataclass(frozen=True, slots=True)

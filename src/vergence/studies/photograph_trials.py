@@ -10,7 +10,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.assembly import run_driver, with_goal
 from vergence.camera.photograph import write_photograph
 from vergence.cell import Cell, load_cell
-from vergence.geometry import se3_inverse, so3_log, transform_points
+from vergence.geometry import se3_inverse, so3_angle, transform_points
 from vergence.signals import Outcome, OutcomeKind
 from vergence.simulation import SimulatedDriver
 from vergence.studies.photograph_methods import Method, without_plan
@@ -159,5 +159,4 @@ def _feasible(
 def apart(T: FloatArray, T_goal: FloatArray) -> tuple[float, float]:
     """Return the distance, m, and the angle, degrees, between two poses."""
     E = se3_inverse(T_goal) @ T
-    turn = np.linalg.norm(so3_log(np.ascontiguousarray(E[:3, :3])))
-    return float(np.linalg.norm(E[:3, 3])), float(np.rad2deg(turn))
+    return float(np.linalg.norm(E[:3, 3])), float(np.rad2deg(so3_angle(E)))

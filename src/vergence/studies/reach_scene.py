@@ -10,7 +10,7 @@ from vergence.camera import Camera
 from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable
-from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
+from vergence.geometry import se3, se3_inverse, so3_angle, so3_exp, transform_points
 from vergence.planning import PlanningProblem
 from vergence.robot import Arm, goal_configurations
 from vergence.simulation import SimulatedDriver
@@ -140,5 +140,4 @@ def _facing_pose(random: np.random.Generator, roll: float, tilt_deg: float) -> F
 
 
 def _is_easy(motion: FloatArray) -> bool:
-    turn = np.linalg.norm(so3_log(np.ascontiguousarray(motion[:3, :3])))
-    return bool(np.linalg.norm(motion[:3, 3]) < EASY_M and turn < EASY_RAD)
+    return bool(np.linalg.norm(motion[:3, 3]) < EASY_M and so3_angle(motion) < EASY_RAD)

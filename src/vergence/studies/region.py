@@ -10,9 +10,8 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.drawing import COLORS, figure, legend, logarithmic
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting, Step
-from vergence.estimation.unseen_turns import pose_error
 from vergence.experiments.workers import Workers
-from vergence.geometry import so3_exp
+from vergence.geometry import moved_pose, pose_difference
 from vergence.studies.check import Check, Progress, StudyResult, within
 from vergence.studies.figure_files import save_figures
 from vergence.studies.honesty_answer import deviations_of
@@ -95,11 +94,10 @@ def follow_film(
     shown = film(mesh, int(random.integers(2**31)), frames, hidden, light, imaging)
     for frame in shown:
         if follower is None:
-            T = frame.T_camera_target.copy()
-            T[:3] = np.column_stack((so3_exp(offset[3:].copy()) @ T[:3, :3], T[:3, 3] + offset[:3]))
+            T = moved_pose(frame.T_camera_target, offset)
             follower = ObjectFollower(tracker, CAMERA, T, 0.0, 1.0 / RATE_HZ, OUTLINE_RULE)
         step = follower.follow(frame.image, frame.time)
-        error = pose_error(step.T_camera_target, frame.T_camera_target)
+        error = pose_difference(step.T_camera_target, frame.T_camera_target)
         turn = _shown_turn(tracker, step, frame.T_camera_target)
         images.append(
             Followed(
@@ -123,7 +121,7 @@ def _shown_turn(tracker: SilhouetteTracker, step: Step, T_true: FloatArray) -> f
     if len(axes) == 1:  # exactly, however far it has turned about its axis
         aside = np.linalg.norm(np.cross(R @ axes[0], R_true @ axes[0]))
         return float(np.arctan2(aside, (R @ axes[0]) @ (R_true @ axes[0])))
-    turn = pose_error(step.T_camera_target, T_true)[3:]
+    turn = pose_difference(step.T_camera_target, T_true)[3:]
     unseen = step.unseen[3:]
     return float(np.linalg.norm(turn - unseen @ (unseen.T @ turn)))
 

@@ -9,7 +9,7 @@ from vergence.app.calibration.synthetic import Truth
 from vergence.arrays import FloatArray
 from vergence.camera.calibration import LENS, LensFit, MountingFit
 from vergence.camera.calibration.reprojection import lens_of
-from vergence.geometry import matrix_to_rpy, rpy_rates_to_omega, so3_log
+from vergence.geometry import angle_between, matrix_to_rpy, rpy_rates_to_omega
 
 _LOCKED = 2e-3  # cosine of the pitch: nearer to ±90° roll and yaw are one angle
 
@@ -59,8 +59,7 @@ def mounting_estimates(fit: MountingFit, truth: Truth | None) -> list[Estimate]:
 
 def rotation_error_deg(fit: MountingFit, truth: Truth) -> float:
     """Return the angle between the camera's estimated and true orientation."""
-    R = fit.T_mount_camera[:3, :3] @ truth.T_mount_camera[:3, :3].T
-    return float(np.rad2deg(np.linalg.norm(so3_log(R))))
+    return float(np.rad2deg(angle_between(fit.T_mount_camera, truth.T_mount_camera)))
 
 
 def _position(fit: MountingFit, T: FloatArray, true: FloatArray) -> Iterator[Estimate]:

@@ -9,7 +9,9 @@ from vergence.app.tracking.film import Film
 from vergence.app.tracking.footage import Footage
 from vergence.app.tracking.track_subject import Subject
 from vergence.arrays import ImageArray
+from vergence.camera.image_file import as_jpeg
 
+_QUALITY = 95  # JPEG
 _KEY_FRAMES = 6  # spread over the footage
 _MOST_KEY_FRAMES = 24  # with those where the state changes
 
@@ -59,8 +61,6 @@ class OverlayFiles:
         changed = number > 0 and before != self._state
         many = len(self._key_frames) >= _MOST_KEY_FRAMES
         if (number % self._spacing == 0 or changed or last) and not many:
-            import cv2
-
             path = self._folder / f"frame-{number:06d}.jpg"
-            path.write_bytes(bytes(cv2.imencode(".jpg", canvas)[1]))
+            path.write_bytes(as_jpeg(canvas, _QUALITY))
             self._key_frames.append(path)

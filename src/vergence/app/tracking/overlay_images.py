@@ -17,11 +17,11 @@ from vergence.app.recorded_images import (
     CameraImages,
     MarkedImage,
     film_numbers,
-    jpeg_of,
     thinned,
 )
 from vergence.app.tracking.track_record import TrackRecord
 from vergence.arrays import ImageArray
+from vergence.camera.image_file import as_jpeg
 
 
 def overlay_images(record: TrackRecord) -> CameraImages:
@@ -42,7 +42,7 @@ def _film(record: TrackRecord, path: Path) -> Iterator[MarkedImage]:
                 return
             if number in wanted:
                 small = _narrowed(video.retrieve()[1], FILM_WIDTH_PX)
-                yield MarkedImage(float(record.time[number]), jpeg_of(small, FILM_QUALITY))
+                yield MarkedImage(float(record.time[number]), as_jpeg(small, FILM_QUALITY))
     finally:
         video.release()
 
@@ -57,7 +57,7 @@ def _key_frames(record: TrackRecord) -> Iterator[MarkedImage]:
         if image is None or number is None or int(number[1]) >= len(record.time):
             continue
         row = int(number[1])
-        jpeg = jpeg_of(_narrowed(image, KEY_FRAME_WIDTH_PX), KEY_FRAME_QUALITY)
+        jpeg = as_jpeg(_narrowed(image, KEY_FRAME_WIDTH_PX), KEY_FRAME_QUALITY)
         yield MarkedImage(float(record.time[row]), jpeg, record.state(row))
 
 

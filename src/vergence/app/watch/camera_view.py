@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
+from vergence.camera.image_file import as_jpeg
 from vergence.runtime.json_numbers import numbers
 from vergence.signals import ImagePoints, curves_of
 
@@ -47,10 +48,7 @@ class CameraView:
         """The image as JPEG; empty without one."""
         if self.image is None:
             return self.kept
-        import cv2
-
-        quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-        return bytes(cv2.imencode(".jpg", self.image, quality)[1])
+        return as_jpeg(self.image, _JPEG_QUALITY)
 
     @cached_property
     def header(self) -> dict[str, Any]:

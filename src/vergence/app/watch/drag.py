@@ -9,7 +9,7 @@ from vergence.app.watch.viewer_camera import ViewerCamera
 from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.arrays import FloatArray
 from vergence.errors import InputError, nearest
-from vergence.geometry import se3_inverse, so3_exp, so3_log
+from vergence.geometry import se3_inverse, so3_angle, so3_exp, so3_log
 
 _RAD_PER_FOCAL = 3.0  # by how much the target turns as the mouse goes one focal length
 
@@ -123,7 +123,7 @@ class TargetDrag:
         self._drag = self._taken = None
         shifted = 1e3 * float(np.linalg.norm(target.shift_m - drag.shift_m))
         between = so3_exp(target.turn_rad) @ so3_exp(drag.turn_rad).T
-        turned = float(np.rad2deg(np.linalg.norm(so3_log(between))))
+        turned = float(np.rad2deg(so3_angle(between)))
         done = [f"by {shifted:.0f} mm"] * (shifted > 0.5) + [f"by {turned:.0f}°"] * (turned > 0.5)
         return ", ".join(done)
 

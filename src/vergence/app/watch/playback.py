@@ -25,10 +25,10 @@ from vergence.app.watch.plots import (
 )
 from vergence.app.watch.view_state import Row
 from vergence.arrays import FloatArray
-from vergence.geometry import se3_inverse
+from vergence.geometry import angle_between, se3_inverse
 from vergence.robot import manipulability_measure
 from vergence.runtime.recording import Recording
-from vergence.runtime.results import CameraTrace, angle_between
+from vergence.runtime.results import CameraTrace
 from vergence.signals import ImagePoints, SearchWindows
 
 _MM = 1e3

@@ -12,10 +12,10 @@ from vergence.app.watch.plots import Plot, drawn_errors, error_key, live_plots, 
 from vergence.app.watch.view_state import ViewState
 from vergence.arrays import FloatArray
 from vergence.cell import Cell
-from vergence.geometry import se3_inverse, transform_points
+from vergence.geometry import angle_between, se3_inverse, transform_points
 from vergence.robot import manipulability_measure
 from vergence.runtime import RunInfo, TickRecord
-from vergence.runtime.results import about_other, angle_between, other_names, tick_pose_errors
+from vergence.runtime.results import about_other, other_names, tick_pose_errors
 from vergence.signals import Frame, FrameTruth, ImagePoints, Observation, Outcome, Reference
 from vergence.simulation import SimulatedDriver
 

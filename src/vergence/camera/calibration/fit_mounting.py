@@ -28,7 +28,7 @@ from vergence.camera.calibration.reprojection import lens_of, residuals, rms
 from vergence.camera.calibration.sighting import BadImage, Sighting, pixels
 from vergence.camera.calibration.solver import Solution, solve
 from vergence.camera.pinhole import Camera
-from vergence.geometry import se3, se3_inverse, so3_exp, so3_log
+from vergence.geometry import angle_between, se3, se3_inverse, so3_exp
 
 FEWEST_POSES = 5
 SCALE_DEVIATION = 0.005  # of a board that was measured with a ruler: 1 mm in 200 mm
@@ -156,7 +156,7 @@ def _doubt(problem: JointProblem, solution: Solution, noise: Noise, starts: list
     for other in others:
         X, Y = solution.state.mounting.X, other.state.mounting.X
         apart_m = float(np.linalg.norm(X[:3, 3] - Y[:3, 3]))
-        apart_rad = float(np.linalg.norm(so3_log(X[:3, :3].T @ Y[:3, :3])))
+        apart_rad = angle_between(X, Y)
         as_good = other.converged and other.cost < solution.cost + _ALIKE
         if as_good and (apart_m > _SAME_M or apart_rad > _SAME_RAD):
             return (

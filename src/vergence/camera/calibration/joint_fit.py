@@ -14,6 +14,8 @@ from vergence.camera.calibration.reprojection import camera_with, reproject, res
 from vergence.camera.calibration.sighting import Sighting
 from vergence.camera.pinhole import Camera
 from vergence.geometry import (
+    angle_between,
+    moved_pose,
     se3,
     se3_adjoint,
     se3_inverse,
@@ -21,7 +23,6 @@ from vergence.geometry import (
     skew,
     so3_exp,
     so3_left_jacobian,
-    so3_log,
 )
 
 SCALE = 21  # which of the parameters is the logarithm of the board's scale
@@ -50,8 +51,7 @@ class State(NamedTuple):
         A rotation vector turns a frame about its own origin, along the axes of its mount.
         """
         X, Y = (
-            se3(so3_exp(d[3:].copy()) @ T[:3, :3], T[:3, 3] + d[:3])
-            for T, d in zip(self.mounting, (step[9:15], step[15:21]), strict=True)
+            moved_pose(T, d) for T, d in zip(self.mounting, (step[9:15], step[15:21]), strict=True)
         )
         scale = self.log_scale + float(step[SCALE])
         return State(self.lens + step[:9], Mounting(X, Y), scale, self.arm_errors + arm_steps)
@@ -167,7 +167,7 @@ class JointProblem:
         free = board_pose(state.camera(self.camera), seen)
         middle = np.append(seen.points.mean(axis=0), 1.0)
         distance = float(np.linalg.norm((T @ middle - free @ middle)[:3]))
-        angle = float(np.linalg.norm(so3_log(T[:3, :3].T @ free[:3, :3])))
+        angle = angle_between(T, free)
         return rms(residuals(state.lens, T, seen)), distance, angle
 
 

@@ -2,7 +2,8 @@
 
 from numba import njit
 
-from vergence.control.moving_pose import MovingPose, moved, pose_difference
+from vergence.control.moving_pose import MovingPose, moved
+from vergence.geometry import pose_difference
 
 
 @njit(cache=True)

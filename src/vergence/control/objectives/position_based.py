@@ -6,12 +6,12 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control.mounting import CameraMounting
-from vergence.control.moving_pose import MovingPose, moved, pose_difference
+from vergence.control.moving_pose import MovingPose, moved
 from vergence.control.objectives._interpolator import interpolate
 from vergence.control.objectives._pose_goal import tip_goal_beside, tip_goal_of_holder
 from vergence.control.objectives.objective import CameraState, Quadratic
 from vergence.errors import Absent, InputError
-from vergence.geometry import se3_compose
+from vergence.geometry import pose_difference, se3_compose
 from vergence.parts import knob, part
 from vergence.robot import Arm, forward_kinematics, jacobian
 from vergence.signals import TargetState

@@ -3,7 +3,8 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.estimation.goal_fit import points_in, pose_difference
+from vergence.estimation.goal_fit import points_in
+from vergence.geometry import pose_difference
 from vergence.planning.approach.goal import GoalImage
 from vergence.planning.approach.recognition import Recognition, tracked_image
 from vergence.vision.tracks import Tracks

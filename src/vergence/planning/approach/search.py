@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.estimation.goal_fit import GoalFit, Prior, pose_difference
+from vergence.estimation.goal_fit import GoalFit, Prior
+from vergence.geometry import pose_difference
 from vergence.planning.approach.answers import Answer
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
 from vergence.planning.approach.recognition import (

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from vergence.arrays import ImageArray
 from vergence.camera.encodings import PIXEL_BYTES, grey_image
 from vergence.camera.grey_levels import grey_levels, grey_values, white_level
-from vergence.camera.image_file import require_size
+from vergence.camera.image_file import as_jpeg, require_size
 from vergence.errors import NOTHING, Absent, InputError
 
 _DEEP = ("mono16", "16UC1")
@@ -66,9 +65,5 @@ def decoded_image(data: Any, name: str) -> np.ndarray:
 
 def jpeg_of(raw: np.ndarray, name: str) -> bytes:
     """Return a grey image as JPEG."""
-    import cv2
-
     values = grey_values(raw, name)
-    grey: ImageArray = grey_levels(values, white_level(values))
-    quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
-    return bytes(cv2.imencode(".jpg", grey, quality)[1])
+    return as_jpeg(grey_levels(values, white_level(values)), _QUALITY)

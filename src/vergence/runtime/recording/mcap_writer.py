@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vergence.arrays import ImageArray
+from vergence.camera.image_file import as_jpeg
 from vergence.places import CELL, RECORDING
 from vergence.runtime.json_numbers import finite
 from vergence.runtime.recording import messages, streams
@@ -134,18 +134,11 @@ class McapWriter:
         self._images[frame.camera] = count + 1
         if frame.image is None or not self._image_every or count % self._image_every:
             return
-        image = messages.image(frame.camera, frame.time, _jpeg(frame.image, self._jpeg_quality))
+        image = messages.image(frame.camera, frame.time, as_jpeg(frame.image, self._jpeg_quality))
         self._file.typed(f"/camera/{frame.camera}/image", self.now, image)
 
 
 def _warm_up() -> None:
     """Load and compile everything that would otherwise delay the first tick."""
     messages.transforms(0.0, {"": np.eye(4)})
-    _jpeg(np.zeros((8, 8), dtype=np.uint8), 50)
-
-
-def _jpeg(image: ImageArray, quality: int) -> bytes:
-    import cv2
-
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return data.tobytes()
+    as_jpeg(np.zeros((8, 8), dtype=np.uint8), 50)

@@ -4,7 +4,6 @@ from vergence.runtime.results.columns import Columns, Row
 from vergence.runtime.results.other_target import OtherTarget, about_other, other_names
 from vergence.runtime.results.pose_errors import (
     PoseErrors,
-    angle_between,
     pose_errors,
     tick_pose_errors,
 )
@@ -43,7 +42,6 @@ __all__ = [
     "RunRecorder",
     "TargetTrace",
     "about_other",
-    "angle_between",
     "arm_row",
     "camera_row",
     "images_of",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.geometry import so3_log
+from vergence.geometry import angle_between
 from vergence.runtime.results.columns import Columns
 from vergence.runtime.results.tick_rows import camera_row, images_of, target_row
 from vergence.runtime.results.traces import CameraTrace, TargetTrace
@@ -79,11 +79,6 @@ def tick_pose_errors(record: TickRecord, info: RunInfo) -> PoseErrors:
         seen[row["camera"]].append(row)
     cameras = {name: columns.table() for name, columns in seen.items()}
     return pose_errors(believed.table(), cameras, info.task_camera)
-
-
-def angle_between(T_a: FloatArray, T_b: FloatArray) -> float:
-    """Return the angle of R_aᵀ R_b, rad, for poses (4, 4)."""
-    return float(np.linalg.norm(so3_log(np.ascontiguousarray(T_a[:3, :3].T @ T_b[:3, :3]))))
 
 
 def _angles(T_a: FloatArray, T_b: FloatArray) -> FloatArray:

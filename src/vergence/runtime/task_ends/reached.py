@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.geometry import se3_compose, se3_inverse, so3_log
+from vergence.geometry import se3_compose, se3_inverse, so3_angle
 from vergence.parts import knob, part
 from vergence.runtime.task_ends.task_end import EndSetting, Moment, Until
 from vergence.signals import Outcome, OutcomeKind
@@ -65,6 +65,6 @@ class _Watch:
         seen = se3_compose(T_camera_world, now.observation.target.T_world_target)
         off = se3_compose(se3_inverse(np.ascontiguousarray(desired)), seen)
         distance = float(np.linalg.norm(off[:3, 3]))
-        angle = float(np.rad2deg(np.linalg.norm(so3_log(np.ascontiguousarray(off[:3, :3])))))
+        angle = float(np.rad2deg(so3_angle(off)))
         near = distance <= self._end.tolerance_m and angle <= self._end.tolerance_deg
         return f"{1e3 * distance:.2f} mm and {angle:.2f}° from the goal" if near else ""

@@ -4,9 +4,9 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
+from vergence.geometry import moved_pose, pose_difference
 from vergence.robot.positive_definite import factor_spd, solve_factored
 from vergence.vision.known_object.contour_lines import REACH, ContourLines
-from vergence.vision.known_object.pose_fit import moved_pose, pose_difference
 from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.silhouette import Outline
 

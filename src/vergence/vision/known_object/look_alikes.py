@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.geometry import se3, se3_compose, se3_inverse, so3_exp, so3_log
+from vergence.geometry import angle_between, se3, se3_compose, se3_inverse, so3_exp, so3_log
 from vergence.vision.known_object.object_model import ObjectModel
 
 _FOLDS = (2, 3, 4, 6)  # of common symmetries
@@ -48,7 +48,8 @@ def turns_of(model: ObjectModel) -> list[Turn]:
                 R = so3_exp(np.ascontiguousarray(angle * axis))
                 turn = Turn(se3(R, middle - R @ middle), axis, float(np.rad2deg(angle)))
                 if all(
-                    apart_rad(turn.T_target_turned, o.T_target_turned) > _APART_RAD for o in turns
+                    angle_between(turn.T_target_turned, o.T_target_turned) > _APART_RAD
+                    for o in turns
                 ):
                     turns.append(turn)
     return turns
@@ -119,11 +120,6 @@ def axes_apart_rad(R: FloatArray, others: FloatArray, free: FloatArray) -> Float
         cosines = 0.5 * (np.einsum("nij,ij->n", others, R) - 1.0)
     angles: FloatArray = np.arccos(np.clip(cosines, -1.0, 1.0))
     return angles
-
-
-def apart_rad(T: FloatArray, T_other: FloatArray) -> float:
-    """Return the angle between two orientations."""
-    return float(np.linalg.norm(so3_log(np.ascontiguousarray(T[:3, :3].T @ T_other[:3, :3]))))
 
 
 def _axes(model: ObjectModel) -> list[tuple[FloatArray, tuple[int, ...]]]:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.geometry import se3, so3_exp, so3_log
+from vergence.geometry import moved_pose, pose_difference
 from vergence.robot.positive_definite import factor_spd, solve_factored
 from vergence.vision.known_object.edge_samples import EdgeSamples, Steps
 from vergence.vision.known_object.projection import pixel_rows
@@ -130,31 +130,6 @@ def _likeliest(
         if inside > 0.0 and weight > best:
             best, step, residual = weight, j, miss
     return step, residual, best / farthest**2
-
-
-@njit(cache=True)
-def pose_difference(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
-    """Return (δp, δθ) that moves pose b to a: t_a - t_b, log(R_a R_bᵀ)."""
-    difference = np.empty(6)
-    difference[:3] = T_a[:3, 3] - T_b[:3, 3]
-    turn = np.eye(4)
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = T_a[i, 0] * T_b[j, 0] + T_a[i, 1] * T_b[j, 1] + T_a[i, 2] * T_b[j, 2]
-    difference[3:] = so3_log(turn)
-    return difference
-
-
-@njit(cache=True)
-def moved_pose(T: FloatArray, step: FloatArray) -> FloatArray:
-    """Return the pose moved by (δp, δθ)."""
-    E = so3_exp(step[3:])
-    R = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                R[i, j] += E[i, k] * T[k, j]
-    return se3(R, T[:3, 3] + step[:3])
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.geometry import so3_log
+from vergence.geometry import angle_between, so3_log
 from vergence.geometry.chi_square import chi_square_quantile, normal_deviate_of_ratio
 from vergence.vision.two_view import bundle
 from vergence.vision.two_view.bundle import GENERAL, PLANE, ROTATION, TwoViewState
@@ -86,9 +86,10 @@ class Fit:
 
     def differs_from(self, other: "Fit") -> bool:
         """Return whether two motions of a general object are different."""
-        turn = so3_log(np.ascontiguousarray(self.state.R.T @ other.state.R))
         cosine = np.clip(self.state.t @ other.state.t, -1.0, 1.0)
-        return bool(np.linalg.norm(turn) > TURNED or np.arccos(cosine) > AIMED)
+        return bool(
+            angle_between(self.state.R, other.state.R) > TURNED or np.arccos(cosine) > AIMED
+        )
 
 
 class Comparison(NamedTuple):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.geometry import se3, so3_log
+from vergence.geometry import angle_between, se3, so3_log
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,7 @@ class TwoView:
 
     def apart_deg(self, other: "TwoView") -> float:
         """Return the angle between the two orientations of the current camera."""
-        turn = np.ascontiguousarray(self.rotation.T @ other.rotation)
-        return float(np.rad2deg(np.linalg.norm(so3_log(turn))))
+        return float(np.rad2deg(angle_between(self.rotation, other.rotation)))
 
     @property
     def homography(self) -> FloatArray:
