@@ -1,6 +1,7 @@
 """Whether an arm can still brake before its bodies touch anything."""
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.robot import Arm, Clearance
@@ -75,11 +76,11 @@ class ClearBraking:
         """Return whether the distances known are large enough for all that the joints may move."""
         if self._q is None:
             return False
-        changed = self._clearance.reach @ (np.abs(q - self._q) + most)
+        room = self._room
         if len(self._others):
             moved = np.abs(self._clearance.others() - self._others)
-            changed += self._clearance.reach_of_others @ moved
-        return bool((changed < self._room).all())
+            room = room - self._clearance.reach_of_others @ moved
+        return bool(_changes_less(self._clearance.reach, self._q, q, most, room))
 
     def _rooms(self, q: FloatArray) -> FloatArray:
         rooms: FloatArray = self._clearance.distances(q) - self._kept
@@ -118,3 +119,25 @@ class ClearBraking:
         return self._between(setpoint, pairs, start, middle) or self._between(
             setpoint, pairs, middle, end
         )
+
+
+@njit(cache=True, error_model="numpy")
+def _changes_less(
+    reach: FloatArray, q_from: FloatArray, q_to: FloatArray, most: FloatArray, room: FloatArray
+) -> bool:
+    """Return whether no pair's distance changes by its room (P,) between two positions, and on.
+
+    Args:
+        reach: what each joint changes each distance by at most, (P, n).
+        q_from: joint positions, (n,).
+        q_to: others, (n,).
+        most: how far each joint moves on from there, (n,).
+        room: (P,) m.
+    """
+    for p in range(len(room)):
+        changed = 0.0
+        for i in range(len(most)):
+            changed += reach[p, i] * (abs(q_to[i] - q_from[i]) + most[i])
+        if not changed < room[p]:
+            return False
+    return True

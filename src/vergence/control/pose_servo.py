@@ -1,6 +1,7 @@
 """Position-based servoing at the inner rate."""
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control.limits import Limits, TargetView
@@ -22,6 +23,7 @@ from vergence.robot import Arm
 from vergence.signals import JointCommand, JointState, Observation, Reference, Setpoint
 
 _ONSET_S = 0.5  # to start the motion of redundant joints within their acceleration limits
+_EVERY_DIRECTION = np.eye(6)  # H of ½ ‖v_tip - twist‖²
 _HELD_BACK = 1e-3  # m/s and rad/s of the desired twist that are not reached
 
 
@@ -55,6 +57,7 @@ class PoseServo:
         situation: Situation,
     ) -> None:
         self._arm, self._mounting, self._situation = arm, mounting, situation
+        self._limits = arm.limits
         setting = Setting(
             arm, mounting, limits, situation.period_s, situation.obstacles,
             situation.depth_range, situation.start, situation.clearance,
@@ -94,7 +97,8 @@ class PoseServo:
             self._view.see(target, desired, joints.time)
         pressure = describe(self._active, self._slack, self._solved, self._solver.names)
         self._active, self._slack, self._solved = 0 * self._active, 0 * self._slack, True
-        solution = self._solve(joints, self._trajectory.twist(joints.position))
+        now = Setpoint(joints.position.copy(), joints.velocity.copy())
+        solution = self._solve(now, self._trajectory.twist(joints.position))
         A = self._twist_map(joints.position)
         return JointCommand(
             solution.rates,
@@ -125,7 +129,7 @@ class PoseServo:
         self._trajectory.clear()
         self._null_space = np.zeros(self._arm.joint_count)
 
-    def _solve(self, joints: JointState | Setpoint, twist: FloatArray) -> Solution:
+    def _solve(self, joints: Setpoint, twist: FloatArray) -> Solution:
         features, faces = NO_FEATURES, None
         if self._view is not None:
             T_world_tip = self._arm.forward_kinematics(joints.position)
@@ -133,7 +137,7 @@ class PoseServo:
         problem = Problem(
             joints.position,
             joints.velocity,
-            np.eye(6),
+            _EVERY_DIRECTION,
             twist,
             features,
             self._null_space_rates(joints.position),
@@ -156,7 +160,30 @@ class PoseServo:
 
     def _null_space_rates(self, q: FloatArray) -> FloatArray:
         """Return the rates of redundant joints towards mid-range, (n,), started smoothly."""
-        away = -self._null_space_rate * self._arm.normalized(q)
         share = self._situation.period_s / _ONSET_S
-        self._null_space = self._null_space + share * (away - self._null_space)
+        self._null_space = nearer_to_middle(
+            self._null_space, q, self._limits, self._null_space_rate, share
+        )
         return self._null_space
+
+
+@njit(cache=True, error_model="numpy")
+def nearer_to_middle(
+    before: FloatArray, q: FloatArray, limits: FloatArray, rate: float, share: float
+) -> FloatArray:
+    """Return rates (n,) that have come by a share nearer to those towards the middle of the range.
+
+    Args:
+        before: the rates of the period before, (n,).
+        q: joint positions, (n,).
+        limits: rows q_min, q_max and others, (k, n); without both, a joint has no middle.
+        rate: from an end of the range, rad/s or m/s.
+        share: from 0 to 1.
+    """
+    rates = np.empty(len(q))
+    for i in range(len(q)):
+        low, high, towards = limits[0, i], limits[1, i], 0.0
+        if np.isfinite(high - low):
+            towards = -rate * (2.0 * q[i] - low - high) / (high - low)
+        rates[i] = before[i] + share * (towards - before[i])
+    return rates

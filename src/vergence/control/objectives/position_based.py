@@ -1,8 +1,10 @@
 """Position-based visual servoing: keeps the target at a desired pose in the camera."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from vergence.arrays import FloatArray
 from vergence.control.mounting import CameraMounting
@@ -14,7 +16,17 @@ from vergence.errors import Absent, InputError
 from vergence.geometry import pose_difference, se3_compose
 from vergence.parts import knob, part
 from vergence.robot import Arm, forward_kinematics, jacobian
+from vergence.robot.chain import Chain
 from vergence.signals import TargetState
+
+
+class Lead(NamedTuple):
+    """How a trajectory leads the tip to a goal."""
+
+    frequency: float  # ω of the second-order filter, rad/s
+    damping: float  # ζ of the filter
+    gain: float  # with which the tip follows the trajectory, 1/s
+    period_s: float  # inner
 
 
 @part("objective", "position_based")
@@ -45,7 +57,7 @@ class PositionBased:
         assert state.q is not None
         assert state.mounting is not None
         goal = tip_goal(state.target, state.T_camera_target, state.mounting, state.time)
-        twist = tip_twist(state.arm, state.q, goal, 2 * np.pi * self.closed_loop_hz)
+        twist = tip_twist(state.arm.chain, state.q, goal, 2 * np.pi * self.closed_loop_hz)
         if state.A is None:
             return Quadratic(np.eye(6), twist)
         inverse = np.linalg.inv(state.A)
@@ -74,21 +86,45 @@ def tip_goal(
     return tip_goal_beside(target, T_camera_target)
 
 
-def tip_twist(arm: Arm, q: FloatArray, reference: MovingPose, gain: float) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def tip_twist(chain: Chain, q: FloatArray, reference: MovingPose, gain: float) -> FloatArray:
     """Return the twist (6,) that keeps the tip on a reference trajectory, in its own frame.
 
     twist + gain · Δ(reference, tip), of the closed-loop inverse kinematics.
 
     Args:
-        arm: up to the tip.
+        chain: up to the tip.
         q: joint set-points, (n,).
         reference: desired pose of the tip, and its velocity.
         gain: 1/s.
     """
-    T = forward_kinematics(arm.chain, q)
-    twist = reference.twist + gain * pose_difference(reference.T, T)
-    R = np.ascontiguousarray(T[:3, :3].T)
-    return np.concatenate((R @ twist[:3], R @ twist[3:]))
+    T = forward_kinematics(chain, q)
+    asked = reference.twist + gain * pose_difference(reference.T, T)
+    twist = np.zeros(6)
+    for i in range(3):
+        for j in range(3):
+            twist[i] += T[j, i] * asked[j]
+            twist[3 + i] += T[j, i] * asked[3 + j]
+    return twist
+
+
+@njit(cache=True, error_model="numpy")
+def led_twist(
+    chain: Chain, q: FloatArray, reference: MovingPose, goal: MovingPose, lead: Lead
+) -> tuple[MovingPose, FloatArray]:
+    """Return a trajectory a period ahead, and the twist (6,) of the tip that follows it there.
+
+    The twist is that of the present pose with the next velocity.
+
+    Args:
+        chain: up to the tip.
+        q: joint set-points, (n,).
+        reference: present state of the trajectory.
+        goal: that it leads to.
+        lead: how it does.
+    """
+    ahead = interpolate(reference, goal, lead.frequency, lead.damping, lead.period_s)
+    return ahead, tip_twist(chain, q, MovingPose(reference.T, ahead.twist), lead.gain)
 
 
 class PoseTrajectory:
@@ -101,9 +137,13 @@ class PoseTrajectory:
     """
 
     def __init__(self, objective: PositionBased, arm: Arm, period_s: float) -> None:
-        self._arm, self._period_s = arm, period_s
-        self._frequency, self._damping = 2 * np.pi * objective.filter_hz, objective.damping
-        self._gain = 2 * np.pi * objective.closed_loop_hz
+        self._arm = arm
+        self._lead = Lead(
+            2 * np.pi * objective.filter_hz,
+            objective.damping,
+            2 * np.pi * objective.closed_loop_hz,
+            period_s,
+        )
         self._goal: MovingPose | None = None
         self._reference: MovingPose | None = None
         self._ahead: MovingPose | None = None
@@ -131,17 +171,15 @@ class PoseTrajectory:
     def twist(self, q: FloatArray) -> FloatArray:
         """Return the tip's twist (6,) now, at joint positions q (n,)."""
         assert self._reference is not None
-        return tip_twist(self._arm, q, self._reference, self._gain)
+        twist: FloatArray = tip_twist(self._arm.chain, q, self._reference, self._lead.gain)
+        return twist
 
     def next_twist(self, q: FloatArray) -> FloatArray:
-        """Return the twist (6,) for the next period: the present pose with the next velocity."""
+        """Return the twist (6,) for the next period, see `led_twist`."""
         assert self._goal is not None
         assert self._reference is not None
-        self._ahead = interpolate(
-            self._reference, self._goal, self._frequency, self._damping, self._period_s
-        )
-        leading = MovingPose(self._reference.T, self._ahead.twist)
-        return tip_twist(self._arm, q, leading, self._gain)
+        self._ahead, twist = led_twist(self._arm.chain, q, self._reference, self._goal, self._lead)
+        return twist
 
     def advance(self, q: FloatArray, rates: FloatArray, held_back: bool) -> None:
         """Advance by one inner period.
@@ -154,10 +192,10 @@ class PoseTrajectory:
         """
         assert self._goal is not None
         self._reference = self._moving_tip(q, rates) if held_back else self._ahead
-        self._goal = MovingPose(moved(self._goal, self._period_s), self._goal.twist)
+        self._goal = MovingPose(moved(self._goal, self._lead.period_s), self._goal.twist)
 
     def _moving_tip(self, q: FloatArray, rates: FloatArray) -> MovingPose:
-        after = q + self._period_s * rates
+        after = q + self._lead.period_s * rates
         T = forward_kinematics(self._arm.chain, after)
         v = jacobian(self._arm.chain, after) @ rates
         return MovingPose(T, np.concatenate((T[:3, :3] @ v[:3], T[:3, :3] @ v[3:])))

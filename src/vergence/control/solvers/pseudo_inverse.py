@@ -148,13 +148,43 @@ class _BoundDampedPseudoInverse:
 
     def solve(self, problem: Problem) -> Solution:
         """Return the joint rates for one tick."""
-        twist = np.linalg.solve(problem.H, problem.g).astype(np.float64)
-        J = self._arm.jacobian(problem.q)
-        rates: FloatArray = resolve_redundant(
-            J, twist, secondary_rates(problem), self._arm.rate_max, self._numbers.singular_below
-        )
+        arm, secondary = self._arm, secondary_rates(problem)
+        rates, v_tip = damped_rates(
+            arm.chain, problem.q, arm.rate_max, problem.H, problem.g, secondary,
+            self._numbers.singular_below,
+        )  # fmt: skip
         none = np.zeros(len(KIND_NAMES))
-        return Solution(rates, J @ rates, np.nan, np.nan, none, none, True)
+        return Solution(rates, v_tip, np.nan, np.nan, none, none, True)
+
+
+@njit(cache=True, error_model="numpy")
+def damped_rates(
+    chain: Chain,
+    q: FloatArray,
+    rate_max: FloatArray,
+    H: FloatArray,
+    g: FloatArray,
+    secondary: FloatArray,
+    singular_below: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates (n,) of `resolve_redundant` for the twist H⁻¹ g, and the twist they make.
+
+    Args:
+        chain: up to the tip.
+        q: joint positions, (n,).
+        rate_max: (n,).
+        H: of the twist of the tip, (6, 6).
+        g: (6,).
+        secondary: desired in the null space, (n,).
+        singular_below: σ₀, relative to the largest singular value.
+    """
+    J, twist = jacobian(chain, q), np.linalg.solve(H, g).astype(np.float64)
+    rates = resolve_redundant(J, twist, secondary, rate_max, singular_below)
+    v_tip = np.zeros(6)
+    for r in range(6):
+        for i in range(len(rates)):
+            v_tip[r] += J[r, i] * rates[i]
+    return rates, v_tip
 
 
 def secondary_rates(problem: Problem) -> FloatArray:
