@@ -114,7 +114,9 @@ def filter_steps() -> tuple[Block, Block]:
 
 def many_cameras(count: int, features: int) -> tuple[Callable[[], object], Callable[[], object]]:
     """Visibility, and the selection of 8, for so many cameras and corners of four boxes."""
-    boxes = [BOX.triangles + np.array([0.2 * k - 0.3, 0.0, 0.0]) for k in range(features // 8)]
+    boxes = [
+        BOX.surface.triangles + np.array([0.2 * k - 0.3, 0.0, 0.0]) for k in range(features // 8)
+    ]
     points = np.vstack(
         [BOX.points + np.array([0.2 * k - 0.3, 0.0, 0.0]) for k in range(len(boxes))]
     )

@@ -16,7 +16,7 @@ BOX = TargetShape.box(EDGES)
 
 def on_box(points: FloatArray) -> TargetShape:
     """Return the box with other features than its corners."""
-    vertices = BOX.triangles.reshape(-1, 3)
+    vertices = BOX.surface.triangles.reshape(-1, 3)
     return TargetShape.from_mesh(points, vertices, np.arange(len(vertices)).reshape(-1, 3))
 
 

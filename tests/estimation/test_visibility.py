@@ -28,7 +28,7 @@ def el_shape():
     """A concave bracket: a low slab with an upright wall on one side, features on its corners."""
     slab, wall = TargetShape.box((0.2, 0.2, 0.05)), TargetShape.box((0.02, 0.2, 0.2))
     up = np.array([0.09, 0.0, 0.125])
-    triangles = np.vstack((slab.triangles, wall.triangles + up))
+    triangles = np.vstack((slab.surface.triangles, wall.surface.triangles + up))
     vertices = triangles.reshape(-1, 3)
     points = np.vstack((slab.points, wall.points + up))
     return TargetShape.from_mesh(points, vertices, np.arange(len(vertices)).reshape(-1, 3))

@@ -18,7 +18,9 @@ MARKS = np.array(
 BOX = TargetShape.box(np.array([0.16, 0.12, 0.10]))
 FACES = FeatureFaces.of_shape(
     TargetShape.from_mesh(
-        MARKS, BOX.triangles.reshape(-1, 3), np.arange(3 * len(BOX.triangles)).reshape(-1, 3)
+        MARKS,
+        BOX.surface.triangles.reshape(-1, 3),
+        np.arange(3 * len(BOX.surface.triangles)).reshape(-1, 3),
     )
 )
 LEAST_DEG = 8.0  # at which start and goal see either face

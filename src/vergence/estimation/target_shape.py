@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
+from vergence.estimation.triangle_tree import TriangleTree, triangle_tree
 
 TOUCHING = 1e-3  # relative to the target's size: a feature this close to a face lies on it
 
@@ -23,7 +24,7 @@ class TargetShape:
     points: FloatArray  # (M, 3) features, m
     normals: FloatArray  # (M, K, 3) unit normals of the faces around each, padded with zeros
     face_counts: IntArray  # (M,) number of faces; 0: visible from all sides
-    triangles: FloatArray  # (F, 3, 3) corners of the surface's triangles, m
+    surface: TriangleTree
     size: float  # m, diagonal of the bounding box
 
     @classmethod
@@ -63,7 +64,7 @@ class TargetShape:
         for m, found in enumerate(around):
             for k, normal in enumerate(found):
                 normals[m, k] = normal
-        return cls(features, frozen(normals), counts, frozen(triangles), size)
+        return cls(features, frozen(normals), counts, triangle_tree(triangles), size)
 
     @classmethod
     def box(cls, edges: ArrayLike) -> Self:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import in_image, is_one_to_one, pixel_of
 from vergence.estimation.target_shape import TOUCHING, TargetShape
+from vergence.estimation.triangle_tree import TriangleTree, is_cut
 from vergence.geometry import se3_inverse, transform_points
 
 StatusArray: TypeAlias = NDArray[np.uint8]  # a `ViewStatus` each
@@ -54,35 +55,6 @@ class Visibility(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def ray_hits(origin: FloatArray, point: FloatArray, triangle: FloatArray, short_of: float) -> bool:
-    """Return whether a triangle (3, 3) cuts the segment from origin to point before its end.
-
-    Solves origin + t (point - origin) = a + β (b - a) + γ (c - a) for t < 1 - short_of
-    (Möller and Trumbore).
-    """
-    dx, dy, dz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    a, b, c = triangle[0], triangle[1], triangle[2]
-    ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    fx, fy, fz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    px, py, pz = dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
-    determinant = ex * px + ey * py + ez * pz
-    if determinant == 0.0:
-        return False
-    inverse = 1.0 / determinant
-    sx, sy, sz = origin[0] - a[0], origin[1] - a[1], origin[2] - a[2]
-    beta = (sx * px + sy * py + sz * pz) * inverse
-    if beta < 0.0 or beta > 1.0:
-        return False
-    qx, qy, qz = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
-    gamma = (dx * qx + dy * qy + dz * qz) * inverse
-    if gamma < 0.0 or beta + gamma > 1.0:
-        return False
-    t = (fx * qx + fy * qy + fz * qz) * inverse
-    hit: bool = 0.0 < t < 1.0 - short_of
-    return hit
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def faces_camera(
     origin: FloatArray, point: FloatArray, normals: FloatArray, count: int, least_cosine: float
 ) -> bool:
@@ -104,7 +76,7 @@ def see(
     points: FloatArray,
     normals: FloatArray,
     face_counts: IntArray,
-    triangles: FloatArray,
+    surface: TriangleTree,
     touching: float,
     margin_px: float,
     least_cosine: float,
@@ -117,7 +89,7 @@ def see(
         points: features in the target's frame, (M, 3), m.
         normals: of the faces around each feature, (M, K, 3).
         face_counts: how many faces there are around each, (M,).
-        triangles: the target's surface, (F, 3, 3), m.
+        surface: of the target.
         touching: a surface this near a feature does not hide it, m.
         margin_px: how far from the border of the image a feature must be.
         least_cosine: of the angle between a face's normal and the line of sight.
@@ -126,10 +98,8 @@ def see(
     status = np.empty((cameras, features), dtype=np.uint8)
     places = np.empty((cameras, features, 2))
     depth = np.empty((cameras, features))
-    heights = plane_heights(triangles, points)
     for c in range(cameras):
         eye = se3_inverse(T_camera_target[c])[:3, 3].copy()
-        eye_heights = plane_heights(triangles, eye.reshape(1, 3))[0]
         seen = transform_points(T_camera_target[c], points)
         for m in range(features):
             z = seen[m, 2]
@@ -145,46 +115,11 @@ def see(
                 status[c, m] = OUTSIDE
             elif not faces_camera(eye, points[m], normals[m], face_counts[m], least_cosine):
                 status[c, m] = TURNED_AWAY
-            elif _hidden(eye, points[m], triangles, eye_heights, heights[m], touching):
+            elif is_cut(surface, eye, points[m], touching):
                 status[c, m] = HIDDEN
             else:
                 status[c, m] = VISIBLE
     return status, places, depth
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def plane_heights(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """Return how high points (N, 3) lie over the planes of triangles (F, 3, 3), (N, F), scaled."""
-    heights = np.empty((len(points), len(triangles)))
-    for f in range(len(triangles)):
-        a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        fx, fy, fz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-        for n in range(len(points)):
-            p = points[n]
-            heights[n, f] = nx * (p[0] - a[0]) + ny * (p[1] - a[1]) + nz * (p[2] - a[2])
-    return heights
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _hidden(
-    eye: FloatArray,
-    point: FloatArray,
-    triangles: FloatArray,
-    eye_heights: FloatArray,
-    heights: FloatArray,
-    touching: float,
-) -> bool:
-    """Return whether a triangle is between; most have both ends on one side of their plane."""
-    x, y, z = eye[0] - point[0], eye[1] - point[1], eye[2] - point[2]
-    short_of = touching / np.sqrt(x * x + y * y + z * z)
-    for n in range(len(triangles)):
-        e, h = eye_heights[n], heights[n]
-        crossed = e * h < 0.0 and abs(h) > short_of * (abs(e) + abs(h))
-        if crossed and ray_hits(eye, point, triangles[n], short_of):
-            return True
-    return False
 
 
 def predict_visibility(
@@ -212,7 +147,7 @@ def predict_visibility(
             shape.points,
             shape.normals,
             shape.face_counts,
-            shape.triangles,
+            shape.surface,
             TOUCHING * shape.size,
             margin_px,
             least_cosine,
