@@ -185,11 +185,29 @@ def tick(count: int) -> Callable[[], object]:
     return step
 
 
+def seen_mesh(count: int) -> Callable[[], object]:
+    """Visibility of a box for so many cameras, its faces divided into a fine mesh."""
+    cells = 20
+    fine = [
+        a + np.array([[i, j], [i + 1, j], [i, j + 1]]) / cells @ np.array([b - a, c - a])
+        for a, b, c in BOX.surface.triangles
+        for i in range(cells)
+        for j in range(cells - i)
+    ]
+    vertices = np.vstack(fine)
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    shape = TargetShape.from_mesh(BOX.points, vertices, faces)
+    rig = CameraRig.of({f"camera{n}": CAMERA for n in range(count)}, 0.5)
+    poses = np.array([se3_inverse(pose) for pose in around(count)])
+    return lambda: predict_visibility(shape, poses, rig.lenses)
+
+
 def run() -> list[dict[str, Any]]:
     linear, whole = filter_steps()
     filterpy = python_peer("filterpy", SOURCES / "filterpy_step.py", "step")
     see, select = many_cameras(64, 32)
     see_few, select_few = many_cameras(2, 32)
+    see_mesh = seen_mesh(4)
     step, sixty_four = tick(4), tick(64)
     return [
         row("filter: 12 states, 16 measurements, linear", linear, filterpy, ratio_aim=0.04),
@@ -199,6 +217,11 @@ def run() -> list[dict[str, Any]]:
         row("selection: 8 of 2 cameras x 32 features", calls(select_few), unit="us"),
         row("visibility: 64 cameras x 32 features", calls(see), unit="us"),
         row("visibility: 2 cameras x 32 features", calls(see_few), unit="us"),
+        row(
+            "visibility: 4 cameras x 8 corners, a mesh of 2 520 triangles",
+            calls(see_mesh),
+            unit="us",
+        ),
         row("estimation tick: 4 cameras, 8 features", calls(step), value_aim=200.0),
         row(
             "estimation tick: 64 cameras, 8 features",

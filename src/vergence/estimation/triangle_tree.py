@@ -7,7 +7,7 @@ from numba import njit
 
 from vergence.arrays import FloatArray, IntArray
 
-_LEAF = 4  # triangles in a box that is not divided further
+_LEAF = 8  # triangles in a box that is not divided further
 _SLACK = 1e-9  # by which boxes are enlarged, relative to the surface: for rounding
 
 
@@ -20,6 +20,7 @@ class TriangleTree(NamedTuple):
     first: IntArray  # (N,) the first triangle in it
     end: IntArray  # (N,) the one after its last; the first again for a box with boxes inside
     triangles: FloatArray  # (F, 3, 3) m
+    planes: FloatArray  # (F, 4) of each a normal n and n · p of its points p
 
 
 def triangle_tree(triangles: FloatArray) -> TriangleTree:
@@ -30,6 +31,9 @@ def triangle_tree(triangles: FloatArray) -> TriangleTree:
     order: list[int] = []
     everything = np.arange(len(triangles))
     boxes = _boxes(triangles, everything, 0, order) if len(triangles) else []
+    ordered = np.array(triangles[order])
+    normals = np.cross(ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0])
+    heights = np.einsum("ni,ni->n", normals, ordered[:, 0])
     slack = _SLACK * float(np.ptp(triangles, axis=(0, 1)).max()) if len(triangles) else 0.0
     return TriangleTree(
         np.array([box.low for box in boxes]).reshape(-1, 3) - slack,
@@ -37,7 +41,8 @@ def triangle_tree(triangles: FloatArray) -> TriangleTree:
         np.array([box.after for box in boxes], dtype=np.int64),
         np.array([box.first for box in boxes], dtype=np.int64),
         np.array([box.end for box in boxes], dtype=np.int64),
-        np.array(triangles[order]),
+        ordered,
+        np.column_stack((normals, heights)),
     )
 
 
@@ -76,36 +81,34 @@ def is_cut(tree: TriangleTree, origin: FloatArray, point: FloatArray, touching: 
         point: (3,) m.
         touching: m, how near to the point a triangle does not count.
     """
-    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    ox, oy, oz, px, py, pz = origin[0], origin[1], origin[2], point[0], point[1], point[2]
+    x, y, z = px - ox, py - oy, pz - oz
     short_of = touching / np.sqrt(x * x + y * y + z * z)
-    box = 0
+    per_x, per_y, per_z = _per(x), _per(y), _per(z)
+    box, low, high, planes = 0, tree.low, tree.high, tree.planes
     while box < len(tree.after):
-        if not _enters(tree.low[box], tree.high[box], origin, point):
+        x0, x1 = (low[box, 0] - ox) * per_x, (high[box, 0] - ox) * per_x
+        y0, y1 = (low[box, 1] - oy) * per_y, (high[box, 1] - oy) * per_y
+        z0, z1 = (low[box, 2] - oz) * per_z, (high[box, 2] - oz) * per_z
+        enters = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), 0.0))
+        leaves = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), 1.0))
+        if enters > leaves:
             box = tree.after[box]
             continue
         for n in range(tree.first[box], tree.end[box]):
-            if ray_hits(origin, point, tree.triangles[n], short_of):
+            a, b, c, height = planes[n, 0], planes[n, 1], planes[n, 2], planes[n, 3]
+            start, end = a * ox + b * oy + c * oz - height, a * px + b * py + c * pz - height
+            crossed = start * end < 0.0 and abs(end) > short_of * (abs(start) + abs(end))
+            if crossed and ray_hits(origin, point, tree.triangles[n], short_of):
                 return True
         box += 1
     return False
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _enters(low: FloatArray, high: FloatArray, origin: FloatArray, point: FloatArray) -> bool:
-    """Return whether a segment is somewhere in a box."""
-    enters, leaves = 0.0, 1.0
-    for a in range(3):
-        along = point[a] - origin[a]
-        if along == 0.0:
-            if origin[a] < low[a] or origin[a] > high[a]:
-                return False
-            continue
-        to_low, to_high = (low[a] - origin[a]) / along, (high[a] - origin[a]) / along
-        enters = max(enters, min(to_low, to_high))
-        leaves = min(leaves, max(to_low, to_high))
-        if enters > leaves:
-            return False
-    return True
+def _per(along: float) -> float:
+    """Return 1 / along; for 0 so large a number that only boxes right on the line are met."""
+    return 1.0 / along if abs(along) > 1e-300 else 1e300
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
