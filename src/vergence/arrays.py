@@ -51,13 +51,18 @@ def as_floats(
         array = np.asarray(values, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise InputError(name, "", values, "an array of numbers") from None
-    if shape is not None:
-        wrong = array.ndim != len(shape) or any(
-            want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
-        )
-        if wrong:
-            raise ShapeError(name, array.shape, shape)
+    if shape is not None and not _fits(array.shape, shape):
+        raise ShapeError(name, array.shape, shape)
     return array
+
+
+def _fits(shape: tuple[int, ...], allowed: tuple[int | None, ...]) -> bool:
+    if len(shape) != len(allowed):
+        return False
+    for have, want in zip(shape, allowed, strict=True):  # no generator: this is asked often
+        if want is not None and have != want:
+            return False
+    return True
 
 
 def pandas_or_error() -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
+from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.cell.cell import Cell
 from vergence.cell.joint_positions import joint_accelerations, joint_positions, joint_rates
 from vergence.cell.named_targets import target_body
@@ -57,7 +57,8 @@ class CellModel:
 
     def joint_position(self, arm: str) -> FloatArray:
         """Return an arm's joint positions (n,), rad or m."""
-        return frozen(self.data.qpos[self._qpos[arm]])
+        position: FloatArray = self.data.qpos[self._qpos[arm]]
+        return position
 
     def camera_pose(self, camera: str) -> FloatArray:
         """Return T_world_camera (4, 4) in OpenCV's convention."""

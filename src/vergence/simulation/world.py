@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import FloatArray
 from vergence.cell.cell import Cell
 from vergence.robot.chain import joint_columns
 from vergence.simulation.cell_model import CellModel
@@ -32,7 +32,8 @@ class World(CellModel):
 
     def joint_velocity(self, arm: str) -> FloatArray:
         """Return an arm's joint velocities (n,), rad/s or m/s."""
-        return frozen(self.data.qvel[self._qvel[arm]])
+        velocity: FloatArray = self.data.qvel[self._qvel[arm]]
+        return velocity
 
     def command(self, arm: str, position: FloatArray, velocity: FloatArray) -> None:
         """Set an arm's servos; the rate is fed forward to compensate their lag k_v/k_p."""
