@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.estimation.looks import Look
+from vergence.estimation.tracking_step import Measured
 from vergence.estimation.visibility import Visibility
 from vergence.estimation.windows import Windows
 from vergence.signals import Frame, ImagePoints, SearchWindows
@@ -58,7 +58,7 @@ def every_point(
     frames: Sequence[Frame],
     visibility: Visibility,
     windows: Windows,
-    looks: Sequence[Look],
+    measured: Sequence[Measured],
     agreeing: Sequence[IntArray],
     widest_px: float,
 ) -> tuple[ImagePoints, ...]:
@@ -72,13 +72,13 @@ def every_point(
         frames: the images, C.
         visibility: their predicted visibility.
         windows: opened in some of them.
-        looks: the measurements inside those.
+        measured: the measurements inside those.
         agreeing: for each measurement, the indices of the features that agree with the pose.
         widest_px: half size of the largest window.
     """
     found = np.zeros(visibility.status.shape, dtype=np.bool_)
-    for look, kept in zip(looks, agreeing, strict=True):
-        found[look.number][kept] = True
+    for image, kept in zip(measured, agreeing, strict=True):
+        found[image.number][kept] = True
     places, covariance = visibility.points_px.copy(), np.empty((*found.shape, 2, 2))
     center_px, half_px = np.empty_like(places), np.empty_like(places)
     fill_points(
@@ -87,8 +87,8 @@ def every_point(
         windows.features,
         windows.center_px,
         windows.half_px,
-        np.concatenate([look.found.points_px for look in looks] or [_NO_POINTS]),
-        np.concatenate([look.found.covariance_px for look in looks] or [_NO_COVARIANCE]),
+        np.concatenate([image.found.points_px for image in measured] or [_NO_POINTS]),
+        np.concatenate([image.found.covariance_px for image in measured] or [_NO_COVARIANCE]),
         found,
         widest_px,
         places,
@@ -98,11 +98,11 @@ def every_point(
     )
     reasons = [[UNSEEN[value] for value in row] for row in visibility.status.tolist()]
     features, start = windows.features.tolist(), 0
-    for look in looks:
-        agrees, row = found[look.number].tolist(), reasons[look.number]
-        for m, reason in zip(features[start:], look.found.reasons, strict=False):
+    for image in measured:
+        agrees, row = found[image.number].tolist(), reasons[image.number]
+        for m, reason in zip(features[start:], image.found.reasons, strict=False):
             row[m] = reason or ("" if agrees[m] else "disagrees with the pose")
-        start += len(look.found.reasons)
+        start += len(image.found.reasons)
     return tuple(
         ImagePoints(
             frame.camera,

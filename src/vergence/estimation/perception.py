@@ -10,7 +10,6 @@ from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH
 from vergence.errors import InputError
 from vergence.estimation.history import FilterHistory
-from vergence.estimation.looks import Expected, Look, Predicted
 from vergence.estimation.measure import (
     CameraPose,
     Find,
@@ -25,6 +24,7 @@ from vergence.estimation.selection import Candidates, InformationSelection, Sele
 from vergence.estimation.spacing import keep_apart
 from vergence.estimation.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.target_shape import TargetShape
+from vergence.estimation.tracking_step import Expected, Measured, Predicted
 from vergence.estimation.view import View, usable_view, view_of
 from vergence.estimation.visibility import (
     Blocked,
@@ -131,12 +131,12 @@ class PosePerception(Generic[B]):
         visibility = self._see(predicted)
         chosen = self._choose(predicted, visibility)
         windows = self._open(predicted, chosen, visibility)
-        looks = self._look(predicted, windows)
-        agreeing = self._correct(looks)
+        measured = self._measured(predicted, windows)
+        agreeing = self._correct(measured)
         time = predicted.frames[-1].time
-        self._judge(time, [look.view for look in looks], predicted.frames)
+        self._judge(time, [image.view for image in measured], predicted.frames)
         points = every_point(
-            predicted.frames, visibility, windows, looks, agreeing, self._windows.most_px
+            predicted.frames, visibility, windows, measured, agreeing, self._windows.most_px
         )
         if self._lost:
             return Observation(time, tuple(nothing_found(p, self._lost) for p in points))
@@ -229,9 +229,9 @@ class PosePerception(Generic[B]):
             )
         )
 
-    def _look(self, predicted: Predicted, windows: Windows) -> list[Look]:
+    def _measured(self, predicted: Predicted, windows: Windows) -> list[Measured]:
         """Measure features inside their windows; images without any are not accessed."""
-        looks, start = [], 0
+        measured, start = [], 0
         for n, end in zip(windows.images.tolist(), windows.ends.tolist(), strict=True):
             features = windows.features[start:end]
             found = self._measure(
@@ -244,18 +244,18 @@ class PosePerception(Generic[B]):
             camera = self._rig.cameras[predicted.numbers[n]]
             points, T_camera_world = windows.points[start:end], predicted.T_camera_world[n]
             view = usable_view(found, camera, T_camera_world, points, features)
-            looks.append(Look(n, found, view))
+            measured.append(Measured(n, found, view))
             start = end
-        return looks
+        return measured
 
-    def _correct(self, looks: list[Look]) -> list[IntArray]:
+    def _correct(self, measured: list[Measured]) -> list[IntArray]:
         """Update the pose by all images; return which features of each agree with it."""
-        if self._lost or not looks:
-            return [look.view.features for look in looks]
-        self._history, updates = self._history.add_all([look.view for look in looks])
+        if self._lost or not measured:
+            return [image.view.features for image in measured]
+        self._history, updates = self._history.add_all([image.view for image in measured])
         return [
-            look.view.features[update.kept] if update.verdict in JUDGED else look.view.features
-            for look, update in zip(looks, updates, strict=True)
+            image.view.features[update.kept] if update.verdict in JUDGED else image.view.features
+            for image, update in zip(measured, updates, strict=True)
         ]
 
     def _judge(self, time: float, views: list[View], frames: Sequence[Frame]) -> None:

@@ -1,4 +1,4 @@
-"""Intermediate data of the tracking loop about an image."""
+"""What one step of the tracking loop knows of its images."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ class Predicted(NamedTuple):
         return self.expected[-1]
 
 
-class Look(NamedTuple):
+class Measured(NamedTuple):
     """The measurement of an image."""
 
     number: int  # of the image
