@@ -25,7 +25,7 @@ class Goal:
 
     features: tuple[tuple[float, ...], ...]  # (M, 3) m, in the target
     desired_px: tuple[tuple[float, ...], ...]  # (M, 2)
-    tables: Mapping[str, Any]  # of a cell, that hold the aim fast
+    tables: Mapping[str, Any]  # of a cell, that fix the goal
 
     @classmethod
     def of(cls, cell: Cell) -> "Goal":

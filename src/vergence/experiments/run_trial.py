@@ -140,7 +140,7 @@ def _in_kernel(
 
 
 def _hidden(run: KinematicRun, trace: BatchTrace) -> bool:
-    """Return whether on the way something hid a feature for as long as the loop is patient.
+    """Return whether on the way something may have hidden a feature for longer than the loop waits.
 
     The kernel knows of no surfaces; such a run is made again, in the loop.
     """

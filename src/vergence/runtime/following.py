@@ -141,8 +141,8 @@ class Follower:
 
     def hindered(self, time: float, measured: FloatArray) -> Fault | None:
         """Return why the arm is held, or why it has hardly moved since it was."""
-        stands = (np.abs(measured - self._held_at) <= self._bound).all()
-        lately = stands and time - self._freed < self._timeout_s
+        unmoved = (np.abs(measured - self._held_at) <= self._bound).all()
+        lately = unmoved and time - self._freed < self._timeout_s
         return self.holding or (self._held_for if lately else None)
 
     def _reason(self, joint: int, measured: FloatArray, robot: RobotState | None) -> Fault | None:

@@ -65,7 +65,7 @@ def project(points: FloatArray, camera: FloatArray, points_px: FloatArray) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def look(
+def found_points(
     points_px: FloatArray, noise_px: FloatArray, camera: FloatArray, time: float
 ) -> SeenPoints:
     """Return what is found in an image that was taken at a time."""
@@ -126,7 +126,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
         record.camera_m[k] = T_world_camera[:3, 3]
         if seen >= 0 and run.arrived[seen]:
             last_image, exposed = time, image_tick(seen, inner_hz, outer_hz) / inner_hz
-            image = look(record.points_px[seen], run.noise_px[seen], run.camera, exposed)
+            image = found_points(record.points_px[seen], run.noise_px[seen], run.camera, exposed)
             if image.found.any():
                 last_seen = time
                 memory, answer = law_tick(law, memory, Moment(chain, image, q, velocity, time))

@@ -1,7 +1,7 @@
-"""The picture of a square marker, and the normal equations of fitting it to grey values.
+"""The pattern of a square marker, and the normal equations of fitting it to grey values.
 
 The cells of a marker are known once its number is. Drawn through a homography and blurred by a
-Gaussian, they make the picture that is expected:
+Gaussian, they make the expected image of the pattern:
 
     I(x) = d(p, q) + g(p, q) (B + c B (1 - B)),   B(x) = Σ_ij b_ij P_i(u) Q_j(v)
 
@@ -197,7 +197,7 @@ def normal_equations(
     A: FloatArray,
     scores: FloatArray,
 ) -> tuple[int, float, float]:
-    """Add up the normal equations of a marker's picture over the pixels of an image.
+    """Add up the normal equations of a marker's pattern over the pixels of an image.
 
     Args:
         image: grey, (height, width).

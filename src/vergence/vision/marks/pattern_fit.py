@@ -1,6 +1,6 @@
 """A square marker fitted to the grey values of an image.
 
-Gauss-Newton over all grey values of the picture that `normal_equations` draws, with weights that
+Gauss-Newton over all grey values of the pattern that `normal_equations` draws, with weights that
 leave out what is not the marker, finds homography, bend, blur and light together: the estimate of
 maximum likelihood, with its covariance. Lines along the outer sides alone are drawn off by what
 lies next to them as soon as the blur reaches it.
@@ -32,7 +32,7 @@ _LENS = 0.06  # of the blur: deviation by a lens whose blur is not a Gaussian
 def fit_pattern(
     image: ImageArray, cells: FloatArray, G: FloatArray, light: FloatArray, thin: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
-    """Fit a marker's picture to an image.
+    """Fit a marker's pattern to an image.
 
     Args:
         image: grey, (height, width).
@@ -43,7 +43,7 @@ def fit_pattern(
 
     Returns:
         corners (4, 2), px; their covariance (8, 8), px²; light; residual, grey levels; the share
-        of the pixels that the picture explains, 0 where the fit did not converge.
+        of the pixels that the pattern explains, 0 where the fit did not converge.
     """
     n = len(cells)
     light = light.copy()

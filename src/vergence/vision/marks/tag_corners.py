@@ -1,4 +1,4 @@
-"""The corners of a square marker, with covariance, from the picture that its cells make."""
+"""The corners of a square marker, with covariance, from the pattern that its cells make."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ _SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)], np.floa
 _PIXELS = 2000  # of a marker, that are used
 _BLUR = (1.0, 0.25)  # standard deviation to start with: px at least, and cells
 _DARK, _BRIGHT = 5.0, 95.0  # per cent of the grey values there: black and white to start with
-_EXPLAINED = 0.5  # least share of the pixels that the picture has to explain
+_EXPLAINED = 0.5  # least share of the pixels that the pattern has to explain
 _CONTRAST = 2.0  # least contrast over the residual
-_UNREFINED = 0.5  # cells: standard deviation of a corner that the picture does not place
+_UNREFINED = 0.5  # cells: standard deviation of a corner that the pattern does not place
 _MOST_CELLS = 2.0  # farthest that a corner moves
 
 
 def refined_corners(
     image: ImageArray, corners_px: FloatArray, cells: FloatArray, noise_px: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return corners (4, 2), px, and their covariances (4, 2, 2), px², from a marker's picture.
+    """Return corners (4, 2), px, and their covariances (4, 2, 2), px², from a marker's pattern.
 
-    Where the picture does not match the image, the corners stay, uncertain by half a cell.
+    Where the pattern does not match the image, the corners stay, uncertain by half a cell.
 
     Args:
         image: grey, (height, width).
