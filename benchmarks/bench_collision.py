@@ -19,7 +19,7 @@ from vergence.control.limits import collision_rows
 from vergence.control.solvers import Problem, Setting
 from vergence.control.solvers.solver import AT_TIP, NO_FEATURES, NO_JOINTS
 from vergence.simulation.clearance import NEAR_M
-from vergence.studies.guarantees_collisions import (
+from vergence.studies.guarantees.collisions import (
     ALONG_S,
     CELLS,
     MARGIN_M,
@@ -29,7 +29,7 @@ from vergence.studies.guarantees_collisions import (
     law_of,
     try_obstacles,
 )
-from vergence.studies.guarantees_runs import CAMERA_MODEL
+from vergence.studies.guarantees.runs import CAMERA_MODEL
 
 FOLDER = BUILT / "collision"
 NEAR_PAIRS, PATHS, INNER_S = 10, 40, 1 / 120

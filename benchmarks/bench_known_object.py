@@ -12,9 +12,9 @@ from harness import calls, measured, row
 from real_images import CUBE, INSTALL, PERIOD_S
 from vergence.arrays import FloatArray, ImageArray
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
-from vergence.studies.region_films import CAMERA as FILM_CAMERA
-from vergence.studies.region_films import film
-from vergence.studies.region_objects import OBJECTS
+from vergence.studies.region.films import CAMERA as FILM_CAMERA
+from vergence.studies.region.films import film
+from vergence.studies.region.objects import OBJECTS
 from vergence.vision.known_object import (
     CornerExtractor,
     EdgeTracker,

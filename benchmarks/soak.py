@@ -27,7 +27,7 @@ from vergence.runtime.hardware import Metronome
 from vergence.signals import Reference, Setpoint
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import ARM, CAMERA
-from vergence.studies.guarantees_runs import CAMERA_MODEL, arms, build, facing
+from vergence.studies.guarantees.runs import CAMERA_MODEL, arms, build, facing
 
 RATE_HZ = 500.0
 LATE_S = 2e-3

@@ -18,7 +18,7 @@ from vergence.assembly import run_driver, with_goal
 from vergence.cell import load_cell
 from vergence.signals import OutcomeKind
 from vergence.simulation import SimulatedDriver
-from vergence.studies.photograph_trials import (
+from vergence.studies.photograph.trials import (
     ARM,
     CAMERA,
     SCENES,

@@ -12,7 +12,7 @@ from vergence.planning.problem import PlanningProblem
 from vergence.planning.trajectory import Trajectory
 from vergence.signals import Reference
 from vergence.studies.ideal_loop import PERIOD, IdealLoop
-from vergence.studies.mezouar2001_methods import tracking
+from vergence.studies.mezouar2001.methods import tracking
 
 
 class Run(NamedTuple):

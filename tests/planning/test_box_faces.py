@@ -12,7 +12,7 @@ from vergence.geometry import se3_inverse, transform_points
 from vergence.planning import OptimisedPlanner, Path
 from vergence.robot import Arm
 from vergence.signals import ImagePoints, JointState, Observation, Reference
-from vergence.studies.defaults import camera_arm
+from vergence.studies.defaults.study import camera_arm
 from vergence.studies.reach_scene import Scene
 
 RATE_HZ = 30.0

@@ -15,8 +15,8 @@ from vergence.planning import (
     Trajectory,
 )
 from vergence.robot import nearest_configuration
-from vergence.studies.defaults import STARTS_SEED, camera_arm, draw
-from vergence.studies.defaults_run import NOISE_PX
+from vergence.studies.defaults.run import NOISE_PX
+from vergence.studies.defaults.study import STARTS_SEED, camera_arm, draw
 from vergence.studies.reach_scene import Scene
 
 

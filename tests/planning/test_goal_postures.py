@@ -7,7 +7,7 @@ import pytest
 
 from vergence.planning import OptimisedPlanner, Path
 from vergence.robot import Arm, goal_configurations
-from vergence.studies.defaults import STARTS_SEED, camera_arm, draw
+from vergence.studies.defaults.study import STARTS_SEED, camera_arm, draw
 
 
 @pytest.fixture(scope="module")

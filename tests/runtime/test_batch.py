@@ -20,7 +20,7 @@ from vergence.runtime import Run
 from vergence.signals import OutcomeKind
 from vergence.simulation import KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import CAMERA as CAMERA_NAME
-from vergence.studies.guarantees_runs import arms
+from vergence.studies.guarantees.runs import arms
 
 CAMERA = Camera(640, 480, 600.0, 580.0, 319.5, 239.5)
 ARMS = arms()  # six turning joints, seven with a track, three sliding and three turning

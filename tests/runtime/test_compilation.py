@@ -16,9 +16,9 @@ from vergence.runtime import Timeouts
 from vergence.runtime.loop import Loop
 from vergence.signals import Sample, Setpoint
 from vergence.simulation import SimulatedDriver
-from vergence.studies.driver_faults import DRIVER_FAULTS
-from vergence.studies.faulty_driver import FaultyDriver
-from vergence.studies.law_faults import LAW_FAULTS, FaultyLaw
+from vergence.studies.guarantees.driver_faults import DRIVER_FAULTS
+from vergence.studies.guarantees.faulty_driver import FaultyDriver
+from vergence.studies.guarantees.law_faults import LAW_FAULTS, FaultyLaw
 
 
 @pytest.fixture

@@ -12,10 +12,10 @@ from scripted_cell import Notes, ScriptedDriver, looped
 from vergence.robot import Arm, Chain
 from vergence.runtime import Timeouts
 from vergence.signals import Outcome, OutcomeKind, Setpoint
-from vergence.studies.driver_faults import DRIVER_FAULTS
-from vergence.studies.faulty_driver import FaultyDriver
-from vergence.studies.guarantees_faults import keeps_limits
-from vergence.studies.law_faults import LAW_FAULTS, FaultyLaw
+from vergence.studies.guarantees.driver_faults import DRIVER_FAULTS
+from vergence.studies.guarantees.faults import keeps_limits
+from vergence.studies.guarantees.faulty_driver import FaultyDriver
+from vergence.studies.guarantees.law_faults import LAW_FAULTS, FaultyLaw
 
 TIMEOUTS = Timeouts(robot_s=0.6)
 

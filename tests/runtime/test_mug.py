@@ -8,8 +8,8 @@ from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower
 from vergence.geometry import se3_exp
-from vergence.studies.region_films import CAMERA, RATE_HZ
-from vergence.studies.region_objects import OBJECTS
+from vergence.studies.region.films import CAMERA, RATE_HZ
+from vergence.studies.region.objects import OBJECTS
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, as_followed
 
 

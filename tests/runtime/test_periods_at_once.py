@@ -11,7 +11,7 @@ from vergence.experiments.kinematic import KinematicRuns
 from vergence.robot import Arm
 from vergence.runtime import Run
 from vergence.simulation import KinematicDriver
-from vergence.studies.guarantees_runs import arms
+from vergence.studies.guarantees.runs import arms
 
 LAWS = ("own", "image_based", "constrained")
 CELLS = ("ur5", "panda", "post", "tag", "so100")

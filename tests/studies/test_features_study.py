@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vergence.errors import VergenceError
-from vergence.studies import features_visp
-from vergence.studies.features import AVOIDANCE, FREE, OURS, VISP, checks_of
-from vergence.studies.features_matrices import matrix_errors
-from vergence.studies.features_scene import KINDS, Start, arm, compared, draw_start, seen
-from vergence.studies.features_servo import Servoing, servo
+from vergence.studies.features.matrices import matrix_errors
+from vergence.studies.features.scene import KINDS, Start, arm, compared, draw_start, seen
+from vergence.studies.features.servo import Servoing, servo
+from vergence.studies.features.study import AVOIDANCE, FREE, OURS, VISP, checks_of
+from vergence.studies.features.study import visp as features_visp
 from vergence.studies.ideal_loop import Ending
 
 START = draw_start(3, 0)

@@ -8,9 +8,9 @@ import pytest
 from vergence.control import guard
 from vergence.runtime import loop
 from vergence.signals import OutcomeKind, Setpoint
-from vergence.studies import guarantees
-from vergence.studies.guarantees_faults import FAULTS, blind_check, try_fault
-from vergence.studies.guarantees_runs import LAWS, arms, attempt
+from vergence.studies.guarantees import study
+from vergence.studies.guarantees.faults import FAULTS, blind_check, try_fault
+from vergence.studies.guarantees.runs import LAWS, arms, attempt
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +50,15 @@ def test_a_guard_that_lets_everything_through_is_noticed(known, monkeypatch):
 
 def test_the_hard_cases_hold(known):
     puma = known[0]
-    check, rows = guarantees._singularity(puma)
+    check, rows = study._singularity(puma)
     assert check.holds, check.note
     assert rows[:, 1].min() < 0.01
-    for hard in (guarantees._outside_start, guarantees._conflict):
+    for hard in (study._outside_start, study._conflict):
         assert hard(puma).holds, hard(puma).note
 
 
 def test_a_heading_that_led_the_papers_law_to_a_limit_is_completed(known):
-    assert guarantees._follows(known[0], "constrained tracking", 0.1, np.pi / 2, 32.0)
+    assert study._follows(known[0], "constrained tracking", 0.1, np.pi / 2, 32.0)
 
 
 def test_faults_on_the_arms_of_the_cells_end_by_name_inside_the_limits(known):

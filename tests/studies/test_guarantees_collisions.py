@@ -2,7 +2,7 @@
 
 from vergence.experiments.workers import Workers
 from vergence.signals import OutcomeKind
-from vergence.studies.guarantees_collisions import LAWS, collisions_check, try_obstacles
+from vergence.studies.guarantees.collisions import LAWS, collisions_check, try_obstacles
 
 
 def test_runs_among_obstacles_touch_nothing_and_would_without_the_clearance():

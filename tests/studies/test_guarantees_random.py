@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vergence.studies.guarantees_laws import LAWS, PLANNED, plan_from_homography, servo
-from vergence.studies.guarantees_random import Pair, draw_pair, endings, success_check
-from vergence.studies.guarantees_runs import arms
+from vergence.studies.guarantees.laws import LAWS, PLANNED, plan_from_homography, servo
+from vergence.studies.guarantees.random_runs import Pair, draw_pair, endings, success_check
+from vergence.studies.guarantees.runs import arms
 from vergence.studies.ideal_loop import Ending
 
 

@@ -5,8 +5,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from vergence.studies.honesty import SCENES, checks_of
-from vergence.studies.honesty_answer import UNFOUNDED, Answer, deviations_of, refused
+from vergence.studies.honesty.answer import UNFOUNDED, Answer, deviations_of, refused
+from vergence.studies.honesty.study import SCENES, checks_of
 
 
 def test_deviations_of_one_number_are_its_own_and_of_several_are_as_unlikely() -> None:
@@ -32,7 +32,7 @@ def test_answers_beyond_five_deviations_and_refusals_without_a_reason_fail() -> 
 
 @pytest.mark.parametrize("part", SCENES)
 def test_scenes_are_answered_the_same_way_for_the_same_seed(part: str) -> None:
-    module = import_module(f"vergence.studies.honesty_{part}")
+    module = import_module(f"vergence.studies.honesty.{part}")
     for number in range(len(module.KINDS)):
         answers = [module.try_scene(np.random.default_rng(number), number) for _ in range(2)]
         assert repr(answers[0]) == repr(answers[1])
@@ -45,6 +45,6 @@ def test_points_whose_marks_hide_a_turn_or_have_twins_are_within_five_deviations
     number: int,
 ) -> None:
     random = np.random.default_rng([0, list(SCENES).index("points"), number])
-    answers = import_module("vergence.studies.honesty_points").try_scene(random, number)
+    answers = import_module("vergence.studies.honesty.points").try_scene(random, number)
     assert len(answers) == 5
     assert all(answer.deviations <= 5.0 for answer in answers if answer.explanations)

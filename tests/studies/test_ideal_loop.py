@@ -12,7 +12,7 @@ from vergence.signals import JointCommand, JointState, Observation, Reference
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import ARM, CAMERA
 from vergence.studies.ideal_loop import PERIOD, IdealLoop, Steer
-from vergence.studies.mezouar2001_methods import CLASSICAL
+from vergence.studies.mezouar2001.methods import CLASSICAL
 from vergence.studies.reach_scene import Scene
 
 DURATION_S = 2.0

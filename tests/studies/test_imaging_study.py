@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from vergence.studies.imaging import Row, check_of, write_table
-from vergence.studies.imaging_cases import CASES, Case, Measured, Trial, measure
+from vergence.studies.imaging.cases import CASES, Case, Measured, Trial, measure
+from vergence.studies.imaging.study import Row, check_of, write_table
 
 CASE = Case("tracker", "points", Trial("ur5"))
 

@@ -10,7 +10,7 @@ from vergence.cell import Cell, load_cell
 from vergence.signals import OutcomeKind
 from vergence.studies import lippiello2005
 from vergence.studies.lippiello2005 import reproduce
-from vergence.studies.lippiello2005_trials import FIXED, PAPER, run
+from vergence.studies.lippiello2005.trials import FIXED, PAPER, run
 
 CHECKS = {
     "hybrid.position_error_max_m",

@@ -12,8 +12,7 @@ from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_poin
 from vergence.planning import OptimisedPlanner
 from vergence.planning import Path as PlannedPath
 from vergence.studies.ideal_loop import ARRIVED_PX, PERIOD, Ending, IdealLoop
-from vergence.studies.mezouar2001 import reproduce, success_rate
-from vergence.studies.mezouar2001_methods import (
+from vergence.studies.mezouar2001.methods import (
     CLASSICAL,
     METHODS,
     Belief,
@@ -24,8 +23,9 @@ from vergence.studies.mezouar2001_methods import (
     servo,
     too_close,
 )
-from vergence.studies.mezouar2001_misprint import twist_of
-from vergence.studies.mezouar2001_trials import (
+from vergence.studies.mezouar2001.misprint import twist_of
+from vergence.studies.mezouar2001.study import reproduce, success_rate
+from vergence.studies.mezouar2001.trials import (
     End,
     Trial,
     is_infeasible,

@@ -7,9 +7,8 @@ import pytest
 
 from vergence.cell import load_cell
 from vergence.studies import nelson1995
-from vergence.studies import nelson1995_limits as limits
-from vergence.studies import nelson1995_runs as runs
 from vergence.studies.check import bisect_threshold, within
+from vergence.studies.nelson1995 import limits, runs
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vergence.signals import OutcomeKind
-from vergence.studies.photograph import checks_of, result_of
-from vergence.studies.photograph_methods import Method
-from vergence.studies.photograph_trials import SCENES, Trial, TrialResult
+from vergence.studies.photograph.methods import Method
+from vergence.studies.photograph.study import checks_of, result_of
+from vergence.studies.photograph.trials import SCENES, Trial, TrialResult
 
 REACHED, REFUSED = OutcomeKind.REACHED, OutcomeKind.INFEASIBLE
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vergence.studies.region import CONDITIONS, Followed, checks_of, follow_film
-from vergence.studies.region_films import CAMERA, film
-from vergence.studies.region_objects import OBJECTS
+from vergence.studies.region.films import CAMERA, film
+from vergence.studies.region.objects import OBJECTS
+from vergence.studies.region.study import CONDITIONS, Followed, checks_of, follow_film
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker
 
 

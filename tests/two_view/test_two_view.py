@@ -12,7 +12,7 @@ from vergence.arrays import FloatArray
 from vergence.errors import InputError, ShapeError
 from vergence.geometry import se3, se3_inverse, so3_exp, so3_log, transform_points
 from vergence.geometry.chi_square import normal_deviate_of_ratio
-from vergence.studies.honesty_two_views import KINDS, try_scene
+from vergence.studies.honesty.two_views import KINDS, try_scene
 from vergence.vision.two_view import TwoView, TwoViewFailure, TwoViewProblem, estimate_two_view
 
 

@@ -3,7 +3,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence.errors import ShapeError
-from vergence.studies.honesty_points import KINDS, try_scene
+from vergence.studies.honesty.points import KINDS, try_scene
 from vergence.vision import SsdTracker
 from vergence.vision.tracker_state import twins_of
 

@@ -11,7 +11,7 @@ from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.geometry import matrix_to_quaternion, se3, so3_exp
 from vergence.simulation.renderer import offscreen
-from vergence.studies.region_objects import OBJECTS, Mesh
+from vergence.studies.region.objects import OBJECTS, Mesh
 
 WIDTH, HEIGHT, FOCAL_PX = 640, 480, 600.0
 CAMERA = Camera(WIDTH, HEIGHT, FOCAL_PX, FOCAL_PX, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)

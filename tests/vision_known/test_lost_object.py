@@ -14,7 +14,7 @@ from vergence.estimation.hypothesis_follower import HypothesisFollower
 from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
 from vergence.estimation.object_search import AT_ONCE, IN_A_LOOP, Fit, ObjectSearch, SearchPace
 from vergence.geometry import angle_between, pose_difference, se3, so3_exp
-from vergence.studies.region_objects import OBJECTS
+from vergence.studies.region.objects import OBJECTS
 from vergence.vision.known_object import EdgeTracker, ObjectModel, SilhouetteTracker
 
 WRONG = 5.0  # deviations

@@ -7,7 +7,13 @@ import numpy as np
 from vergence.app.figures.arm import drawn_names, drawn_positions
 from vergence.app.figures.layout import panels
 from vergence.drawing import legend
-from vergence.studies.path_panels import camera_paths, grid, image_paths, joint_paths, space
+from vergence.studies.mezouar2001.path_panels import (
+    camera_paths,
+    grid,
+    image_paths,
+    joint_paths,
+    space,
+)
 
 if TYPE_CHECKING:
     from vergence.planning import Path, Trajectory

@@ -1,0 +1,5 @@
+"""Reaching where a photograph was taken."""
+
+from vergence.studies.photograph.study import reproduce
+
+__all__ = ["reproduce"]
