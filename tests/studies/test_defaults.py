@@ -11,14 +11,15 @@ from vergence.geometry import se3_exp
 from vergence.planning import Path
 from vergence.robot import goal_configurations
 from vergence.runtime.arrival import Arrival
+from vergence.studies.defaults import plan as defaults_plan
 from vergence.studies.defaults.checks import better
 from vergence.studies.defaults.choices import CHOICES, DEFAULT, EVERY
 from vergence.studies.defaults.judge import End, TrueScene
 from vergence.studies.defaults.moving import AMPLITUDE_M, Drift, keep
-from vergence.studies.defaults.plan import follow, plan
+from vergence.studies.defaults.plan import follow
 from vergence.studies.defaults.run import serve
 from vergence.studies.defaults.study import STARTS_SEED, camera_arm, draw
-from vergence.studies.defaults.study import plan as defaults_plan
+from vergence.studies.known_plan import plan
 from vergence.studies.reach_scene import Scene
 
 

@@ -8,8 +8,7 @@ import pytest
 from vergence.assembly import run_cell
 from vergence.cell import Cell, load_cell
 from vergence.signals import OutcomeKind
-from vergence.studies import lippiello2005
-from vergence.studies.lippiello2005 import reproduce
+from vergence.studies.lippiello2005 import reproduce, study
 from vergence.studies.lippiello2005.trials import FIXED, PAPER, run
 
 CHECKS = {
@@ -47,7 +46,7 @@ def short() -> Cell:
 def test_the_quick_study_holds_what_the_paper_says_and_draws_its_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lippiello2005, "STARTS", 1)
+    monkeypatch.setattr(study, "STARTS", 1)
     result = reproduce(tmp_path, quick=True)
     checks = {check.name: check for check in result.checks}
     assert checks.keys() == CHECKS | COSTS

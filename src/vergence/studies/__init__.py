@@ -1,4 +1,4 @@
-"""Studies: one file a paper; they only assemble the rooms above."""
+"""Studies: a package for each; they only assemble the rooms above."""
 
 from vergence.studies.check import Check, Figure, Progress, Spread, StudyResult
 from vergence.studies.reproduce import PAPERS, reproduce

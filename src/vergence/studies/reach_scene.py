@@ -16,6 +16,8 @@ from vergence.robot import Arm, goal_configurations
 from vergence.simulation import SimulatedDriver
 
 EASY_M, EASY_RAD = 0.3, np.radians(60)  # displacements smaller than both are not asked for
+CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)  # of a scene of its own
+SQUARE = frozen([[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]])  # m
 END_MARGIN_PX, END_MARGIN_JOINT = 15.0, 0.03  # that starts and goals have
 
 

@@ -19,10 +19,10 @@ from vergence.studies.defaults.choices import CHOICES, EVERY, MOVING, Tried
 from vergence.studies.defaults.figures import figures
 from vergence.studies.defaults.judge import End
 from vergence.studies.defaults.moving import Drift, keep
-from vergence.studies.defaults.plan import follow, plan, plan_again
+from vergence.studies.defaults.plan import follow, plan_again
 from vergence.studies.defaults.run import NOISE_PX, serve
-from vergence.studies.guarantees.random_runs import CAMERA, SQUARE
-from vergence.studies.reach_scene import Scene
+from vergence.studies.known_plan import plan
+from vergence.studies.reach_scene import CAMERA, SQUARE, Scene
 
 TITLE = "Default settings compared with the alternatives"
 CELLS = ("ur5", "panda", "gantry")

@@ -27,8 +27,8 @@ from vergence.runtime.stages import Planner
 from vergence.signals import Frame, JointCommand, JointState, Observation, OutcomeKind, Reference
 from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.kinematic_driver import ARM, CAMERA
-from vergence.studies.defaults.plan import plan as plan_known
 from vergence.studies.ideal_loop import Ending
+from vergence.studies.known_plan import plan as plan_known
 from vergence.studies.reach_scene import Scene
 from vergence.vision.two_view import TwoView, estimate_two_view
 

@@ -6,18 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import frozen
-from vergence.camera import Camera
 from vergence.planning import proves_no_path
 from vergence.robot import Arm
 from vergence.studies.check import Check
 from vergence.studies.guarantees.laws import LAWS, PLANNED, servo
 from vergence.studies.ideal_loop import Ending
-from vergence.studies.reach_scene import Scene
+from vergence.studies.reach_scene import CAMERA, SQUARE, Scene
 
 PAIRS_SEED = 5
-CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
-SQUARE = frozen([[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]])  # m
 TILT_DEG = 80.0  # up to which start and goal see the square obliquely
 SUCCESS = 0.99  # of the feasible pairs, that a plan and the constrained law bring home
 PROOF_CELLS = 512  # of the grid that shows a pair to be infeasible
