@@ -25,7 +25,7 @@ LEAST_COMPLETED = 10  # of twelve directions
 
 def misprint(cell: Cell, quick: bool) -> Check:
     """Track along x with the sign of (13) as printed."""
-    printed = {"kind": f"{__package__}.nelson1995_misprint:PrintedTracking"}
+    printed = {"kind": f"{__package__}.misprint:PrintedTracking"}
     trial = run(moving(cell.replace(law={**printed, "solver": "pseudo_inverse"}), 1), quick)
     error = trial.error_px
     lost = float(trial.camera.time[-1])
