@@ -19,9 +19,9 @@ from vergence.estimation import (
     TargetShape,
     predict_visibility,
 )
-from vergence.estimation.information import compress, joseph_update
-from vergence.estimation.motion import predict_covariance
-from vergence.estimation.pose_filter import correct
+from vergence.estimation.filters.information import compress, joseph_update
+from vergence.estimation.filters.motion import predict_covariance
+from vergence.estimation.filters.pose_filter import correct
 from vergence.geometry import moved_pose, se3, se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, ImagePoints
 

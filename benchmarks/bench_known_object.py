@@ -11,7 +11,7 @@ import numpy as np
 from harness import calls, measured, row
 from real_images import CUBE, INSTALL, PERIOD_S
 from vergence.arrays import FloatArray, ImageArray
-from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
+from vergence.estimation.known_object.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
 from vergence.studies.region.films import CAMERA as FILM_CAMERA
 from vergence.studies.region.films import film
 from vergence.studies.region.objects import OBJECTS

@@ -4,8 +4,8 @@ from typing import Any
 
 from harness import calls, row
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.photograph import make_approach
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.tasks.photograph import make_approach
 from vergence.cell import load_cell
 from vergence.cell.schema import ReachTable
 from vergence.planning import Trajectory

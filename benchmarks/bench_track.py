@@ -16,7 +16,7 @@ from harness import Missing, Peer, measured, row
 from peer_programs import NO_VISP
 from real_images import CUBE, INSTALL, PERIOD_S
 from vergence.arrays import ImageArray
-from vergence.estimation.object_follower import ObjectFollower
+from vergence.estimation.known_object.object_follower import ObjectFollower
 from vergence.vision.known_object import EdgeTracker
 from visp_tracker import PROGRAM, VispTracker
 

@@ -33,8 +33,8 @@ from real_images import (
 )
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import Sighting
 from vergence.geometry import pose_difference
 from vergence.vision.known_object import EdgeTracker, ObjectModel
 from visp_tracker import PROGRAM, VispTracker

@@ -12,7 +12,7 @@ from vergence.app.figures.tracked import curve_chart, position_chart, rotation_c
 from vergence.app.tracking.curve_kinds import KINDS
 from vergence.app.tracking.track_page import make_track_page
 from vergence.app.tracking.track_record import TrackedCurve, TrackedPose, TrackRecord
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.object_follower import Sighting
 from vergence.geometry import so3_exp, so3_log
 from vergence.signals import Outcome, OutcomeKind
 

@@ -10,7 +10,7 @@ import pytest
 from vergence.app.main import main
 from vergence.app.tracking.tag_follower import TagFollower, tag_of_option
 from vergence.camera import Camera
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.object_follower import Sighting
 from vergence.geometry import se3, so3_exp, so3_log
 from vergence.simulation.tag_plate import tag_image
 from vergence.vision.marks import MarkerDetector, OneTag, one_tag

@@ -2,9 +2,13 @@ import numpy as np
 import pytest
 from estimation_scene import BOX, CAMERA, HAND, WALL, moving, pose_error, project, view
 
-from vergence.estimation.information import compress, joseph_update, keep_rows
-from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
-from vergence.estimation.motion import predict_covariance
+from vergence.estimation.filters.information import compress, joseph_update, keep_rows
+from vergence.estimation.filters.measurement import (
+    deletion_squares,
+    mahalanobis_squared,
+    whitened_rows,
+)
+from vergence.estimation.filters.motion import predict_covariance
 from vergence.geometry import moved_pose, se3_inverse
 
 STEP = 1e-6

@@ -6,7 +6,7 @@ from estimation_scene import BOX, HAND, WALL, moving, pose_error, view
 
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, Verdict
-from vergence.estimation.target_filter import state_of
+from vergence.estimation.filters.target_filter import state_of
 from vergence.estimation.view import together
 from vergence.geometry import moved_pose
 

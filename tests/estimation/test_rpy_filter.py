@@ -4,9 +4,9 @@ from estimation_scene import BOX, CAMERA, HAND, WALL, moving, pose_error, projec
 
 from vergence.errors import InputError
 from vergence.estimation import PoseFilter, RpyPoseFilter
-from vergence.estimation.rpy_belief import twist_jacobian
-from vergence.estimation.rpy_filter import predict_rpy, rpy_rows
-from vergence.estimation.target_filter import state_of
+from vergence.estimation.filters.rpy_belief import twist_jacobian
+from vergence.estimation.filters.rpy_filter import predict_rpy, rpy_rows
+from vergence.estimation.filters.target_filter import state_of
 from vergence.estimation.view import together
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3, se3_inverse
 

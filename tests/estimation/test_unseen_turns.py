@@ -13,7 +13,7 @@ from vergence.estimation import (
     with_unseen,
     without_unseen,
 )
-from vergence.estimation.unseen_turns import MOST_RAD, UNKNOWN_RAD
+from vergence.estimation.filters.unseen_turns import MOST_RAD, UNKNOWN_RAD
 from vergence.geometry import pose_difference, se3, so3_exp
 
 

@@ -135,7 +135,7 @@ def test_no_fault_of_a_driver_or_law_compiles_anything(compiled, caplog) -> None
 
 
 def test_a_kernel_that_is_compiled_while_the_arm_moves_is_noticed(compiled, monkeypatch) -> None:
-    monkeypatch.setattr("vergence.assembly.task_sequence.warm_up", lambda *arguments: None)
+    monkeypatch.setattr("vergence.assembly.tasks.task_sequence.warm_up", lambda *arguments: None)
     cell = load_cell("puma560")
     run_for(cell, SimulatedDriver(cell), 0.3)
     assert compiled

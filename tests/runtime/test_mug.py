@@ -6,7 +6,7 @@ import pytest
 import vergence as vg
 from vergence.cell import load_cell
 from vergence.errors import InputError
-from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower
+from vergence.estimation.known_object.object_follower import OUTLINE_RULE, ObjectFollower
 from vergence.geometry import se3_exp
 from vergence.studies.region.films import CAMERA, RATE_HZ
 from vergence.studies.region.objects import OBJECTS

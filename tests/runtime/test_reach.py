@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vergence.assembly import reach, run_cell
+from vergence.assembly.tasks import reach, run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.signals import OutcomeKind

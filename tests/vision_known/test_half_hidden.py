@@ -6,9 +6,9 @@ from known_scene import CAMERA, box_model, clutter, drawn_image, pose
 from lost_films import RATE_HZ
 from solid_scene import POINTS, SEEN, half_hidden_film, solid
 
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import Sighting
-from vergence.estimation.unseen_turns import pose_error
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import Sighting
+from vergence.geometry import pose_difference
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import partial_view
@@ -80,7 +80,7 @@ def test_a_solid_that_reappears_half_hidden_is_never_seen_at_a_wrong_pose(name: 
             if number >= SEEN and step.sighting is Sighting.SEEN:
                 T = shown.T_camera_target
                 assert T is not None, seed
-                error = pose_error(step.T_camera_target, T)
+                error = pose_difference(step.T_camera_target, T)
                 square = float(error @ np.linalg.solve(step.covariance[:6, :6], error))
                 assert square < WRONG**2, seed
         found += step.sighting is Sighting.SEEN

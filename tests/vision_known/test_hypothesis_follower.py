@@ -7,8 +7,8 @@ from known_scene import CAMERA, HALF, SIGNS, box_model, clutter, drawn_image, po
 from numpy.typing import NDArray
 
 from vergence.arrays import FloatArray
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import (
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import (
     LEAST_SHARE,
     FollowRule,
     ObjectFollower,

@@ -10,9 +10,15 @@ from known_scene import clutter, off, pose
 from lost_films import CAMERA, RATE_HZ, hidden_for_a_second, moved
 from test_hypothesis_follower import drawn, wedge
 
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
-from vergence.estimation.object_search import AT_ONCE, IN_A_LOOP, Fit, ObjectSearch, SearchPace
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import OUTLINE_RULE, Sighting, Step
+from vergence.estimation.known_object.object_search import (
+    AT_ONCE,
+    IN_A_LOOP,
+    Fit,
+    ObjectSearch,
+    SearchPace,
+)
 from vergence.geometry import angle_between, pose_difference, se3, so3_exp
 from vergence.studies.region.objects import OBJECTS
 from vergence.vision.known_object import EdgeTracker, ObjectModel, SilhouetteTracker

@@ -7,7 +7,7 @@ from known_scene import CAMERA, box_model
 
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
-from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
+from vergence.estimation.known_object.object_follower import OUTLINE_RULE, ObjectFollower, Sighting
 from vergence.geometry import moved_pose, se3, so3_exp
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker, free_axes, shown_by_edges
 from vergence.vision.known_object.contour_fit import fit_contour, outline_motion

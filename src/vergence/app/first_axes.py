@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.axis_advice import POOR
+from vergence.assembly.advice.axis_advice import POOR
 from vergence.control.camera_directions import camera_directions
 from vergence.robot.unserved_directions import listed
 

@@ -38,7 +38,7 @@ def plan(options: "PlanOptions") -> int:
     from vergence.app.plan_page import write_plan_page
     from vergence.app.progress import working
     from vergence.assembly import plan as plan_path
-    from vergence.assembly.reach import timed
+    from vergence.assembly.tasks.reach import timed
     from vergence.planning import Path as PlannedPath
 
     with working("planning"):

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.advance import advance_parts
-from vergence.assembly.follow import follow_parts
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.photograph import is_by_photograph, photograph_parts
 from vergence.assembly.pose import other_poses
-from vergence.assembly.reach import reach_parts
 from vergence.assembly.started_driver import StartedDriver
-from vergence.assembly.switch import switch_parts
 from vergence.assembly.tag import located
-from vergence.assembly.tag_reach import tag_reach_parts
-from vergence.assembly.track import track_parts
+from vergence.assembly.tasks.advance import advance_parts
+from vergence.assembly.tasks.follow import follow_parts
+from vergence.assembly.tasks.photograph import is_by_photograph, photograph_parts
+from vergence.assembly.tasks.reach import reach_parts
+from vergence.assembly.tasks.switch import switch_parts
+from vergence.assembly.tasks.tag_reach import tag_reach_parts
+from vergence.assembly.tasks.track import track_parts
 from vergence.cell import Cell
 from vergence.cell.named_targets import naming_target
 from vergence.cell.schema import AdvanceTable, FollowTable, ReachTable, SwitchTable, TrackTable

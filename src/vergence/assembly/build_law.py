@@ -6,13 +6,13 @@ from contextlib import suppress
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.assembly.advice.motion_needed import require_motion
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.limits_on_plan import (
     PLAN_MARGIN_JOINT,
     PLAN_MARGIN_PX,
     limits_on_plan,
 )
-from vergence.assembly.motion_needed import require_motion
 from vergence.assembly.target_faces import TargetFaces
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable, TrackTable

@@ -7,8 +7,8 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.estimation import Measure
-from vergence.estimation.object_rivals import choose_pose
-from vergence.estimation.object_search import ObjectSearch, SearchPace
+from vergence.estimation.known_object.object_rivals import choose_pose
+from vergence.estimation.known_object.object_search import ObjectSearch, SearchPace
 from vergence.geometry import angle_between, transform_points
 from vergence.signals import Frame, ImagePoints
 from vergence.vision.known_object import EdgeTracker, ObjectModel

@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.photograph import is_by_photograph, plan_approach
-from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.run import changed_cell
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.tag import Located, located
-from vergence.assembly.tag_reach import plan_tag_reach
+from vergence.assembly.tasks.photograph import is_by_photograph, plan_approach
+from vergence.assembly.tasks.reach import measure_twice, plan_reach
+from vergence.assembly.tasks.tag_reach import plan_tag_reach
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable
 from vergence.errors import InputError

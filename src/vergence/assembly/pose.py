@@ -36,7 +36,7 @@ from vergence.estimation import (
     blocked_from_tip,
     seen_from_tip,
 )
-from vergence.estimation.outline_perception import OutlinePerception
+from vergence.estimation.known_object.outline_perception import OutlinePerception
 from vergence.geometry import se3_compose, se3_inverse
 from vergence.loading import asking
 from vergence.robot import forward_kinematics

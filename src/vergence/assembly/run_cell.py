@@ -3,14 +3,14 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 
-from vergence.assembly.axis_advice import axis_advice
-from vergence.assembly.free_directions import free_directions
+from vergence.assembly.advice.axis_advice import axis_advice
+from vergence.assembly.advice.free_directions import free_directions
+from vergence.assembly.advice.under_actuation import under_actuation
 from vergence.assembly.parts import Parts
 from vergence.assembly.self_calibrating import SELF_CALIBRATION, SelfCalibrating, words
 from vergence.assembly.tag import with_tag_in_view
-from vergence.assembly.task_sequence import TaskSequence
-from vergence.assembly.task_stages import stages_of, timeouts_of
-from vergence.assembly.under_actuation import under_actuation
+from vergence.assembly.tasks.task_sequence import TaskSequence
+from vergence.assembly.tasks.task_stages import stages_of, timeouts_of
 from vergence.cell import Cell
 from vergence.cell.tasks import naming_task
 from vergence.errors import InputError, RenderingError

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vergence.estimation.object_rivals import is_near
-from vergence.estimation.object_search import Fit, Near
+from vergence.estimation.known_object.object_rivals import is_near
+from vergence.estimation.known_object.object_search import Fit, Near
 from vergence.geometry import pose_difference
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from vergence.arrays import FloatArray
+from vergence.estimation.filters.measurement import POSE
 from vergence.estimation.measure import CameraPose
-from vergence.estimation.measurement import POSE
 from vergence.estimation.perception import PosePerception
 from vergence.estimation.pose_minima import APART_RAD, PoseMinimum, pose_minima
 from vergence.estimation.recovery import LEAST_POINTS, RIVAL

@@ -9,7 +9,8 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH
 from vergence.errors import InputError
-from vergence.estimation.history import FilterHistory
+from vergence.estimation.filters.history import FilterHistory
+from vergence.estimation.filters.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.measure import (
     CameraPose,
     Find,
@@ -22,7 +23,6 @@ from vergence.estimation.recovery import NoPose, pose_from_points
 from vergence.estimation.rig import CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.spacing import keep_apart
-from vergence.estimation.target_filter import B, TargetFilter, Verdict, state_of
 from vergence.estimation.target_shape import TargetShape
 from vergence.estimation.tracking_step import Expected, Measured, Predicted
 from vergence.estimation.view import View, usable_view, view_of

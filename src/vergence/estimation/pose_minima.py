@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.estimation.measurement import POSE, whitened_rows
+from vergence.estimation.filters.measurement import POSE, whitened_rows
 from vergence.estimation.view import Seen
 from vergence.geometry import moved_pose, se3, se3_compose, se3_inverse, so3_exp, so3_log
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.estimation.measurement import POSE, mahalanobis_squared, whitened_rows
+from vergence.estimation.filters.measurement import POSE, mahalanobis_squared, whitened_rows
 from vergence.estimation.pose_minima import (
     PoseMinimum,
     is_apart,

@@ -9,7 +9,7 @@ from numba import njit
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera.lens import FX, FY
 from vergence.errors import InputError
-from vergence.estimation.measurement import POSE, point_rows
+from vergence.estimation.filters.measurement import POSE, point_rows
 
 
 @njit(cache=True)

@@ -22,7 +22,7 @@ _END_S = 5.0  # that a process has to end by itself
 IMPORTED = (
     "vergence.planning",
     "vergence.runtime",
-    "vergence.estimation.object_follower",
+    "vergence.estimation.known_object.object_follower",
 )
 
 

@@ -15,7 +15,7 @@ from vergence.app.figures.axis import range_of
 from vergence.app.figures.chart import Band, Chart, Curve, Dash, Panel, Shade
 from vergence.app.tracking.track_record import TrackedCurve, TrackedPose, TrackRecord
 from vergence.arrays import BoolArray, FloatArray
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.object_follower import Sighting
 from vergence.geometry import so3_left_jacobian_inverse, so3_log
 
 _SIGMA = "±1 σ"

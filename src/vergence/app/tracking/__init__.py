@@ -1,6 +1,11 @@
 """`vergence track`: an object, a tag or curves in footage of one camera."""
 
 from vergence.app.tracking.points import track_points
-from vergence.estimation.object_follower import FollowRule, ObjectFollower, Sighting, Step
+from vergence.estimation.known_object.object_follower import (
+    FollowRule,
+    ObjectFollower,
+    Sighting,
+    Step,
+)
 
 __all__ = ["FollowRule", "ObjectFollower", "Sighting", "Step", "track_points"]

@@ -9,8 +9,8 @@ from vergence.app.tracking.tag_follower import Shown
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
-from vergence.estimation.object_follower import Sighting, Step
-from vergence.estimation.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_follower import Sighting, Step
+from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker
 from vergence.vision.known_object.edge_samples import sample_edges
 from vergence.vision.known_object.silhouette import outline_of

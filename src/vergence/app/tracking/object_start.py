@@ -10,13 +10,13 @@ from vergence.app.tracking.pose_subject import PoseSubject
 from vergence.app.tracking.start import starting_poses
 from vergence.app.tracking.track_subject import Start
 from vergence.errors import NOTHING, InputError
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import (
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import (
     LEAST_SHARE,
     OUTLINE_RULE,
     FollowRule,
 )
-from vergence.estimation.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.vision.known_object import (
     EdgeTracker,
     ObjectModel,

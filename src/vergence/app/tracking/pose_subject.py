@@ -14,8 +14,8 @@ from vergence.app.tracking.tag_follower import TagFollower
 from vergence.app.tracking.track_subject import Result
 from vergence.arrays import ImageArray
 from vergence.camera import Camera
-from vergence.estimation.hypothesis_follower import HypothesisFollower
-from vergence.estimation.object_follower import Sighting, Step
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import Sighting, Step
 from vergence.signals import Outcome, OutcomeKind
 
 _NO_SAMPLES: dict[str, Any] = {

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from vergence.estimation.object_follower import Step
+from vergence.estimation.known_object.object_follower import Step
 from vergence.geometry import matrix_to_quaternion
 
 COLUMNS = (

@@ -19,7 +19,7 @@ from vergence.estimation import (
     pose_from_points,
     view_of,
 )
-from vergence.estimation.object_follower import CAMERA, Sighting, Step
+from vergence.estimation.known_object.object_follower import CAMERA, Sighting, Step
 from vergence.signals import Frame, ImagePoints, TargetState
 from vergence.vision.known_object import ObjectModel
 

@@ -12,7 +12,7 @@ from vergence.app.output import json_text
 from vergence.app.tracking.curve_kinds import KINDS, CurveKind
 from vergence.arrays import BoolArray, FloatArray
 from vergence.errors import Absent, InputError
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.object_follower import Sighting
 from vergence.geometry import quaternion_to_matrix
 from vergence.places import TRACK
 from vergence.signals import Outcome, OutcomeKind

@@ -6,7 +6,7 @@ from vergence.app.figures.tracked import unit_of
 from vergence.app.table import Row
 from vergence.app.tracking.track_record import TrackedCurve, TrackedPose, TrackRecord
 from vergence.arrays import BoolArray
-from vergence.estimation.object_follower import Sighting
+from vergence.estimation.known_object.object_follower import Sighting
 
 _MEANING = {
     Sighting.SEEN: "found, and the pose fits what was found",

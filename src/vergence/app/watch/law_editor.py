@@ -8,7 +8,7 @@ from typing import Any
 
 from vergence.app.watch.knobs import knobs, law_choices
 from vergence.assembly import LawContext, build_law, with_points
-from vergence.assembly.photograph import is_by_photograph, without_target_motion
+from vergence.assembly.tasks.photograph import is_by_photograph, without_target_motion
 from vergence.cell import Cell, load_cell
 from vergence.cell.toml_text import setting
 from vergence.control import Law

@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.app.figures.arm import drawn_names
 from vergence.arrays import FloatArray
-from vergence.assembly.photograph import is_by_photograph
+from vergence.assembly.tasks.photograph import is_by_photograph
 from vergence.cell import Cell
 from vergence.runtime import ArmInfo
 from vergence.runtime.json_numbers import numbers

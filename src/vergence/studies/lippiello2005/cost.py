@@ -18,7 +18,7 @@ from vergence.estimation import (
     PosePerception,
     TargetShape,
 )
-from vergence.estimation.target_filter import Update
+from vergence.estimation.filters.target_filter import Update
 from vergence.estimation.view import Seen
 from vergence.simulation import SimulatedDriver
 

@@ -8,8 +8,8 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray
 from vergence.assembly import run_cell
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.reach import measure_twice, plan_reach
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.tasks.reach import measure_twice, plan_reach
 from vergence.cell import Cell
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable

@@ -9,7 +9,12 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.drawing import COLORS, figure, legend, logarithmic
-from vergence.estimation.object_follower import OUTLINE_RULE, ObjectFollower, Sighting, Step
+from vergence.estimation.known_object.object_follower import (
+    OUTLINE_RULE,
+    ObjectFollower,
+    Sighting,
+    Step,
+)
 from vergence.experiments.workers import Workers
 from vergence.geometry import moved_pose, pose_difference
 from vergence.studies.check import Check, Progress, StudyResult, within

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from vergence.assembly.build_law import require_suitable
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.photograph import is_by_photograph, require_photograph
-from vergence.assembly.switch import require_output
 from vergence.assembly.target_geometry import target_shape
-from vergence.assembly.task_stages import until_of
+from vergence.assembly.tasks.photograph import is_by_photograph, require_photograph
+from vergence.assembly.tasks.switch import require_output
+from vergence.assembly.tasks.task_stages import until_of
 from vergence.cell import Cell
 from vergence.cell.schema import AdvanceTable, FollowTable, ReachTable, SwitchTable
 from vergence.control import ServoSettings

@@ -12,7 +12,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
-from vergence.estimation.object_tracker import Measurement, ObjectTracker
+from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import se3, se3_compose, skew, so3_exp
 from vergence.vision.known_object.contour_maps import Maps
 from vergence.vision.known_object.contour_vote import directions_of, vote_place

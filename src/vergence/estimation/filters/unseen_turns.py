@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.estimation.belief import Belief
+from vergence.estimation.filters.belief import Belief
 from vergence.geometry import moved_pose, pose_difference
 
 UNKNOWN_RAD = np.pi / np.sqrt(3.0)  # standard deviation of a uniformly distributed angle

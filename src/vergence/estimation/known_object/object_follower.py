@@ -19,7 +19,7 @@ from vergence.estimation import (
     with_unseen,
     without_unseen,
 )
-from vergence.estimation.object_tracker import Measurement, ObjectTracker
+from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import pose_difference, se3_compose
 from vergence.signals import ImagePoints
 

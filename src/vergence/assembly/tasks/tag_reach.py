@@ -10,10 +10,10 @@ from vergence.assembly.build_law import build_law
 from vergence.assembly.first_points import first_points
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
-from vergence.assembly.photograph import take_goal
-from vergence.assembly.reach import SETTLE_S
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.tag import TagFinder
+from vergence.assembly.tasks.photograph import take_goal
+from vergence.assembly.tasks.reach import SETTLE_S
 from vergence.cell.joint_positions import goal_positions
 from vergence.cell.schema import ReachTable, TrackTable
 from vergence.errors import InputError

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.estimation.consistency import Consistency
+from vergence.estimation.filters.consistency import Consistency
 from vergence.geometry import rpy_rates_to_omega, rpy_to_matrix, se3
 
 

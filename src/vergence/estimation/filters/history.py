@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Generic, NamedTuple
 
-from vergence.estimation.target_filter import (
+from vergence.estimation.filters.target_filter import (
     B,
     TargetFilter,
     Update,

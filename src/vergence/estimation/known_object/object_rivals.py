@@ -13,9 +13,9 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.object_follower import ObjectFollower, Step
-from vergence.estimation.object_search import Fit
-from vergence.estimation.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_follower import ObjectFollower, Step
+from vergence.estimation.known_object.object_search import Fit
+from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.geometry import angle_between, pose_difference, se3, se3_compose, so3_exp
 from vergence.vision.known_object.look_alikes import (
     Turn,

@@ -6,11 +6,11 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
-from vergence.estimation.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
+from vergence.estimation.known_object.object_follower import OUTLINE_RULE, Sighting, Step
+from vergence.estimation.known_object.object_search import IN_A_LOOP
+from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.estimation.measure import CameraPose
-from vergence.estimation.object_follower import OUTLINE_RULE, Sighting, Step
-from vergence.estimation.object_search import IN_A_LOOP
-from vergence.estimation.object_tracker import ObjectTracker
 from vergence.geometry import se3_compose, se3_inverse, transform_points
 from vergence.signals import Frame, ImagePoints, Observation, TargetState
 

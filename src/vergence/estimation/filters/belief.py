@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.estimation.consistency import Consistency
+from vergence.estimation.filters.consistency import Consistency
 
 
 @dataclass(frozen=True, slots=True)

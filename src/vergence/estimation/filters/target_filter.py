@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.errors import InputError
-from vergence.estimation.consistency import Consistency
+from vergence.estimation.filters.consistency import Consistency
 from vergence.estimation.view import Seen, View
 from vergence.signals import TargetState
 

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.advance import NotLooking
 from vergence.assembly.law_context import LawContext
 from vergence.assembly.parts import Parts
 from vergence.assembly.started_driver import StartedDriver
+from vergence.assembly.tasks.advance import NotLooking
 from vergence.cell import Cell
 from vergence.cell.schema import SwitchTable
 from vergence.errors import InputError, nearest

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from vergence.arrays import FloatArray
 from vergence.assembly.assemble import assemble_parts, task_parts
-from vergence.assembly.check_task import check_task
 from vergence.assembly.parts import Parts
-from vergence.assembly.rest import Rest
-from vergence.assembly.task_stages import stages_of, timeouts_of
+from vergence.assembly.tasks.check_task import check_task
+from vergence.assembly.tasks.rest import Rest
+from vergence.assembly.tasks.task_stages import stages_of, timeouts_of
 from vergence.assembly.warm_up import warm_up
 from vergence.cell import Cell
 from vergence.cell.schema import FollowTable, TrackTable

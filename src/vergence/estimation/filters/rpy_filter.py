@@ -7,10 +7,14 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.estimation.information import compress, joseph_update, keep_rows
-from vergence.estimation.measurement import deletion_squares, mahalanobis_squared, whitened_rows
-from vergence.estimation.rpy_belief import RpyBelief, twist_jacobian
-from vergence.estimation.target_filter import (
+from vergence.estimation.filters.information import compress, joseph_update, keep_rows
+from vergence.estimation.filters.measurement import (
+    deletion_squares,
+    mahalanobis_squared,
+    whitened_rows,
+)
+from vergence.estimation.filters.rpy_belief import RpyBelief, twist_jacobian
+from vergence.estimation.filters.target_filter import (
     Update,
     Verdict,
     fading_share,

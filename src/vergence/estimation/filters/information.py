@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.estimation.measurement import POSE
+from vergence.estimation.filters.measurement import POSE
 from vergence.kernels.scratch import scratch
 
 STATES = 12

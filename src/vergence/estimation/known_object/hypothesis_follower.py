@@ -7,13 +7,13 @@ from typing import Any
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation.half_hidden import enough_seen
-from vergence.estimation.object_follower import (
+from vergence.estimation.known_object.object_follower import (
     FollowRule,
     ObjectFollower,
     Sighting,
     Step,
 )
-from vergence.estimation.object_rivals import (
+from vergence.estimation.known_object.object_rivals import (
     DECIDED,
     Chosen,
     Evidence,
@@ -26,8 +26,14 @@ from vergence.estimation.object_rivals import (
     is_new_view,
     neighbours,
 )
-from vergence.estimation.object_search import AT_ONCE, Fit, Near, ObjectSearch, SearchPace
-from vergence.estimation.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_search import (
+    AT_ONCE,
+    Fit,
+    Near,
+    ObjectSearch,
+    SearchPace,
+)
+from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.geometry import angle_between, se3_compose
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.look_alikes import Turn, between
