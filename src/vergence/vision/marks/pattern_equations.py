@@ -251,6 +251,9 @@ def normal_equations(
             for k in range(UNKNOWNS):
                 weighted = weight * J[k]
                 scores[block, k] += weighted * residual
-                for m in range(UNKNOWNS):
+                for m in range(k, UNKNOWNS):
                     A[k, m] += weighted * J[m]
+    for k in range(UNKNOWNS):
+        for m in range(k):
+            A[k, m] = A[m, k]
     return count, weights, squares
