@@ -17,6 +17,7 @@ from harness import Peer, calls, measured, row
 from real_images import INSTALL, sequence
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.vision import SsdTracker, pick_features
+from vergence.vision.marks import MarkerDetector
 
 RIGHT_PX = 1.5
 MARGIN_PX = 16
@@ -166,8 +167,28 @@ def speed_rows() -> list[dict[str, Any]]:
     ]
 
 
+def marker_row() -> dict[str, Any]:
+    """A marker of 90 px, slightly blurred, in 640 × 480: found, with its corners."""
+    import cv2
+
+    family = cv2.aruco.DICT_APRILTAG_36H11
+    known = cv2.aruco.getPredefinedDictionary(family)
+    image = np.full((480, 640), 150, np.uint8)
+    image[180:300, 260:380] = 255
+    image[195:285, 275:365] = cv2.aruco.generateImageMarker(known, 7, 90)
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.7), np.uint8)
+    settings = cv2.aruco.DetectorParameters()
+    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_APRILTAG
+    peer = cv2.aruco.ArucoDetector(known, settings)
+    ours = MarkerDetector("apriltag_36h11")
+    assert ours.detect(image).ids.tolist() == [7]
+    found = calls(lambda: peer.detectMarkers(image))
+    name = "marker: found in 640 × 480, with corners"
+    return row(name, calls(lambda: ours.detect(image)), Peer("OpenCV, AprilTag", found))
+
+
 def run() -> list[dict[str, Any]]:
-    rows = speed_rows()
+    rows = [*speed_rows(), marker_row()]
     if not sequence("cube"):
         none = measured("SSD tracker: right on real images", float("nan"), "%")
         return [*rows, none | {"peer": INSTALL}]
