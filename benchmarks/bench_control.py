@@ -12,11 +12,17 @@ from peer_programs import machinevision, visp
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.control import (
+    CameraMounting,
+    DampedPseudoInverse,
     MotionSettings,
     OptimalTracking,
+    PoseServo,
+    PositionBased,
     PseudoInverse,
+    QuadraticProgram,
     Servo,
     Situation,
+    Solver,
     TrackingSetup,
 )
 from vergence.control.objectives import optimal_tracking_tick, pack_setup
@@ -25,7 +31,9 @@ from vergence.control.objectives._tracking import (
     tracking_displacement,
     unpack_gains,
 )
+from vergence.geometry import se3, se3_compose
 from vergence.robot import Arm
+from vergence.signals import JointState, Observation, Reference, Setpoint, TargetState
 
 POSE = np.array([-2.19, 0.75, -3.01, 0.1, -0.87, 0.2])
 DESIRED = 0.1 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -88,6 +96,21 @@ def repeat_tick(count, weights, joints, q, features):  # type: ignore[no-untyped
     return result[0]
 
 
+def inner_tick(arm: Arm, solver: Solver) -> Callable[[], object]:
+    """An inner tick of position-based servoing: from the last set-point to joint rates."""
+    camera = Camera(640, 480, 1454.0, 1230.0, 319.5, 239.5)
+    at = Situation(period_s=1.0 / 500.0)
+    servo = PoseServo(arm, CameraMounting(camera), PositionBased(), solver=solver, situation=at)
+    ahead = se3(np.eye(3), np.array([0.01, 0.0, 0.5]))
+    T_world_target = se3_compose(arm.forward_kinematics(POSE), ahead)
+    target = TargetState(0.0, T_world_target, np.zeros(6), np.eye(12), True)
+    desired = Reference(0.0, T_camera_target=se3(np.eye(3), np.array([0.0, 0.0, 0.5])))
+    rest = np.zeros(len(POSE))
+    servo.command(Observation(0.0, (), target), desired, JointState(0.0, POSE, rest))
+    setpoint = Setpoint(POSE, rest)
+    return lambda: servo.follow(setpoint)
+
+
 def run() -> list[dict[str, Any]]:
     arm = puma()
     plain, avoiding = setup_of(arm, S=0.0), setup_of(arm, S=1e-6)
@@ -95,10 +118,15 @@ def run() -> list[dict[str, Any]]:
     tick, gradient = calls(whole_tick(plain)), calls(whole_tick(avoiding))
     packed = pack_setup(avoiding)
     inside = loops(lambda count: repeat_tick(count, *packed, POSE, FEATURES))
+    by_inverse, by_program = (
+        calls(inner_tick(arm, solver)) for solver in (DampedPseudoInverse(), QuadraticProgram())
+    )
     return [
         row("control: interaction matrix + law", alone, visp("tick"), ratio_aim=0.15),
         row("control: interaction matrix + law", alone, machinevision("tick")),
         row("control: with kinematics", tick, visp("tick_kinematics"), ratio_aim=0.3),
         row("control: with exact w' gradient", gradient, visp("tick_joint_limits"), value_aim=4.0),
         row("control: the same, inside a kernel", inside, value_aim=2.5),
+        row("position-based: inner tick, damped inverse", by_inverse),
+        row("position-based: inner tick, quadratic program", by_program),
     ]
