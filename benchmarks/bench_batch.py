@@ -21,6 +21,7 @@ from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 RUN_S, RUNS = 25.0, 500
 SHARED = 200  # runs of 5 s that two workers share
 RATE_HZ = 30.0  # of images
+POSE_CELLS = ("lippiello2005", "four_cameras")  # tasks that follow a pose, in physics
 LAWS = ("image_based", "constrained")
 
 
@@ -61,9 +62,9 @@ def runs_a_second(run: KinematicRun) -> float:
     return RUNS / (time.perf_counter() - start)
 
 
-def runs_a_cpu_second(law: str) -> float:
+def runs_a_cpu_second(law: str, cell: str = "ur5") -> float:
     """How many runs of 5 s a core makes of a cell under a law, from a cell to results."""
-    source = CellSource.changed("ur5", {"duration_s": 5.0})
+    source = CellSource.changed(cell, {"duration_s": 5.0})
     trials = start_trials(source.load(), [law], 5, 0, Sampling(("starts",)))
     run_trials(source, trials[:1], 2.0)
     start = time.process_time()
@@ -119,6 +120,12 @@ def run() -> list[dict[str, Any]]:
         *(
             measured(f"campaign: runs of 5 s, {law} law, a core", runs_a_cpu_second(law), "runs/s")
             for law in LAWS
+        ),
+        *(
+            measured(
+                f"campaign: runs of 5 s, {cell}, a core", runs_a_cpu_second("own", cell), "runs/s"
+            )
+            for cell in POSE_CELLS
         ),
         measured(
             "campaign: two workers, by the wall", sooner_by_two_workers(), "× one", at_least=1.8
