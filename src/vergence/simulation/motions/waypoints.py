@@ -4,11 +4,12 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
+from numba import njit
 from pydantic import Field
 
 from vergence.arrays import FloatArray
 from vergence.errors import InputError
-from vergence.geometry import rpy_to_matrix, se3
+from vergence.geometry import rpy_to_matrix, se3, se3_compose
 from vergence.parts import knob, part
 from vergence.simulation.motions.motion import Angle, Angles3, Vector3
 
@@ -80,7 +81,22 @@ class PoseMotion(Waypoints):
         roll_pitch_yaw = np.deg2rad(self.rotations_rpy_deg)
         values = np.hstack((np.array(self.positions_m), roll_pitch_yaw[:, ::-1]))
         path = self.through(values, times)
-        return np.array([T_start @ se3(rpy_to_matrix(row[3:]), row[:3]) for row in path])
+        moved: FloatArray = _poses_along(np.array(T_start), path)
+        return moved
+
+
+@njit(cache=True)
+def _poses_along(T_start: FloatArray, path: FloatArray) -> FloatArray:
+    """Return the poses (K, 4, 4) in the world of positions, roll, pitch and yaw (K, 6) in a frame.
+
+    Args:
+        T_start: of that frame, (4, 4).
+        path: (K, 6) m and rad.
+    """
+    poses = np.empty((len(path), 4, 4))
+    for k in range(len(path)):
+        poses[k] = se3_compose(T_start, se3(rpy_to_matrix(path[k, 3:]), path[k, :3]))
+    return poses
 
 
 @part("arm_motion", "joints")
