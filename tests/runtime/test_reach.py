@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vergence.assembly.tasks import reach, run_cell
+from vergence.assembly import run_cell
+from vergence.assembly.tasks import reach
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.signals import OutcomeKind

@@ -6,7 +6,7 @@ from typing import Any
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.half_hidden import enough_seen
+from vergence.estimation.known_object.half_hidden import enough_seen
 from vergence.estimation.known_object.object_follower import (
     FollowRule,
     ObjectFollower,
