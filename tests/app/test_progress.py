@@ -106,13 +106,16 @@ def test_work_that_was_done_before_says_from_its_first_second_how_long_it_took(
 
 
 def test_a_bar_estimates_by_the_last_time_until_that_is_over_and_by_its_pace_then() -> None:
+    now = 0.0
     with bar("") as progress:
+        progress.get_time = lambda: now
         task = progress.add_task("a study", total=100)
         progress.expect(task, 0.9)
         assert progress.rest(progress.tasks[0]) == "1 s left"
-        progress.update(task, advance=1)  # at its pace it would last for long
+        now = 0.001
+        progress.update(task, advance=1)
         assert progress.rest(progress.tasks[0]) == "1 s left"
-        time.sleep(3.2)
+        now = 3.2
         assert progress.rest(progress.tasks[0]) == "takes longer than estimated"
         progress.update(task, advance=1)
         assert float(progress.rest(progress.tasks[0]).removesuffix(" s left")) > 40.0
@@ -129,8 +132,9 @@ def test_what_took_how_long_is_kept_of_the_newest_and_no_file_of_ours_is_an_erro
     for number, name in enumerate(("first", "second", "third")):
         remember_s(name, number)
     assert [usual_s(name) for name in ("first", "second", "third")] == [None, 1.0, 2.0]
-    (tmp_path / "vergence" / "durations.json").write_text("[1, 2")
-    assert usual_s("third") is None
+    for broken in ("[1, 2", "[1, 2]", '{"third": "long"}', '{"third": null}'):
+        (tmp_path / "vergence" / "durations.json").write_text(broken)
+        assert usual_s("third") is None
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "vergence" / "durations.json"))
     remember_s("third", 1.0)
     assert usual_s("third") is None

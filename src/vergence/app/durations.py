@@ -31,7 +31,9 @@ def _read() -> Mapping[str, float]:
         noted = json.loads(_path().read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return noted if isinstance(noted, dict) else {}
+    if not isinstance(noted, dict):
+        return {}
+    return {name: s for name, s in noted.items() if isinstance(s, (int, float)) and s >= 0.0}
 
 
 def _path() -> Path:

@@ -15,10 +15,8 @@ from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 _FOUND = 0.95  # fraction of the places found on visible edges
 _PRECISE_PX = 0.5  # standard deviation of their residuals
 _TOLERANCE_PX = 1.5  # within which others are found by chance
-_ALIKE, _MOST_OF_EDGE = (
-    4.0,
-    3.0,
-)  # places that count as one; and of one edge, which may lie on a line
+_ALIKE = 4.0  # places that count as one
+_MOST_OF_EDGE = 3.0  # independent places that an edge counts as, at most: it may lie on a line
 _DIRECTIONS, _BOUNDS = 12, 24  # of the borders that are tried, and their places along each
 _LEAST_CHANCE, _MOST_CHANCE = 0.3, 0.9
 
