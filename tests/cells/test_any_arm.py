@@ -20,7 +20,7 @@ def test_a_package_that_is_not_installed_is_answered_with_how_to_install_it():
 def test_a_path_that_fits_no_file_or_several_of_a_package_is_refused():
     for path in ("no_such.urdf", "panda_description/meshes/collision/link.stl"):
         model = Path(f"package:example-robot-data/{path}")
-        with pytest.raises(InputError, match="fits 0 files"):
+        with pytest.raises(InputError, match="no file of example-robot-data ends with that"):
             locate_model(model, Path(), "cell.toml", "arms.a.model")
     with pytest.raises(InputError, match="package:NAME/PATH"):
         locate_model(Path("package:numpy"), Path(), "cell.toml", "arms.a.model")

@@ -233,7 +233,7 @@ class HypothesisFollower:
         return [fit for fit in fits if fit.whole >= self._rule.found_again]
 
     def _look_elsewhere(self, image: ImageArray, time: float, step: Step) -> None:
-        """Search on; track beside the pose what explains the images as well elsewhere."""
+        """Search on; track beside the pose what explains the images as well at another place."""
         fits = self._search.look(image)
         if fits is None:
             return
@@ -242,7 +242,7 @@ class HypothesisFollower:
         memory = self._tracker.elsewhere(self._main.memory)
         for fit in self._whole(fits):
             known = [step.T_camera_target, *(r.follower.T_camera_target for r in self._rivals)]
-            elsewhere = not any(is_near(fit.T_camera_target, T) for T in known)
+            elsewhere = all(self._search.apart(fit.T_camera_target, T) for T in known)
             worse = own.over(Evidence().and_seen(fit.share, fit.expected)) > DECIDED
             if elsewhere and not worse and len(self._rivals) < _MOST_RIVALS:
                 rival = self._begin(fit.T_camera_target, time, memory, self._search.deviation)
