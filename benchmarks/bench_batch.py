@@ -19,7 +19,7 @@ from vergence.experiments.kinematic import KinematicRuns
 from vergence.simulation import KinematicCell, SimulatedDriver, target_poses
 
 RUN_S, RUNS = 25.0, 500
-SHARED = 200  # runs of 5 s that two workers share
+SHARED = 1400  # runs of 5 s that two workers share: about a minute for one
 RATE_HZ = 30.0  # of images
 POSE_CELLS = ("lippiello2005", "four_cameras")  # tasks that follow a pose, in physics
 LAWS = ("image_based", "constrained")
