@@ -15,7 +15,6 @@ from vergence.estimation.known_object.object_follower import OUTLINE_RULE, Sight
 from vergence.estimation.known_object.object_search import (
     AT_ONCE,
     IN_A_LOOP,
-    Fit,
     ObjectSearch,
     SearchPace,
 )
@@ -90,16 +89,6 @@ def beside_a_look_alike(aside: float) -> list[tuple[Step, Any]]:
 def test_what_is_mostly_outside_the_image_is_not_taken_for_a_hidden_object(aside: float) -> None:
     steps = [(step, T) for step, T in beside_a_look_alike(aside) if step.sighting is Sighting.SEEN]
     assert all(T is not None and deviations(step, T) < WRONG for step, T in steps)
-
-
-def test_what_looked_like_a_hidden_object_gives_way_when_it_reappears(monkeypatch) -> None:
-    monkeypatch.setattr(Fit, "whole", property(lambda fit: fit.share))  # as if all were in view
-    steps = beside_a_look_alike(1e-12)
-    assert any(step.sighting is Sighting.SEEN for step, T in steps[10:] if T is None)
-    step, T = steps[-1]
-    poses = [step.T_camera_target, *step.alternatives]
-    assert min(np.linalg.norm(pose[:3, 3] - T[:3, 3]) for pose in poses) < 0.1
-    assert step.sighting is Sighting.AMBIGUOUS or deviations(step, T) < WRONG
 
 
 def edge_film(cut: float, after: Any, seed: int, hidden: int, count: int) -> Iterator[Any]:

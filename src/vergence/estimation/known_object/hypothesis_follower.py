@@ -54,8 +54,7 @@ class HypothesisFollower:
 
     A lost object is searched for in whole images, at all places and many rotations. It counts as
     found when these have been compared, wherever it is; what the images do not distinguish is
-    ambiguous. Where the object may be anywhere, images are searched once more after it was found:
-    what looked like it while it was hidden must not keep it from being found.
+    ambiguous.
 
     Args:
         tracker: finds the object's edges, or its outline.
@@ -95,7 +94,6 @@ class HypothesisFollower:
         self._lost = False  # until rotated poses have been compared
         self._search = ObjectSearch(tracker, camera, pace, self._rule.found_again)
         self._searching = False
-        self._checking = False  # whether images are searched for it elsewhere, since it was found
         self._undecided = ""  # what the last round of the search left open
         self._compared = not self._by_edges
         self._settled = not self._by_edges  # whether poses nearby have been compared
@@ -140,8 +138,6 @@ class HypothesisFollower:
         if self.was_seen and step.sighting is not Sighting.SEEN:
             self._lost = self._lost or step.sighting is Sighting.LOST
             step = self._sought(image, time, step)
-        elif self._checking:
-            self._look_elsewhere(image, time, step)
         if self._missed >= _MISSED:  # the prediction is vague
             self._settled = not self._by_edges
         if not self._settled and step.sighting is Sighting.SEEN:
@@ -192,7 +188,7 @@ class HypothesisFollower:
             return step
         if not self._searching or angle_between(search.T_last, self._last) > _STALE_RAD:
             search.begin(self._last, self._main.memory)
-            self._searching, self._checking, self._undecided = True, False, ""
+            self._searching, self._undecided = True, ""
         if not search.promising:
             self._hidden_until = time
         near = Near(step.T_camera_target, step.covariance[:6, :6]) if self._by_edges else None
@@ -224,30 +220,12 @@ class HypothesisFollower:
             return replace(step, reason=self._undecided)
         self._main, self._lost, self._evidence = main, False, Evidence()
         self._compared_at, self._settled = None, not self._by_edges
-        self._checking = not self._by_edges
         self._rivals = [Rival(self._begin(T, time, memory, deviation), Evidence()) for T in rivals]
         return found
 
     def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return the poses of which enough is found; what is outside the image is not."""
         return [fit for fit in fits if fit.whole >= self._rule.found_again]
-
-    def _look_elsewhere(self, image: ImageArray, time: float, step: Step) -> None:
-        """Search on; track beside the pose what explains the images as well at another place."""
-        fits = self._search.look(image)
-        if fits is None:
-            return
-        self._checking = False
-        own = Evidence().and_seen(step.share, len(step.samples_found))
-        memory = self._tracker.elsewhere(self._main.memory)
-        for fit in self._whole(fits):
-            known = [step.T_camera_target, *(r.follower.T_camera_target for r in self._rivals)]
-            elsewhere = all(self._search.apart(fit.T_camera_target, T) for T in known)
-            worse = own.over(Evidence().and_seen(fit.share, fit.expected)) > DECIDED
-            if elsewhere and not worse and len(self._rivals) < _MOST_RIVALS:
-                rival = self._begin(fit.T_camera_target, time, memory, self._search.deviation)
-                self._rivals.append(Rival(rival, Evidence()))
-                self._evidence, self._compared_at = Evidence(), None
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
         """Track the rotated poses too; drop worse ones, adopt one that explains more."""

@@ -188,11 +188,6 @@ class ObjectSearch:
         """Whether a promising pose was found before this round."""
         return self._seen
 
-    def apart(self, T: FloatArray, T_other: FloatArray) -> bool:
-        """Return whether the object is at different places: half its size apart, or more."""
-        away = float(np.linalg.norm(self._place(T) - self._place(T_other)))
-        return away > 0.5 * self._tracker.model.size
-
     def _start(self, seen: bool) -> None:
         """Start with the first rotation; `seen`: whether the object was in the images before."""
         self._seen, self._images = seen, 0
