@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vergence.estimation.known_object.object_follower import pose_distance
 from vergence.estimation.known_object.object_rivals import is_near
 from vergence.estimation.known_object.object_search import Fit, Near
-from vergence.geometry import pose_difference
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
 
@@ -50,7 +50,6 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
         return alike
     if not all(is_near(fit.T_camera_target, T) for fit in alike):
         return "several poses explain what is seen of the object"
-    error = pose_difference(T, near.T_camera_target)
-    if float(error @ np.linalg.solve(near.covariance, error)) > _PREDICTED:
+    if pose_distance(T, near.T_camera_target, near.covariance) > _PREDICTED:
         return "what is seen of the object is not where it was predicted"
     return [fits[best]]

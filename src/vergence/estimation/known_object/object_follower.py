@@ -301,8 +301,19 @@ class ObjectFollower:
 
 def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:
     """Return the squared Mahalanobis distance of a pose from the prediction."""
-    error = pose_difference(T_camera_target, belief.T_world_target)
-    return float(error @ np.linalg.solve(belief.honest_covariance[:6, :6], error))
+    return pose_distance(T_camera_target, belief.T_world_target, belief.honest_covariance)
+
+
+def pose_distance(T: FloatArray, T_other: FloatArray, covariance: FloatArray) -> float:
+    """Return the squared Mahalanobis distance between two poses (4, 4).
+
+    Args:
+        T: one pose.
+        T_other: the other.
+        covariance: at least (6, 6), of (δp, δθ) along the axes of the frame the poses are in.
+    """
+    error = pose_difference(T, T_other)
+    return float(error @ np.linalg.solve(covariance[:6, :6], error))
 
 
 def _points(seen: Measurement, time: float) -> ImagePoints:

@@ -13,10 +13,10 @@ import numpy as np
 
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
-from vergence.estimation.known_object.object_follower import ObjectFollower, Step
+from vergence.estimation.known_object.object_follower import ObjectFollower, Step, pose_distance
 from vergence.estimation.known_object.object_search import Fit
 from vergence.estimation.known_object.object_tracker import ObjectTracker
-from vergence.geometry import angle_between, pose_difference, se3, se3_compose, so3_exp
+from vergence.geometry import angle_between, moved_pose, pose_difference, se3_compose
 from vergence.vision.known_object.look_alikes import (
     Turn,
     axes_apart_rad,
@@ -145,8 +145,7 @@ def covered(step: Step, T: FloatArray) -> bool:
 
 def _covers(step: Step, T: FloatArray, T_other: FloatArray) -> bool:
     """Return whether two poses (4, 4) are the same within the stated covariance."""
-    error = pose_difference(T, T_other)
-    return float(error @ np.linalg.solve(step.covariance[:6, :6], error)) < _COVERED
+    return pose_distance(T, T_other, step.covariance) < _COVERED
 
 
 def compare_poses(
@@ -175,16 +174,13 @@ def compare_poses(
         The best pose; the poses that cannot be distinguished from it; and, if it is not the given
         one, the reason, else "".
     """
-
-    def fitted(start: FloatArray) -> Candidate:
-        seen = tracker.measure(image, camera, start, covariance, tracker.blank())
-        evidence = Evidence().and_seen(seen.share, seen.expected)
-        return Candidate(seen.T_camera_target, seen.share, evidence)
-
     alike = [np.eye(4), *(turn.T_target_turned for turn in symmetries)]
     starts = [*others, *(T @ turn.T_target_turned for turn in turns_of(tracker.model))]
-    given = fitted(T)
-    fits = [fitted(np.ascontiguousarray(start)) for start in _distinct([T], starts, alike)]
+    given = _fitted(tracker, image, camera, T, covariance)
+    fits = [
+        _fitted(tracker, image, camera, np.ascontiguousarray(start), covariance)
+        for start in _distinct([T], starts, alike)
+    ]
     fits = sorted((fit for fit in fits if fit.share >= least_share), key=lambda fit: -fit.share)
     chosen, note = given, ""
     if fits and fits[0].evidence.over(given.evidence) > DECIDED:
@@ -198,9 +194,17 @@ def compare_poses(
     return chosen.T_camera_target, _distinct([chosen.T_camera_target], near, alike), note
 
 
-def is_near(T: FloatArray, T_other: FloatArray) -> bool:
-    """Return whether two poses (4, 4) are so close that a wider covariance can cover both."""
-    return _same(T, T_other)
+def _fitted(
+    tracker: ObjectTracker,
+    image: ImageArray,
+    camera: Camera,
+    start: FloatArray,
+    covariance: FloatArray,
+) -> Candidate:
+    """Return the pose that fits an image, searched for around a start without any memory."""
+    seen = tracker.measure(image, camera, start, covariance, tracker.blank())
+    evidence = Evidence().and_seen(seen.share, seen.expected)
+    return Candidate(seen.T_camera_target, seen.share, evidence)
 
 
 def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
@@ -243,14 +247,12 @@ def neighbours(
     own = Evidence().and_seen(step.share, len(step.samples_found))
     for k in range(_TILTS):
         angle = 2.0 * np.pi * k / _TILTS
-        tilt = so3_exp(_TILT_RAD * np.array((np.cos(angle), np.sin(angle), 0.0)))
-        start = se3(np.ascontiguousarray(tilt @ T[:3, :3]), T[:3, 3].copy())
-        seen = tracker.measure(image, camera, start, covariance, tracker.blank())
-        evidence = Evidence().and_seen(seen.share, seen.expected)
-        if seen.share < least_share or own.over(evidence) > DECIDED:
+        tilt = _TILT_RAD * np.array((0.0, 0.0, 0.0, np.cos(angle), np.sin(angle), 0.0))
+        fit = _fitted(tracker, image, camera, moved_pose(T, tilt), covariance)
+        if fit.share < least_share or own.over(fit.evidence) > DECIDED:
             continue
-        if not any(_covers(step, seen.T_camera_target, other) for other in (T, *found)):
-            found.append(seen.T_camera_target)
+        if not any(_covers(step, fit.T_camera_target, other) for other in (T, *found)):
+            found.append(fit.T_camera_target)
     return found
 
 
@@ -260,12 +262,13 @@ def _distinct(
     """Return the poses that show an object differently from known ones and from each other."""
     new: list[FloatArray] = []
     for T in poses:
-        if not any(_same(T @ S, other) for other in (*known, *new) for S in alike):
+        if not any(is_near(T @ S, other) for other in (*known, *new) for S in alike):
             new.append(T)
     return new
 
 
-def _same(T: FloatArray, T_other: FloatArray) -> bool:
+def is_near(T: FloatArray, T_other: FloatArray) -> bool:
+    """Return whether two poses (4, 4) are so close that a wider covariance can cover both."""
     return angle_between(T, T_other) < _SAME_RAD and _near(T, T_other)
 
 
