@@ -9,13 +9,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from docutils import nodes
-from field_comments import field_comments
 from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 from vergence.cell import Cell, schema
+from vergence.field_comments import field_comments
 from vergence.parts import is_part, kind_of
 from vergence.registry import find, kinds
 

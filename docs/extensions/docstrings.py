@@ -3,8 +3,9 @@
 import re
 from typing import Any
 
-from field_comments import field_comments
 from sphinx.application import Sphinx
+
+from vergence.field_comments import field_comments
 
 _ARRAY = re.compile(r"~?numpy\.ndarray\[.*?~?numpy\.dtype\[~?numpy\.(\w+?)_?\]\]")
 _NAMES = {

@@ -36,6 +36,7 @@ def knob(
     upto: float | None = None,
     below: float | None = None,
     live: bool = True,
+    needs: str = "",
 ) -> Any:
     """Declare a field with its default, unit and range.
 
@@ -47,8 +48,10 @@ def knob(
         upto: it is at most this.
         below: it is smaller than this.
         live: whether the live page offers it.
+        needs: a field of the same part without which it has no effect: one that is zero, empty or
+            false.
     """
-    extra: Any = {"unit": unit, "live": live}
+    extra: Any = {"unit": unit, "live": live, "needs": needs}
     return Field(default, gt=above, ge=least, le=upto, lt=below, json_schema_extra=extra)
 
 

@@ -105,6 +105,8 @@ def test_after_a_cut_page_and_view_in_space_come_back_by_themselves(
     line.cut()
     browser.wait(BADGE, lambda text: text == "not connected")
     assert browser.value("watch.scene.lost")
+    assert browser.value("['parts', 'transport'].every((id) => document.getElementById(id).inert)")
     line.open = True
     browser.wait(BADGE, lambda text: text == "running")
+    assert not browser.value("document.querySelectorAll('[inert]').length")
     browser.wait("!watch.scene.lost && watch.scene.lines.size === 2")

@@ -1,7 +1,9 @@
 """What a page asks of a running cell, without a browser: nothing that it asks ends the command."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from steered import NoScene, Steered, wait
 
@@ -51,6 +53,19 @@ def test_points_that_cannot_be_tracked_are_refused_and_a_reset_takes_up_the_cell
     assert page.refused == []
     assert run.outcome.kind is OutcomeKind.STOPPED
     assert run.cameras["wrist"].points_px.shape[1] == 1
+
+
+def test_a_switch_that_the_law_does_not_take_is_not_offered() -> None:
+    editor = LawEditor("puma560", SMALL, None)
+    driver = SimulatedDriver(editor.cell, images=False)
+    started = LawContext.of(editor.stage, StartedDriver(driver, ("wrist",)))
+    context = replace(started, points_px={"wrist": np.array([[160.0, 120.0]])})
+    editor.offer(context)
+    assert {"prediction", "S"} <= {knob["key"] for knob in editor.as_json()["knobs"]}
+    assert "feed_forward" not in {knob["key"] for knob in editor.as_json()["knobs"]}
+    with pytest.raises(InputError, match="a wrong depth looks like motion"):
+        editor.turn("feed_forward", True, context)
+    driver.close()
 
 
 TRACK = 'kind = "track", arm = "puma", camera = "wrist"'

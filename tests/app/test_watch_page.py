@@ -234,6 +234,17 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
     browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.5" in t)
     turn("-1")
     browser.wait(log, lambda text: "refused" in text and "law.gain" in text)
+    field = "document.querySelector('.knob[data-key=gain] input')"
+    browser.wait(f"{field}.value", lambda value: value == "3.5")
+    told = browser.value("document.getElementById('log').children.length")
+    turn("3.5")  # as it is already: nothing changes
+    browser.value(f"{field}.focus()")
+    browser.key("ArrowUp")
+    browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.93" in t)
+    browser.wait("document.getElementById('log').children.length", lambda count: count == told + 1)
+    assert browser.value(f"{field}.ariaDescription").endswith("0 to 100 1/s")
+    slider = "document.querySelector('.knob[data-key=gain] [type=range]')"
+    browser.wait(f"{slider}.ariaValueText", lambda text: text == "3.93 1/s")
     before = browser.value(TIME)
     browser.wait(TIME, lambda time: time > before + 0.5)  # and the old one goes on
     assert "law changed" in browser.value(log)

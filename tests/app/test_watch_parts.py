@@ -171,6 +171,30 @@ class TestKnobs:
         assert {"Q", "S", "penalty_k", "solver.singular_below"} <= keys
         assert not keys & {"gain", "limits.joint_margin", "solver.S", "flow_smoothing_s"}
 
+    def test_numbers_of_what_is_switched_off_are_no_knobs(self) -> None:
+        def keys(**law: Any) -> set[str]:
+            cell = load_cell("puma560").replace(law=law)
+            return {knob["key"] for knob in knobs(cell.law)}
+
+        of_avoidance = {"penalty", "measure", "penalty_k", "avoidance_speed_max_m_s"}
+        assert keys() >= of_avoidance
+        assert not keys(S=0.0) & of_avoidance
+        assert "S" in keys(S=0.0)
+        assert not keys(avoidance_axes=()) & {"S", *of_avoidance}
+        program = {"kind": "quadratic_program", "S": 0.0}
+        assert "solver.avoidance_rate_max" not in keys(solver=program)
+        assert "solver.avoidance_rate_max" in keys(solver=program | {"S": 1.0})
+
+    @pytest.mark.parametrize("name", built_in_cells())
+    def test_every_knob_says_what_it_means(self, name: str) -> None:
+        for law in load_cell(name).laws.values() or [load_cell(name).law]:
+            assert all(knob["meaning"] for knob in knobs(law))
+
+    def test_a_weight_has_a_unit(self) -> None:
+        cell = load_cell("puma560").replace(law={"solver": "quadratic_program"})
+        units = {knob["key"]: knob["unit"] for knob in knobs(cell.law)}
+        assert all(units[key] for key in ("Q", "R", "S", "solver.S"))
+
     @pytest.mark.parametrize("name", [n for n in built_in_cells() if n not in ("ur5", "panda")])
     def test_every_choice_is_a_law_that_the_cell_file_takes(self, name: str) -> None:
         cell = load_cell(name)

@@ -44,7 +44,7 @@ class ServoSettings:
     feed_forward: bool | None = knob(None)
     prediction: bool = knob(True)  # predict features from their exposure to the present
     # Smoothing time of the target's estimated motion in the image.
-    flow_smoothing_s: float = knob(0.2, "s", least=0, upto=10)
+    flow_smoothing_s: float = knob(0.2, "s", least=0, upto=10, needs="feed_forward")
 
     def __post_init__(self) -> None:
         if not self.objectives:

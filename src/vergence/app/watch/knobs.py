@@ -1,12 +1,14 @@
 """The laws that may be chosen while a cell runs, and the numbers of each that may be changed."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
+from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 from vergence.cell import Cell
 from vergence.control import PositionBased, QuadraticProgram, ServoSettings
 from vergence.errors import InputError
+from vergence.field_comments import field_comments
 from vergence.parts import is_part, kind_of, written
 from vergence.registry import kinds
 
@@ -41,8 +43,8 @@ def law_choices(cell: Cell) -> dict[str, str]:
 def knobs(law: Any) -> list[dict[str, Any]]:
     """Return what may be changed on a law: keys, labels, units, values and ranges.
 
-    Only what acts is there: limits only with a solver that keeps them, the flow's smoothing only
-    where the target's motion is fed forward.
+    Only what acts is there: limits only with a solver that keeps them, numbers of what is switched
+    off not at all.
     """
     if not isinstance(law, ServoSettings):
         return list(_of_part("", law))
@@ -54,19 +56,18 @@ def knobs(law: Any) -> list[dict[str, Any]]:
         found += list(_of_part("limits.", law.limits))
     acting = _ALWAYS if isinstance(law.objective, PositionBased) else _ON_FEATURES
     for knob in _of_part("", law):
-        if knob["key"] not in acting:
-            continue
-        if knob["key"] == "flow_smoothing_s" and law.feed_forward is False:
-            continue
-        found.append(knob)
+        if knob["key"] in acting:
+            found.append(knob)
     return found
 
 
 def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
     """Yield the knobs of a part's fields."""
+    cls: Hashable = type(part)
+    meanings = _meanings(cls)
     for name, about in type(part).__pydantic_fields__.items():
         extra = about.json_schema_extra or {}
-        if not extra.get("live", False):
+        if not extra.get("live", False) or not _acts(part, name):
             continue
         value = getattr(part, name)
         if is_part(value):  # such as an adaptive gain, by its own numbers
@@ -76,6 +77,7 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
             "key": begin + name,
             "label": _label(begin + name, extra.get("unit", "")),
             "unit": extra.get("unit", ""),
+            "meaning": meanings.get(name, ""),
             "value": value,
         }
         if isinstance(value, bool):
@@ -87,6 +89,22 @@ def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
         else:
             continue
         yield knob
+
+
+def _acts(part: Any, name: str) -> bool:
+    """Whether a field has an effect: what it needs is not zero, empty or false, and acts itself."""
+    needed = type(part).__pydantic_fields__[name].json_schema_extra.get("needs", "")
+    if not needed:
+        return True
+    value = getattr(part, needed)
+    return (value is None or bool(value)) and _acts(part, needed)  # None: chosen automatically
+
+
+@cache
+def _meanings(cls: Hashable) -> dict[str, str]:
+    """Return what the fields of a part mean, by name."""
+    assert isinstance(cls, type)
+    return field_comments(cls)
 
 
 def _label(key: str, unit: str) -> str:

@@ -43,6 +43,7 @@ class LawEditor:
 
     def __init__(self, source: str, settings: Mapping[str, str], seed: int | None) -> None:
         self._own_task = load_cell(source, settings, seed)
+        self._refused = frozenset[str]()
         self._start_from(self._own_task)
 
     @property
@@ -56,6 +57,23 @@ class LawEditor:
         if self._at not in self._edited:
             choices = law_choices(self.stage)
             self._edited[self._at] = _Edited(choices, next(iter(choices)), _values(self.stage))
+
+    def offer(self, context: LawContext) -> None:
+        """Offer of the switches those that the law of the task takes either way.
+
+        Args:
+            context: of the task.
+        """
+        found = set()
+        for knob in self._knobs if self._goes_by_law else ():
+            if knob["kind"] != "switch":
+                continue
+            try:
+                other = {f"{self._at}.{knob['key']}": json.dumps(not knob["value"])}
+                self._law_of(_with(self.cell, other), context)
+            except InputError:
+                found.add(knob["key"])
+        self._refused = frozenset(found)
 
     def law_after(self, cell: Cell, context: LawContext) -> Law | None:
         """Return the law of the task as it is now; None if it is as another cell has it.
@@ -107,7 +125,7 @@ class LawEditor:
                 it was.
         """
         self._require_law("key", key)
-        keys = [knob["key"] for knob in knobs(self.stage.law)]
+        keys = [knob["key"] for knob in self._knobs]
         if key not in keys:
             raise InputError("message", "key", key, nearest(key, keys))
         own, at = self._edited[self._at].own, f"{self._at}.{key}"
@@ -118,19 +136,28 @@ class LawEditor:
 
     def as_json(self) -> dict[str, Any]:
         """Return what the page shows."""
-        settings = [f"{key}={value}" for key, value in self._changed.items()]
         if not self._goes_by_law:
-            return {"choices": [], "choice": "", "knobs": [], "settings": settings}
+            return {"choices": [], "choice": "", "knobs": [], "settings": self.settings}
         edited = self._edited[self._at]
         return {
             "choices": list(edited.choices),
             "choice": edited.choice,
             "knobs": [
                 {**knob, "own": edited.own.get(knob["key"], knob["value"])}
-                for knob in knobs(self.stage.law)
+                for knob in self._knobs
+                if knob["key"] not in self._refused
             ],
-            "settings": settings,
+            "settings": self.settings,
         }
+
+    @property
+    def settings(self) -> list[str]:
+        """What was changed, as options for `--set`."""
+        return [f"{key}={value}" for key, value in self._changed.items()]
+
+    @property
+    def _knobs(self) -> list[dict[str, Any]]:
+        return knobs(self.stage.law)
 
     @property
     def _at(self) -> str:
@@ -158,13 +185,21 @@ class LawEditor:
         self.begin_task(0)
 
     def _change(self, changed: dict[str, str], context: LawContext) -> Law:
-        cell = self._base
-        for key, text in changed.items():
-            names, value = setting(key, text)
-            cell = cell.replace(**reduce(lambda table, name: {name: table}, reversed(names), value))
-        law = build_law(replace(context, cell=_as_assembled(cell.stages[self._number])))
+        cell = _with(self._base, changed)
+        law = self._law_of(cell, context)
         self.cell, self._changed = cell, changed
         return law
+
+    def _law_of(self, cell: Cell, context: LawContext) -> Law:
+        return build_law(replace(context, cell=_as_assembled(cell.stages[self._number])))
+
+
+def _with(cell: Cell, changed: Mapping[str, str]) -> Cell:
+    """Return a cell with settings."""
+    for key, text in changed.items():
+        names, value = setting(key, text)
+        cell = cell.replace(**reduce(lambda table, name: {name: table}, reversed(names), value))
+    return cell
 
 
 def _as_assembled(stage: Cell) -> Cell:

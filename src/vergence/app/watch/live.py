@@ -1,6 +1,7 @@
 """A running cell that can be watched, paused and changed, and whose target can be moved."""
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -153,9 +154,11 @@ class Live:
         if self._loop is loop:  # another task of the same run
             self._task += 1
             self._editor.begin_task(self._task)
+            self._editor.offer(parts.context)
             self._is_new = True
             return
         self._loop = loop
+        self._editor.offer(parts.context)
         self.view_state.status(preparing=False)
         self._driver.between = self._between
         self._begun = self._driver.time
@@ -245,9 +248,9 @@ class Live:
             case Look():
                 self.scene.look(command)
             case ChooseLaw(name=name):
-                self._replace_law(self._editor.choose(name, self._law_context))
+                self._change_law(lambda context: self._editor.choose(name, context))
             case TurnKnob(key=key, value=value):
-                self._replace_law(self._editor.turn(key, value, self._law_context))
+                self._change_law(lambda context: self._editor.turn(key, value, context))
             case _ if self._driver.world.target_is_free():
                 self._move_target(command)
 
@@ -306,13 +309,20 @@ class Live:
         stage = self._editor.stage
         return self._context or LawContext.of(stage, StartedDriver(self._driver, stage.watched))
 
+    def _change_law(self, change: Callable[[LawContext], Law]) -> None:
+        """Go by another law from now on, if it is another one."""
+        before, context = self._editor.settings, self._law_context
+        law = change(context)
+        if self._editor.settings != before:
+            self._editor.offer(context)
+            self._replace_law(law)
+
     def _replace_law(self, law: Law) -> None:
         # Between two tasks the arm comes to rest by a law of its own.
         if self._loop is not None and self._loop.law is self._law:
             self._loop.replace_law(law)
             self._law = law
-        changes = self._editor.as_json()["settings"]
-        self._say("law changed", ", ".join(changes) or "reset to the cell's settings")
+        self._say("law changed", ", ".join(self._editor.settings) or "reset to the cell's settings")
 
     def _take_changes(self) -> None:
         """Apply changes of a law since the start of the run to a task that has just begun."""
@@ -336,6 +346,7 @@ class Live:
                     self._say("target moved", done)
             case LetGo():
                 self._driver.target.held = False
+                self._say("target let go", "it moves by itself again")
 
     def _say(self, name: str, text: str) -> None:
         time = self._time

@@ -60,17 +60,18 @@ class OptimalTracking:
     Q: float = knob(2e-6, "1/px²", above=0, upto=1)
     # Weight of the motion, one number for all axes or one for each.
     R: Annotated[float, Field(gt=0, le=1e9)] | tuple[Annotated[float, Field(gt=0, le=1e9)], ...] = (
-        knob(10.0)
+        knob(10.0, "1/m², 1/rad²")
     )
     # Weight of 1/w', where w' is the penalised manipulability.
-    S: float = knob(0.0, least=0, upto=1e3)
+    S: float = knob(0.0, "cost × w'", least=0, upto=1e3, needs="avoidance_axes")
     # Penalty for joint limits: eq. (27), or per joint.
-    penalty: Literal["product", "per_joint"] = knob("product")
+    penalty: Literal["product", "per_joint"] = knob("product", needs="S")
     # Measure of manipulability: eq. (26), or eq. (24), with |det J| in place of its square.
-    measure: Literal["squared", "absolute"] = knob("squared")
-    penalty_k: float = knob(1e5, above=0, upto=1e9)  # k of the penalty in eq. (27)
+    measure: Literal["squared", "absolute"] = knob("squared", needs="S")
+    # Steepness k of the penalty in eq. (27).
+    penalty_k: float = knob(1e5, above=0, upto=1e9, needs="S")
     # Highest camera speed for avoidance.
-    avoidance_speed_max_m_s: float = knob(0.5, "m/s", above=0, upto=10)
+    avoidance_speed_max_m_s: float = knob(0.5, "m/s", above=0, upto=10, needs="S")
 
     def __post_init__(self) -> None:
         if stray := [axis for axis in self.avoidance_axes if axis not in self.axes]:

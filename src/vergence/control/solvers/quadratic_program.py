@@ -38,9 +38,10 @@ class QuadraticProgram:
     minimise Σ ½ vᵀ H v - gᵀ v + ½ μ ‖q̇ - q̇_null‖² + ½ S / w'(q + T q̇)  subject to  C q̇ ≥ d.
     """
 
-    S: float = knob(0.0, least=0, upto=1e3)  # weight of 1/w', with the penalty per joint
+    # Weight of 1/w', the inverse of the manipulability with the penalty per joint.
+    S: float = knob(0.0, "cost × w'", least=0, upto=1e3)
     # Highest joint rate caused by S.
-    avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100)
+    avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100, needs="S")
     damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, weight of the joint rates
 
     def bind(self, setting: Setting) -> BoundSolver:

@@ -103,12 +103,14 @@ class View {
     this.hover = false;
     this.canvas.role = "img";
     this.canvas.ariaLabel = `image of ${camera.name}`;
-    if (about.mode !== "live") return;
+    const picks = about.images && camera.name === about.task_camera;
+    if (about.mode !== "live" || !(about.draggable || picks)) return;
     this.steering = new Steering(this.canvas, camera, images.mouse);
     this.canvas.role = "application"; // arrow keys belong to the image
+    if (about.draggable) this.canvas.ariaLabel += ": arrow keys move the target, with Shift nearer or farther, with Alt they turn it";
     this.canvas.addEventListener("keydown", (event) => this.key(event, about.draggable));
     if (about.draggable) this.listen();
-    if (about.images && camera.name === about.task_camera) this.listen_for_points();
+    if (picks) this.listen_for_points();
   }
 
   /**

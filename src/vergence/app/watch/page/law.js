@@ -1,11 +1,15 @@
-// The law: which one, and its numbers; a number has a field, and a slider over three decades.
+// The law: which one, and its numbers; a number has a field, and a slider over up to three decades.
 
 import { element, first } from "./dom.js";
 
 /** @import { Ask, KnobAbout, LawStatus } from "./protocol.js" */
 /** @typedef {(value: unknown) => void} Turn */
+/** @typedef {{ field: HTMLInputElement | HTMLSelectElement, beside?: HTMLElement[], below?: HTMLElement[] }} Made */
 
 const DECADES = 1.5; // to either side of where it was when the law was chosen
+const STEP = 0.05; // decades by which an arrow key turns a number
+/** @type {Record<string, number>} */
+const ARROWS = { ArrowUp: STEP, ArrowDown: -STEP };
 
 export class Law {
   /**
@@ -19,10 +23,12 @@ export class Law {
     this.settings = element("settings");
     this.ask = ask;
     this.text = "";
+    /** @type {LawStatus | undefined} */
+    this.law = undefined;
     /** @type {string | null} */
     this.shown = null;
-    /** @type {Map<string, (value: any) => void>} */
-    this.fields = new Map();
+    /** @type {Map<string, (value: any, always?: boolean) => void>} */
+    this.fields = new Map(); // that show a value: always, or unless somebody is about to change it
     /** @type {Map<string, (value: any) => void>} */
     this.undos = new Map();
     this.choice.addEventListener("change", () => {
@@ -38,6 +44,7 @@ export class Law {
     const text = JSON.stringify(law);
     if (text === this.text) return;
     this.text = text;
+    this.law = law;
     const names = [law.choice, ...law.knobs.map(({ key }) => key)].join();
     if (names !== this.shown) this.build(law);
     this.shown = names;
@@ -46,6 +53,13 @@ export class Law {
       this.undos.get(knob.key)?.(knob.value);
     }
     this.settings.replaceChildren(...command(law.settings));
+  }
+
+  /** Shows the law as it is, where what was asked for was not done: refused, or asked while not connected. */
+  restore() {
+    if (!this.law) return;
+    this.choice.value = this.law.choice;
+    for (const { key, value } of this.law.knobs) this.fields.get(key)?.(value, true);
   }
 
   /** @param {LawStatus} law */
@@ -58,17 +72,19 @@ export class Law {
 
   /** @param {KnobAbout} knob */
   knob(knob) {
-    const row = document.createElement("label");
+    const row = document.createElement("div");
     row.className = `knob ${knob.kind}`;
     row.dataset.key = knob.key;
-    const name = document.createElement("span");
+    row.title = knob.meaning;
+    const name = document.createElement("label");
     name.textContent = knob.label;
     /** @type {Turn} */
     const turn = (value) => this.ask({ do: "knob", key: knob.key, value });
     const make = { number: this.number, choice: this.choices, switch: this.flag }[knob.kind];
-    const [field, ...rest] = make.call(this, knob, turn);
-    const slider = rest.at(-1)?.matches("[type=range]") ? rest.splice(-1) : [];
-    row.append(name, field, ...rest, this.undo(knob, turn), ...slider);
+    const { field, beside = [], below = [] } = make.call(this, knob, turn);
+    field.id = name.htmlFor = `knob ${knob.key}`.replace(" ", "-");
+    field.ariaDescription = [knob.meaning, knob.kind === "number" ? range(knob) : ""].filter(Boolean).join("; ");
+    row.append(name, field, ...beside, this.undo(knob, turn), ...below);
     return row;
   }
 
@@ -84,48 +100,62 @@ export class Law {
     button.textContent = "↺";
     button.title = `back to ${typeof knob.own === "number" ? short(knob.own) : knob.own}`;
     button.ariaLabel = `${knob.label}: ${button.title}`;
-    button.addEventListener("click", (event) => { event.preventDefault(); turn(knob.own); });
+    button.addEventListener("click", () => turn(knob.own));
     this.undos.set(knob.key, (value) => { button.style.visibility = value === knob.own ? "hidden" : "visible"; });
     return button;
   }
 
   /**
+   * A field and a slider; the arrow keys turn the field as they turn the slider, by a share.
    * @param {KnobAbout} knob
    * @param {Turn} turn
-   * @returns {HTMLElement[]}
+   * @returns {Made}
    */
   number(knob, turn) {
     const field = document.createElement("input");
     field.type = "number";
     field.step = "any";
-    field.title = range(knob);
-    const unit = document.createElement("span");
-    unit.className = "soft";
-    unit.textContent = knob.unit;
-    field.addEventListener("change", () => field.value !== "" && turn(Number(field.value)));
+    [field.min, field.max] = [knob.low, knob.high].map((end) => String(end ?? ""));
+    const unit = text("soft", knob.unit), ends = text("range", range(knob));
+    ends.ariaHidden = "true"; // it is in the field's description
+    field.addEventListener("change", () => (field.value === "" ? this.restore() : turn(Number(field.value))));
+    field.addEventListener("keydown", (event) => {
+      if (!(event.key in ARROWS)) return;
+      event.preventDefault();
+      const next = rounded(Number(field.value) * 10 ** ARROWS[event.key]);
+      field.value = short(Math.min(next, knob.high ?? next));
+      turn(Number(field.value));
+    });
+    /** @type {number} */
+    const middle = knob.value;
+    if (!(middle > 0)) {
+      this.fields.set(knob.key, (value, always) => { if (always || !focused(field)) field.value = short(value); });
+      return { field, beside: [unit], below: [ends] };
+    }
     const slider = document.createElement("input");
     slider.type = "range";
     slider.min = String(-DECADES);
-    slider.max = String(DECADES);
+    slider.max = String(Math.min(DECADES, Math.log10((knob.high ?? Infinity) / middle)));
     slider.step = "0.01";
     slider.ariaLabel = knob.label;
-    /** @type {number} */
-    const middle = knob.value;
-    slider.disabled = middle <= 0;
-    const chosen = () => Number((middle * 10 ** Number(slider.value)).toPrecision(3));
-    slider.addEventListener("input", () => { field.value = short(chosen()); });
+    const chosen = () => rounded(Math.min(middle * 10 ** Number(slider.value), knob.high ?? Infinity));
+    /** @param {number} value */
+    const say = (value) => { slider.ariaValueText = `${short(value)} ${knob.unit}`.trim(); };
+    slider.addEventListener("input", () => { field.value = short(chosen()); say(chosen()); });
     slider.addEventListener("change", () => turn(chosen()));
-    this.fields.set(knob.key, (value) => {
-      if (document.activeElement !== field) field.value = short(value);
-      if (middle > 0 && document.activeElement !== slider) slider.value = String(Math.log10(Math.max(value, 1e-300) / middle));
+    this.fields.set(knob.key, (value, always) => {
+      if (always || !focused(field)) field.value = short(value);
+      if (!always && focused(slider)) return;
+      slider.value = String(Math.log10(Math.max(value, 1e-300) / middle));
+      say(value);
     });
-    return middle > 0 ? [field, unit, slider] : [field, unit];
+    return { field, beside: [unit], below: [slider, ends] };
   }
 
   /**
    * @param {KnobAbout} knob
    * @param {Turn} turn
-   * @returns {HTMLElement[]}
+   * @returns {Made}
    */
   choices(knob, turn) {
     const field = document.createElement("select");
@@ -133,20 +163,20 @@ export class Law {
     field.append(...(knob.choices ?? []).map((name) => new Option(name.replaceAll("_", " "), name)));
     field.addEventListener("change", () => turn(field.value));
     this.fields.set(knob.key, (value) => { field.value = value; });
-    return [field];
+    return { field };
   }
 
   /**
    * @param {KnobAbout} knob
    * @param {Turn} turn
-   * @returns {HTMLElement[]}
+   * @returns {Made}
    */
   flag(knob, turn) {
     const field = document.createElement("input");
     field.type = "checkbox";
     field.addEventListener("change", () => turn(field.checked));
     this.fields.set(knob.key, (value) => { field.checked = value; });
-    return [field];
+    return { field };
   }
 }
 
@@ -166,14 +196,37 @@ function command(settings) {
  * @param {KnobAbout} knob
  */
 function range({ low, high, unit }) {
-  const ends = [low !== undefined ? `from ${short(low)}` : "", high !== undefined ? `up to ${short(high)}` : ""];
+  const ends = low !== undefined && high !== undefined
+    ? [`${short(low)} to ${short(high)}`]
+    : [low !== undefined ? `from ${short(low)}` : "", high !== undefined ? `up to ${short(high)}` : ""];
   return [...ends, unit].filter(Boolean).join(" ");
 }
+
+/**
+ * @param {string} kind
+ * @param {string} words
+ */
+function text(kind, words) {
+  const span = document.createElement("span");
+  span.className = kind;
+  span.textContent = words;
+  return span;
+}
+
+/** @param {HTMLElement} field */
+function focused(field) { return document.activeElement === field; }
+
+/**
+ * A number with three digits.
+ * @param {number} value
+ */
+function rounded(value) { return Number(value.toPrecision(3)); }
 
 /**
  * A number as briefly as it can be written.
  * @param {number} value
  */
 function short(value) {
-  return value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential() : String(value);
+  const size = Math.abs(value);
+  return size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential().replace("e+", "e") : String(value);
 }

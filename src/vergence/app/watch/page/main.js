@@ -26,9 +26,16 @@ const law = new Law(element("law"), ask);
 const log = new Log(element("log"));
 const connection = new Connection(
   hear,
-  (reason) => log.refused(reason),
-  (open) => { for (const part of [transport, scene]) part.connected(open); },
+  (reason) => { log.refused(reason); law.restore(); },
+  connected,
 );
+
+/** @param {boolean} open */
+function connected(open) {
+  for (const part of [transport, scene]) part.connected(open);
+  for (const part of [element("transport"), element("slider"), element("parts")]) part.inert = !open;
+  if (open) law.restore();
+}
 
 /**
  * @param {News} news

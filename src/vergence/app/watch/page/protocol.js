@@ -33,6 +33,7 @@
  * @property {string} key
  * @property {string} label
  * @property {string} unit
+ * @property {string} meaning
  * @property {"number" | "choice" | "switch"} kind
  * @property {any} value
  * @property {any} own  what the law has by itself

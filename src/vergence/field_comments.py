@@ -11,9 +11,12 @@ def field_comments(cls: type) -> dict[str, str]:
     """Return the comments beside or above the annotated fields of a class itself, by field.
 
     A comment of several lines is joined. One above a field is a sentence in the code, and comes out
-    as the phrase that the others are.
+    as the phrase that the others are. Nothing is known of a class whose code is nowhere to be read.
     """
-    source = textwrap.dedent(inspect.getsource(cls))
+    try:
+        source = textwrap.dedent(inspect.getsource(cls))
+    except (OSError, TypeError):
+        return {}
     comments = {
         token.start[0]: token.string.lstrip("#").strip()
         for token in tokenize.generate_tokens(io.StringIO(source).readline)
