@@ -63,6 +63,12 @@ def test_a_switch_that_the_law_does_not_take_is_not_offered() -> None:
     editor.offer(context)
     assert {"prediction", "S"} <= {knob["key"] for knob in editor.as_json()["knobs"]}
     assert "feed_forward" not in {knob["key"] for knob in editor.as_json()["knobs"]}
+    editor.choose("image_based", context)  # feeds no motion forward, since the depth is held
+    editor.offer(context)
+    keys = {knob["key"] for knob in editor.as_json()["knobs"]}
+    assert "gain" in keys
+    assert "flow_smoothing_s" not in keys
+    editor.choose("optimal_tracking (as in the cell)", context)
     with pytest.raises(InputError, match="a wrong depth looks like motion"):
         editor.turn("feed_forward", True, context)
     driver.close()

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, frozen
 from vergence.control._tracking_tick import TrackingTickLaw
 from vergence.control.compile_law import CompiledLaw, compile_law
+from vergence.control.image_motion import MotionSettings
 from vergence.control.limits import CollisionLimit, Limits, pack_features
 from vergence.control.objectives import (
     CameraState,
@@ -134,6 +135,11 @@ class Servo:
         return compile_law(
             self._arm, self._main, objective, self._solver, self._kernel, desired_px, covariance_px
         )
+
+    @property
+    def motion(self) -> MotionSettings:
+        """Assumptions about the features between their exposure and now."""
+        return self._situation.motion
 
     @property
     def collision_limit(self) -> CollisionLimit | None:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Hashable, Iterator
 from functools import cache
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, cast, get_args, get_origin
 
 from vergence.cell import Cell
 from vergence.control import PositionBased, QuadraticProgram, ServoSettings
@@ -15,6 +15,7 @@ from vergence.registry import kinds
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
 # others, which act on features in the image.
 _ALWAYS = ("feed_forward", "prediction")
+_ALONE_IDLE = ("camera_velocity", "posture")  # objectives that do nothing by themselves
 _UNITS = ("_m_s", "_rad_s", "_deg_s", "_hz", "_deg", "_px", "_m", "_s")  # endings of keys
 _ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m")
 
@@ -63,8 +64,7 @@ def knobs(law: Any) -> list[dict[str, Any]]:
 
 def _of_part(begin: str, part: Any) -> Iterator[dict[str, Any]]:
     """Yield the knobs of a part's fields."""
-    cls: Hashable = type(part)
-    meanings = _meanings(cls)
+    meanings = _meanings(cast(Hashable, type(part)))
     for name, about in type(part).__pydantic_fields__.items():
         extra = about.json_schema_extra or {}
         if not extra.get("live", False) or not _acts(part, name):
@@ -127,7 +127,7 @@ def _range(about: Any) -> dict[str, float]:
 
 def _suits(cell: Cell, kind: str) -> bool:
     """Whether a cell takes an objective with the numbers it has by itself."""
-    if (kind == "position_based") != (cell.task.kind == "follow") or kind == "posture":
+    if (kind == "position_based") != (cell.task.kind == "follow") or kind in _ALONE_IDLE:
         return False
     try:
         cell.replace(law={"kind": kind})

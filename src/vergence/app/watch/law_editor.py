@@ -11,7 +11,7 @@ from vergence.assembly import LawContext, build_law, with_points
 from vergence.assembly.tasks.photograph import is_by_photograph, without_target_motion
 from vergence.cell import Cell, load_cell
 from vergence.cell.toml_text import setting
-from vergence.control import Law
+from vergence.control import Law, Servo
 from vergence.errors import InputError, nearest
 
 _BY_LAW = ("track", "reach", "follow")  # kinds of task that go by the law of the cell file
@@ -43,7 +43,7 @@ class LawEditor:
 
     def __init__(self, source: str, settings: Mapping[str, str], seed: int | None) -> None:
         self._own_task = load_cell(source, settings, seed)
-        self._refused = frozenset[str]()
+        self._withheld = frozenset[str]()
         self._start_from(self._own_task)
 
     @property
@@ -59,12 +59,16 @@ class LawEditor:
             self._edited[self._at] = _Edited(choices, next(iter(choices)), _values(self.stage))
 
     def offer(self, context: LawContext) -> None:
-        """Offer of the switches those that the law of the task takes either way.
+        """Offer what acts on the law of the task: no switch that it refuses, no idle number.
 
         Args:
             context: of the task.
         """
         found = set()
+        if self._goes_by_law:
+            law = self._law_of(self.cell, context)
+            if isinstance(law, Servo) and not law.motion.feeds_forward:
+                found.add("flow_smoothing_s")
         for knob in self._knobs if self._goes_by_law else ():
             if knob["kind"] != "switch":
                 continue
@@ -73,7 +77,7 @@ class LawEditor:
                 self._law_of(_with(self.cell, other), context)
             except InputError:
                 found.add(knob["key"])
-        self._refused = frozenset(found)
+        self._withheld = frozenset(found)
 
     def law_after(self, cell: Cell, context: LawContext) -> Law | None:
         """Return the law of the task as it is now; None if it is as another cell has it.
@@ -145,7 +149,7 @@ class LawEditor:
             "knobs": [
                 {**knob, "own": edited.own.get(knob["key"], knob["value"])}
                 for knob in self._knobs
-                if knob["key"] not in self._refused
+                if knob["key"] not in self._withheld
             ],
             "settings": self.settings,
         }
