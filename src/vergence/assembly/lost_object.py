@@ -7,6 +7,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.estimation import Measure
+from vergence.estimation.known_object.half_hidden import enough_seen
 from vergence.estimation.known_object.object_rivals import choose_pose
 from vergence.estimation.known_object.object_search import ObjectSearch, SearchPace
 from vergence.geometry import angle_between, transform_points
@@ -23,8 +24,8 @@ _STALE_RAD = 0.1  # turn of the camera after which it begins again
 class ObjectFinder:
     """Finds a lost target in whole images; a `Find` of perception.
 
-    The cameras take turns, one round of the search each. A pose that other poses explain equally
-    well is not an answer.
+    The cameras take turns, one round of the search each. A pose is an answer if its edges are found
+    more precisely than chance explains, and if no other pose explains them as well.
 
     Args:
         model: the target's geometry.
@@ -64,9 +65,10 @@ class ObjectFinder:
         if fits is None:
             return None
         self._names.append(self._names.pop(0))
-        if fits[0].share < _LEAST_SHARE:
+        enough = enough_seen(fits, None, _LEAST_SHARE)
+        if isinstance(enough, str):
             return None
-        chosen = choose_pose(fits, T_camera_target, self._turns, search.free_axes)
+        chosen = choose_pose(enough, T_camera_target, self._turns, search.free_axes)
         return (
             None
             if chosen is None or chosen.rivals

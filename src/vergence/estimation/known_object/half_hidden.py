@@ -18,7 +18,7 @@ _DECIDED = float(np.log(1e3))  # over every other pose
 _PREDICTED = 22.5  # χ² with six degrees of freedom: 999 of 1000
 
 
-def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit] | str:
+def enough_seen(fits: Sequence[Fit], near: Near | None, least_share: float) -> list[Fit] | str:
     """Return the poses that explain what is seen of a lost object, or why there is none.
 
     What is seen must be too much for chance. Of an object that is partly hidden, the part that is
@@ -27,7 +27,7 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
 
     Args:
         fits: poses fitted to the edges of an image, at least one.
-        near: where the object is predicted.
+        near: where the object is predicted; without it, one that is partly hidden is not found.
         least_share: fraction of the visible part that must be found.
 
     Returns:
@@ -48,6 +48,8 @@ def enough_seen(fits: Sequence[Fit], near: Near, least_share: float) -> list[Fit
     alike = [fits[k] for k in order if nats[k] > nats[best] - _DECIDED]
     if whole:
         return alike
+    if near is None:
+        return ""
     if not all(is_near(fit.T_camera_target, T) for fit in alike):
         return "several poses explain what is seen of the object"
     if pose_distance(T, near.T_camera_target, near.covariance) > _PREDICTED:
