@@ -1,6 +1,9 @@
 """`vergence watch` in a real browser: the page shows a cell that runs, and steers it."""
 
+import os
 import re
+import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -151,6 +154,22 @@ def test_the_view_in_space_is_hidden_while_it_is_not_connected(browser: Browser)
     browser.reload()
     browser.wait("typeof seen === 'undefined' && typeof watch === 'object'")
     browser.wait(ROWS, lambda rows: rows > 5)
+
+
+def test_the_badge_and_the_view_in_space_agree_that_nothing_comes(
+    browser: Browser, watched: Watched
+) -> None:
+    browser.wait(SHOWN)
+    os.kill(watched.pid, signal.SIGSTOP)
+    try:
+        browser.wait("document.getElementById('badge').textContent", lambda t: t == "no answer")
+        browser.wait(f"!({SHOWN})")
+        time.sleep(2.0)  # the viewer draws its notice
+        assert not browser.value(SHOWN)
+    finally:
+        os.kill(watched.pid, signal.SIGCONT)
+    browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+    browser.wait(SHOWN)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -22,7 +22,12 @@ class Watched:
             env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
         )
         assert self._process.stderr is not None
-        self.said = self._process.stderr.readline() + self._process.stderr.readline()
+        self.said = ""
+        for line in self._process.stderr:  # progress on a busy computer, then what it says
+            self.said += line
+            if "http://" in line:
+                self.said += self._process.stderr.readline()
+                break
         found = re.search(r"http://\S+", self.said)
         assert found, self.said + self._process.communicate(timeout=60)[1]
         self.address = found[0]

@@ -15,6 +15,7 @@ export class Connection {
     this.refused = refused;
     this.status = status;
     this.tries = 0;
+    this.heard_ms = 0; // when something came last
     this.socket = this.open();
   }
 
@@ -24,6 +25,7 @@ export class Connection {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { this.tries = 0; this.status(true); };
     socket.onmessage = ({ data }) => {
+      this.heard_ms = performance.now();
       if (typeof data === "string") return this.refused(JSON.parse(data).refused);
       this.hear(...unpack(data));
       setTimeout(() => this.ask({ do: "more" })); // after what the mouse and the screen wait for

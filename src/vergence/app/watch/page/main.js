@@ -30,6 +30,10 @@ const connection = new Connection(
   connected,
 );
 
+setInterval(() => {
+  if (connection.socket.readyState === WebSocket.OPEN) transport.waits(performance.now() - connection.heard_ms);
+}, 1000);
+
 /** @param {boolean} open */
 function connected(open) {
   for (const part of [transport, scene]) part.connected(open);

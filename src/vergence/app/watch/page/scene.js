@@ -8,11 +8,13 @@ import { inside } from "./polygon.js";
 /** @import { About, Ask, Place, Status } from "./protocol.js" */
 
 const VIEWER = "/index.html";
-const LINES = ["/state", "/ui"]; // its connections
+const STATE = "/state"; // over which the states come
+const LINES = [STATE, "/ui"]; // its connections
 const AGAIN_MS = 1000;
 const TIMEOUT_MS = 20_000; // for the second after the first: it may wait for the old one to be given up
 const LONGEST_TIMEOUT_MS = 160_000; // doubled up to this, where a slow computer needs longer
 const FRAMES = 3; // drawn after its connections are open, until it shows what has come over them
+const SILENT_MS = 2500; // without a state: half a second later the viewer says that it is disconnected
 const BAR = 32; // px of the viewer's own bar, which is left outside
 const TURN_DEG = 5; // of a press of an arrow
 const ZOOM = 1.1;
@@ -43,6 +45,8 @@ export class Scene {
     this.open = false; // the page's own connection
     /** @type {Set<string>} */
     this.lines = new Set(); // the viewer's connections over which something has come
+    this.heard_ms = 0; // when the last state came
+    this.silent = false; // or was so a few frames ago
     this.waiting = 0; // a timer
     this.timeout = TIMEOUT_MS;
     this.over = document.createElement("canvas");
@@ -86,7 +90,7 @@ export class Scene {
   get lost() { return !this.open || !LINES.every((path) => this.lines.has(path)); }
 
   /** Shows the viewer only while it is connected: it would say that it is not, over whatever it showed last. */
-  show() { this.stage.classList.toggle("lost", this.frame !== null && this.lost); }
+  show() { this.stage.classList.toggle("lost", this.frame !== null && (this.lost || this.silent)); }
 
   /** Loads the viewer, again if it has lost its connection. */
   load() {
@@ -105,6 +109,7 @@ export class Scene {
     const page = frame.contentDocument && frame.contentWindow; // null for the browser's page of an error
     if (page?.location.pathname !== VIEWER) return this.wait(AGAIN_MS);
     this.follow(page);
+    this.look(page, this.lines);
     this.listen(page);
     this.wait(LONGEST_TIMEOUT_MS);
   }
@@ -123,9 +128,24 @@ export class Scene {
         super(address);
         const path = new URL(address, location.href).pathname;
         this.addEventListener("message", () => scene.heard(page, open.add(path)), { once: true });
+        if (path === STATE) this.addEventListener("message", () => { scene.heard_ms = performance.now(); });
         this.addEventListener("close", () => { open.delete(path); scene.heard(page, open, AGAIN_MS); });
       }
     } });
+  }
+
+  /**
+   * Looks in every frame of a viewer, before it is seen, whether states come.
+   * @param {Window} page
+   * @param {Set<string>} open  its connections
+   * @param {number} unsure  frames to be drawn before it is believed to show what has come
+   */
+  look(page, open, unsure = 0) {
+    if (open !== this.lines) return;
+    const quiet = performance.now() - this.heard_ms > SILENT_MS;
+    const silent = quiet || unsure > 0;
+    if (silent !== this.silent) { this.silent = silent; this.show(); }
+    page.requestAnimationFrame(() => this.look(page, open, quiet ? FRAMES : unsure - 1));
   }
 
   /**

@@ -4,6 +4,8 @@ import { element } from "./dom.js";
 
 /** @import { About, Ask, Status } from "./protocol.js" */
 
+const SILENT_MS = 2500; // without news of a run
+
 export class Transport {
   /** @param {Ask} ask */
   constructor(ask) {
@@ -20,7 +22,7 @@ export class Transport {
     this.slider = element("slider");
     this.seek = /** @type {HTMLInputElement} */ (element("seek"));
     this.cell = element("cell");
-    this.paused = this.recording = this.robot = this.sliding = false;
+    this.paused = this.recording = this.robot = this.sliding = this.runs = false;
     this.stop.addEventListener("click", () => ask({ do: "stop" }));
     this.pause.addEventListener("click", () => this.toggle());
     this.step.addEventListener("click", () => ask({ do: "step" }));
@@ -57,9 +59,15 @@ export class Transport {
     if (!open) this.mark("not connected", "plain", "vergence does not answer");
   }
 
+  /** @param {number} waited_ms  since something came from vergence */
+  waits(waited_ms) {
+    if (waited_ms > SILENT_MS && this.runs) this.mark("no answer", "plain", `nothing has come from vergence for ${(waited_ms / 1000).toFixed(0)} s`);
+  }
+
   /** @param {Status} status */
   status({ time, paused, speed, measured, outcome, preparing }) {
     this.paused = paused ?? false;
+    this.runs = !paused && !outcome && !preparing && !this.recording;
     this.time.textContent = time === undefined ? "" : `${time.toFixed(2)} s`;
     this.pause.textContent = paused ? "Resume" : "Pause";
     if (document.activeElement !== this.speed) this.speed.value = String(speed);
