@@ -170,6 +170,8 @@ def test_a_region_is_mapped_to_an_image_and_a_table(
         (["map", "puma560", "--over", "starts"], "headings, places"),
         (["map", "puma560", "--speeds", "0,1"], "--speeds"),
         (["map", "no_such_cell"], "a built-in cell"),
+        (["compare", "puma560", "--scheduler", "nope"], "vergence: --scheduler: given nope;"),
+        (["map", "puma560", "--scheduler", "tcp://127.0.0.1:1"], "where nothing answers"),
     ],
 )
 def test_a_mistake_is_one_message(
@@ -180,6 +182,13 @@ def test_a_mistake_is_one_message(
     assert said in captured.err
     assert captured.out == ""
     assert captured.err.count("\n") == 1
+
+
+def test_a_scheduler_that_is_none_is_refused_before_anything_is_done(
+    command: Command, tmp_path: Path
+) -> None:
+    assert command("compare", "nope", "--scheduler", "nope", "--out", str(tmp_path / "out")) == 2
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("name", ["compare", "map"])

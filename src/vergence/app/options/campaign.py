@@ -1,6 +1,7 @@
 """The options of `vergence compare` and `vergence map`."""
 
 import math
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -10,10 +11,34 @@ import typer
 from vergence.app import names
 from vergence.app.options.shared import CellName, Json, Settings, folder_to_write
 from vergence.errors import InputError, nearest
+from vergence.optional_package import optional_package
+
+_SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
+_LAST_PORT, _CONNECT_S = 65_535, 10.0
 
 # What a cell can say of a target that moves along a line.
 _NEAREST_M, _FARTHEST_M = 1e-3, 500.0
 _FASTEST_M_S, _LONGEST_S = 1000.0, 86_000.0
+
+
+def scheduler_that_answers(address: str | None) -> str | None:
+    """Return the address that ``--scheduler`` gives, before any work is done.
+
+    Raises:
+        InputError: if it is none, nobody answers there, or Dask is not installed.
+    """
+    if address is None:
+        return None
+    host, _, port = address.rpartition("://")[2].rpartition(":")
+    if not host or not port.isdecimal() or int(port) > _LAST_PORT:
+        raise InputError("--scheduler", "", address, _SCHEDULER)
+    optional_package("a Dask scheduler", "distributed", "cluster", "--scheduler")
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), _CONNECT_S):
+            return address
+    except OSError as error:
+        given = f"{address}, where nothing answers ({error.strerror or error})"
+        raise InputError("--scheduler", "", given, _SCHEDULER) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +64,9 @@ class CampaignOptions:
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="Address of a Dask scheduler whose workers do the runs."
+            metavar="ADDRESS",
+            help="Address of a Dask scheduler whose workers do the runs.",
+            callback=scheduler_that_answers,
         ),
     ] = None
     physics: Annotated[
