@@ -219,6 +219,7 @@ def test_a_bad_row_is_named_with_what_is_allowed(
 def test_bad_input_is_named(words: tuple, said: str, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     assert call(*words, "--out", tmp_path / "o", monkeypatch=monkeypatch) == 2
+    assert not (tmp_path / "o").exists()
     assert said in capsys.readouterr().err
 
 

@@ -4,9 +4,11 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import accessibility
 import made_up_run
 import numpy as np
 import pytest
+from browser import Browser
 
 from vergence.app.figures.pair import arms_chart, errors_chart
 from vergence.app.recorded_images import camera_images
@@ -33,6 +35,20 @@ def test_the_table_has_the_numbers_of_both(runs: dict[str, Recording]) -> None:
         for row in camera_rows(run.cameras["wrist"]):
             assert f'<td class="number">{row.value}</td>' in page
     assert page.count('class="film"') == 2
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_to_complain_of(
+    runs: dict[str, Recording], tmp_path: Path, scheme: str
+) -> None:
+    page = tmp_path / "pair.html"
+    page.write_text(make_pair(runs, dict.fromkeys(runs, "")), encoding="utf-8")
+    browser = Browser(tmp_path / "chromium")
+    browser.open(page.as_uri())
+    browser.wait("document.readyState === 'complete'")
+    found = accessibility.complaints(browser, scheme)
+    browser.close()
+    assert found == []
 
 
 def test_each_signal_is_a_curve_a_run(runs: dict[str, Recording]) -> None:

@@ -40,7 +40,6 @@ def calibrate(options: "CalibrateOptions") -> int:
     if not options.overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
         given = f"{folder}, which holds a calibration"
         raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")
-    folder.mkdir(parents=True, exist_ok=True)
     data, truth = calibration_data(options, folder)
     if truth is not None:
         T_world_base = truth.T_world_base
@@ -49,6 +48,7 @@ def calibrate(options: "CalibrateOptions") -> int:
     if isinstance(found, CalibrationFailure):
         return tell_failure(found, data, options.as_json)
     camera = options.watch or "camera"
+    folder.mkdir(parents=True, exist_ok=True)
     write_results(folder, found.camera, found.mounting, T_world_base, camera)
     with working("drawing"):
         report = write_calibration_page(folder, name, found)

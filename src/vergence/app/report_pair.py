@@ -111,7 +111,7 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
     """Return the rows of all runs as one table, a column a run; what a run lacks is empty."""
     by_name = [{row.name: row for row in own} for own in rows]
     names = dict.fromkeys(name for own in by_name for name in own)
-    heading = "".join(f'<th class="number">{escape(run)}</th>' for run in runs)
+    heading = "".join(f'<th scope="col" class="number">{escape(run)}</th>' for run in runs)
     lines = []
     for name in names:
         cells = [own.get(name, Row(name, "–")) for own in by_name]
@@ -124,7 +124,7 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
     body = "\n".join(lines)
     return (
         f'<h3>{escape(title)}</h3><table class="pair">'
-        f"<thead><tr><th></th>{heading}<th></th></tr></thead>"
+        f"<thead><tr><td></td>{heading}<td></td></tr></thead>"
         f"<tbody>{body}</tbody></table>"
     )
 

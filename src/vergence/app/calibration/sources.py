@@ -45,7 +45,7 @@ def calibration_data(options: "CalibrateOptions", folder: Path) -> "tuple[Datase
         if options.projected:
             return make_data(studio, options.image_count, None, options.noise_px)
         image_folder = folder / "images"
-        image_folder.mkdir(exist_ok=True)
+        image_folder.mkdir(parents=True, exist_ok=True)
         _, truth = make_data(studio, options.image_count, image_folder, options.noise_px)
         return read_dataset(image_folder, None, None), truth
 
@@ -110,7 +110,7 @@ def _require_agreement(cell: "Cell", camera: str, agreed: bool) -> None:
 
 def _empty_folder(folder: Path) -> Path:
     """Make a folder for images, without those of an earlier calibration."""
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.png"):
         old.unlink()
     return folder

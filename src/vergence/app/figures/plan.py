@@ -25,6 +25,7 @@ def plan_image_figure(path: "Path") -> Any:
     """Draw the path of each point through the image."""
     drawn, axes = grid(_WIDTH, 5.2, 1, 1)
     image_paths(axes[0, 0], path.problem.camera, path.points_px)
+    legend(axes[0, 0])
     return drawn
 
 

@@ -67,11 +67,11 @@ def draw_image(
 
 
 def image_paths(axes: "Axes", camera: Camera, points_px: FloatArray) -> None:
-    """Draw the way of each point (K, N, 2) px, hollow where it starts and filled where it ends."""
+    """Draw the path of each point (K, N, 2) px, hollow where it starts and filled at its end."""
     for index in range(points_px.shape[1]):
-        axes.plot(*points_px[:, index].T, **curve(index))
-    axes.plot(*points_px[0].T, "o", markerfacecolor="white", **_MARKED)
-    axes.plot(*points_px[-1].T, "s", **_MARKED)
+        axes.plot(*points_px[:, index].T, label=f"point {index}", **curve(index))
+    axes.plot(*points_px[0].T, "o", markerfacecolor="white", label="start", **_MARKED)
+    axes.plot(*points_px[-1].T, "s", label="goal", **_MARKED)
     _image_frame(axes, camera, points_px)
 
 
