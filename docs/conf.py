@@ -62,7 +62,8 @@ def setup(app: Sphinx) -> None:
     app.connect("html-page-context", _levels, priority=900)  # after the theme's
 
 
-def _levels(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: object) -> None:
+def _levels(*about: Any) -> None:
+    context = about[3]
     navigation = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = navigation.replace(
         'role="heading"', 'role="heading" aria-level="2"'
