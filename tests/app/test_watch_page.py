@@ -292,6 +292,7 @@ def test_the_arm_follows_the_target_that_the_mouse_drags_in_an_image(
 
 def test_the_target_can_be_dragged_in_space_too(browser: Browser) -> None:
     settled(browser)
+    browser.wait(SHOWN)
     browser.middle("#stage")
     joints = browser.value("watch.plots.rows.at(-1)[2]")
     start = tuple(browser.value(TARGET))
