@@ -58,13 +58,16 @@ html_theme_options = {"top_of_page_buttons": []}
 
 
 def setup(app: Sphinx) -> None:
-    """Give the headings of the navigation the level that the theme does not state."""
-    app.connect("html-page-context", _levels, priority=900)  # after the theme's
+    """Make of pages what a keyboard and a screen reader can use."""
+    app.connect("html-page-context", _accessible, priority=900)  # after the theme's
 
 
-def _levels(*about: Any) -> None:
+def _accessible(*about: Any) -> None:
+    """Give headings their level, code that scrolls the focus, and empty headings of tables none."""
     context = about[3]
-    navigation = context.get("furo_navigation_tree", "")
-    context["furo_navigation_tree"] = navigation.replace(
-        'role="heading"', 'role="heading" aria-level="2"'
-    )
+    for part, old, new in (
+        ("furo_navigation_tree", 'role="heading"', 'role="heading" aria-level="2"'),
+        ("body", "<pre>", '<pre tabindex="0">'),
+        ("body", '<th class="head"><p></p></th>', "<td></td>"),
+    ):
+        context[part] = context.get(part, "").replace(old, new)

@@ -199,6 +199,29 @@ def test_a_rate_limit_that_is_none_is_replaced_by_a_guess_that_says_so(
     assert "[0.4, 90, 57.3]  # guesses for shoulder: the model has no limits below 100 " in text
 
 
+@pytest.mark.parametrize(
+    ("model", "body", "joint"),
+    [
+        ("z1_description/urdf/z1.urdf", "gripperMover", "jointGripper"),
+        ("panda_description/urdf/panda.urdf", "panda_leftfinger", "panda_finger_joint1"),
+        ("panda_description/urdf/panda.urdf", "panda_hand_tcp", ""),
+        ("so_arm_description/urdf/so101.urdf", "gripper_frame_link", ""),
+    ],
+)
+def test_a_joint_of_a_gripper_in_the_arm_is_pointed_out(
+    command, capsys, model: str, body: str, joint: str
+) -> None:
+    assert command("new", f"{ROBOTS}/{model}", "--body", body) == 0
+    said = capsys.readouterr().out
+    assert ("seems to move a gripper" in said) == bool(joint)
+    assert f"joint {joint}, the last one" in said or not joint
+
+
+def test_only_an_arm_with_a_prismatic_joint_speaks_of_metres(command, tmp_path: Path) -> None:
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1], "--out", "mine") == 0
+    assert "prismatic" not in (tmp_path / "mine" / "cell.toml").read_text()
+
+
 def test_the_lens_of_a_camera_file_is_the_cameras(command, tmp_path: Path) -> None:
     lens = "width = 1280\nheight = 720\nfx = 2400.0\nfy = 2400.0\ncx = 640.0\ncy = 360.0\n"
     (tmp_path / "lens.toml").write_text(lens)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from vergence.simulation.draft import Draft
 
 _SHARE = 0.85  # of the image's height that the board fills
+_GRIPPER = re.compile("grip|finger|jaw|thumb|knuckle", re.IGNORECASE)  # in names of joints
+_FINGER_M = 0.1  # the longest travel of a finger that slides
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
   <asset>
@@ -63,8 +66,8 @@ duration_s = 10.0
 model = "{model}"
 body = "{body}"  # the arm's last body
 position_m = [0.0, 0.0, {height}]  # of its base
-start_deg = {start}  # metres for prismatic joints
-rate_max_deg_s = {rates}  # {rates_from}; m/s for prismatic joints
+start_deg = {start}{metres}
+rate_max_deg_s = {rates}  # {rates_from}{metres_a_second}
 acceleration_max_deg_s2 = {accelerations}  # a guess: see the robot's manual
 
 [cameras.wrist]
@@ -160,7 +163,20 @@ def _advice(folder: Path, draft: "Draft") -> list[str]:
     from vergence.simulation.build import intrinsics
 
     camera = intrinsics(load_cell(folder).cameras["wrist"])
-    return list(filter(None, (poorly_measured(draft, camera), poorly_served(draft))))
+    found = (_gripper_joint(draft), poorly_measured(draft, camera), poorly_served(draft))
+    return list(filter(None, found))
+
+
+def _gripper_joint(draft: "Draft") -> str:
+    """Say that the last joint of an arm seems to open and close a gripper, if it does."""
+    arm = draft.arm
+    short = arm.sliding[-1] and arm.q_max[-1] - arm.q_min[-1] <= _FINGER_M
+    if not (short or _GRIPPER.search(arm.names[-1])):
+        return ""
+    return (
+        f"joint {arm.names[-1]}, the last one, seems to move a gripper: to leave it out of the "
+        "arm's motion, give a body before it as --body"
+    )
 
 
 def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:
@@ -230,6 +246,8 @@ def _text(draft: "Draft", model_name: str, model: str, body: str, name: str, wha
         name=name,
         drivers=", ".join(kinds("driver")),
         start=_numbers(draft.start / unit, 3),
+        metres="  # metres for prismatic joints" if draft.arm.sliding.any() else "",
+        metres_a_second="; m/s for prismatic joints" if draft.arm.sliding.any() else "",
         rates=_limits(draft.arm.rate_max / unit),
         rates_from=draft.rates_from,
         accelerations=_limits(draft.arm.acceleration_max / unit),
