@@ -44,6 +44,20 @@ def test_a_path_is_drawn_and_its_joints_written(
     assert np.abs(np.diff(values[:, 1:], axis=0)).max() < 0.03
 
 
+def test_the_report_of_a_run_is_not_written_over(
+    command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("run").mkdir()
+    Path("run/recording.mcap").touch()
+    for words in (("gantry",), ("gantry", "--no-images")):
+        assert command(*words, "--out", "run") == 2
+        said = capsys.readouterr().err
+        assert (
+            said == "vergence: --out: given run, which holds a recording; allowed: another folder\n"
+        )
+    assert [path.name for path in Path("run").iterdir()] == ["recording.mcap"]
+
+
 def test_json_is_one_object_with_the_paths_numbers(
     command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.app import markup
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.app.report import REPORT
 from vergence.app.run import overrides
 
@@ -31,6 +31,7 @@ def check(options: "CheckOptions") -> int:
     from vergence.drivers.bring_up import bring_up, killed_client_finding
 
     loaded = load_cell(options.cell, overrides(options.settings))
+    folder = page_folder(options.out, f"check-{loaded.name}")
     check_driver(loaded, options.driver)
     rehearse(loaded)
     opened = open_driver(loaded, options.driver)
@@ -52,7 +53,6 @@ def check(options: "CheckOptions") -> int:
         findings.append(killed_client_finding(again, loaded.task.arm, by))
         if not options.as_json:
             say(_words(findings[-1]))
-    folder = options.out or new_folder(f"check-{loaded.name}")
     page = _write_page(folder, loaded.name, options.driver, findings)
     holds = all(found.holds for found in findings)
     if options.as_json:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vergence.app.output import SUCCESS, emit, new_folder
+from vergence.app.output import SUCCESS, emit, page_folder
 from vergence.errors import NOTHING, InputError, nearest
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def calibrate(options: "CalibrateOptions") -> int:
         read_camera(options.camera)
     T_world_base = _base(options)
     name = options.synthetic or str(options.images or options.cell)
-    folder = options.out or new_folder(f"calibrate-{Path(name).stem or 'images'}")
+    folder = page_folder(options.out, f"calibrate-{Path(name).stem or 'images'}")
     if not options.overwrite and any((folder / made).exists() for made in (CAMERA, TABLE)):
         given = f"{folder}, which holds a calibration"
         raise InputError("vergence calibrate", "--out", given, "another folder, or --overwrite")

@@ -82,13 +82,13 @@ def prepare(command: str, options: "CampaignOptions") -> "tuple[CellSource, Runn
     Raises:
         InputError: if there is no such cell, or a setting cannot be used.
     """
-    from vergence.app.output import new_folder
+    from vergence.app.output import page_folder
     from vergence.app.run import overrides
     from vergence.experiments import CellSource, renders, usual_tolerance_px
 
     source = CellSource.of(options.cell, overrides(options.settings), None)
     cell = source.load()
-    folder = options.out or new_folder(f"{cell.name}-{command}")
+    folder = page_folder(options.out, f"{cell.name}-{command}")
     tolerance_px = options.tolerance_px
     if tolerance_px is None:
         # A map makes the target rest where it is to be found; a comparison lets it move on.

@@ -63,6 +63,17 @@ def run_folder(out: Path | None, overwrite: bool, name: str) -> Path:
     return out
 
 
+def page_folder(out: Path | None, name: str) -> Path:
+    """Return the folder that a report of anything but a run is written to.
+
+    Raises:
+        InputError: if a recording is in it: the report of that run has the same name.
+    """
+    if out is not None and (out / RECORDING).exists():
+        raise InputError("--out", "", f"{out}, which holds a recording", "another folder")
+    return out or new_folder(name)
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _finite(entry) for key, entry in value.items()}

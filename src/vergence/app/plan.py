@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.errors import InputError, nearest
 from vergence.registry import kinds
 
@@ -41,6 +41,7 @@ def plan(options: "PlanOptions") -> int:
     from vergence.assembly.tasks.reach import timed
     from vergence.planning import Path as PlannedPath
 
+    folder = page_folder(options.out, f"{cell.name}-plan")
     with working("planning"):
         found = plan_path(cell, images=options.images)
     answer: dict[str, object] = {"command": "plan", "cell": cell.name, "found": bool(found)}
@@ -49,7 +50,6 @@ def plan(options: "PlanOptions") -> int:
         emit({**answer, "reason": reason}) if options.as_json else say(f"no path: {reason}")
         return FAILURE
     trajectory = timed(cell, cell.task, found)
-    folder = options.out or new_folder(f"{cell.name}-plan")
     numbers = _numbers(found, trajectory)
     with working("drawing"):
         report = write_plan_page(folder, cell.name, trajectory, numbers)

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.errors import InputError, nearest
 from vergence.studies.rendered import RENDERED, check_imaging
 from vergence.studies.reproduce import PAPERS
@@ -37,7 +37,7 @@ def reproduce(
     if imaging is not None:
         check_imaging(paper, imaging, quick)
 
-    folder = out or new_folder(paper)
+    folder = page_folder(out, paper)
     result = _study(paper, folder, quick, seed, seeds, imaging)
     remark = _remark(paper, result, quick, imaging)
     report = write_study_page(folder, result, remark)

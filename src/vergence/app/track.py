@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vergence.app.output import FAILURE, SUCCESS, emit, new_folder, say
+from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.errors import NOTHING, InputError
 from vergence.places import TRACK
 
@@ -45,12 +45,12 @@ def track(options: "TrackOptions") -> int:
     from vergence.runtime.interrupt import Interrupt
     from vergence.runtime.recording import outcome_json
 
+    folder = page_folder(options.out, f"track-{Path(options.images).stem or 'footage'}")
     start = _prepare(options)
     footage = open_footage(options.images, options.rate, options.topic)
     frames = footage.frames()
     first = next(frames)
     subject = start(footage, first)
-    folder = options.out or new_folder(f"track-{Path(options.images).stem or 'footage'}")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / TRACK).unlink(missing_ok=True)  # it is not about what is written now
     overlay = OverlayFiles(folder, footage, subject, options.overlay)
