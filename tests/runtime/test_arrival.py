@@ -56,6 +56,21 @@ def test_an_arm_that_nears_its_goal_slowly_has_not_stalled() -> None:
         assert watched.stalled is stalled
 
 
+def test_an_arm_whose_target_sets_off_has_stalled_only_where_a_limit_holds_it() -> None:
+    for active, stalled in (((), False), (("joint positions",), True)):
+        watched = Arrival(Goal(), np.ones(6))
+        for k in range(45):
+            measured = SQUARE + 10.0 * max(k / 30 - 1.0, 0.0)
+            view = ImagePoints(
+                "c", k / 30, measured, np.tile(np.eye(2), (4, 1, 1)), np.ones(4, bool), ("",) * 4
+            )
+            command = JointCommand(np.zeros(6), np.zeros(6), active=active)
+            reference = Reference(k / 30, SQUARE)
+            watched.observe(Observation(k / 30, (view,)), reference, command, np.zeros(6))
+        assert watched.error_px > 1.0
+        assert watched.stalled is stalled
+
+
 def test_a_task_with_an_end_that_moves_when_its_time_is_over_is_not_reached() -> None:
     outcome = arrival(SQUARE + 5.0, goal=Goal(1.0, ends=True), speed=0.1).outcome(2.0, 2.0)
     assert outcome.kind is OutcomeKind.NOT_REACHED

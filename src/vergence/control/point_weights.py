@@ -20,8 +20,8 @@ def point_weights(covariance_px: FloatArray) -> FloatArray | None:
         return None
     weight = np.linalg.inv(np.eye(2) + covariance_px / _SURE_PX**2)
     weight /= np.linalg.eigvalsh(weight).max()
-    roots: FloatArray = np.linalg.cholesky(weight).transpose(0, 2, 1)
-    return roots
+    # Contiguous, as every array of a kernel: it would be compiled once more.
+    return np.ascontiguousarray(np.linalg.cholesky(weight).transpose(0, 2, 1))
 
 
 def row_variance(roots: FloatArray | None, covariance: FloatArray) -> float:

@@ -48,8 +48,8 @@ class Arrival:
     """Monitors the error and the joints of a run.
 
     A run is stalled if the arm and the desired features have been at rest for a second while the
-    mean error is above the tolerance and no longer falling. A moving target keeps the arm moving,
-    so it does not count as a stall.
+    mean error is above the tolerance and no longer falling. A target that moves away from an arm
+    that no limit holds does not count as a stall: the arm is about to follow.
 
     Args:
         goal: of the task.
@@ -85,9 +85,7 @@ class Arrival:
     @property
     def falls(self) -> bool:
         """Whether the error is still falling."""
-        rows = list(self._rows)
-        half = len(rows) // 2
-        before, now = _mean_error(rows[:half]), _mean_error(rows[half:])
+        before, now = self._halves()
         return before - now > max(_FALLING * before, _FALLING_PX)
 
     @property
@@ -108,7 +106,7 @@ class Arrival:
     def stalled(self) -> bool:
         """Whether the arm is at rest away from its goal and the error no longer falls."""
         away = self._rests() and self.error_px > self._goal.tolerance_px
-        return away and not self.falls
+        return away and not self.falls and not self._leaves()
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -132,6 +130,17 @@ class Arrival:
         if self.reached:
             return endings.reached(self.error_px, time)
         return endings.not_reached(self.error_px, "out of time", time)
+
+    def _halves(self) -> tuple[float, float]:
+        """Return the mean errors of the first and the second half of the window, px."""
+        rows = list(self._rows)
+        half = len(rows) // 2
+        return _mean_error(rows[:half]), _mean_error(rows[half:])
+
+    def _leaves(self) -> bool:
+        """Whether the target has begun to move away, and nothing keeps the arm from following."""
+        before, now = self._halves()
+        return not self.active and now - before > max(_FALLING * before, _FALLING_PX)
 
     def _rests(self) -> bool:
         if not self._rows or self._rows[-1].time - self._rows[0].time < 0.9 * _WINDOW_S:
