@@ -37,15 +37,14 @@ def _group(group: Any, name: str) -> Iterator[str]:
 def _command(command: Any, name: str) -> Iterator[str]:
     yield from (f"## {name}", "", *_meaning(command.help or "").split("\n"), "")
     arguments = [p for p in command.params if not p.opts[0].startswith("-")]
-    usage = "".join(
-        f" {p.name.upper()}" if p.required else f" [{p.name.upper()}]" for p in arguments
-    )
+    options = [p for p in command.params if p not in arguments]
+    usage = "".join(f" {_word(p)}" if p.required else f" [{_word(p)}]" for p in arguments)
     yield from ("```text", f"{name}{usage} [OPTIONS]", "```", "")
     if command.epilog:
         word, _, example = command.epilog.partition(": ")
         yield from (f"{word}: `{example}`", "")
     yield from ("| | meaning | default |", "|---|---|---|")
-    for parameter in command.params:
+    for parameter in (*arguments, *options):
         cells = (_name(parameter), _meaning(parameter.help or ""), _default(parameter))
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
     yield ""
@@ -53,10 +52,14 @@ def _command(command: Any, name: str) -> Iterator[str]:
 
 def _name(parameter: Any) -> str:
     if not parameter.opts[0].startswith("-"):
-        return f"`{parameter.name.upper()}`"
+        return f"`{_word(parameter)}`"
     names = "`, `".join([*parameter.opts, *parameter.secondary_opts])
     value = "" if parameter.is_flag else f" {parameter.metavar or _kind(parameter)}"
     return f"`{names}{value}`"
+
+
+def _word(argument: Any) -> str:
+    return argument.metavar or argument.name.upper()
 
 
 def _meaning(text: str) -> str:
@@ -72,7 +75,7 @@ def _kind(parameter: Any) -> str:
 def _default(parameter: Any) -> str:
     if parameter.required:
         return "required"
-    if parameter.default is None or parameter.default is False:
+    if parameter.default in (None, False, ""):
         return ""
     if parameter.default is True and parameter.secondary_opts:
         return f"`{parameter.opts[0]}`"

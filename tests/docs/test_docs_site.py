@@ -71,6 +71,14 @@ def test_options_that_a_command_mentions_are_code():
     assert [line for line in text.splitlines() if re.search(r"--[a-z]", line)] == []
 
 
+def test_a_command_lists_its_arguments_first_and_no_empty_default():
+    for section in "\n".join(commands()).split("\n## "):
+        rows = [line for line in section.splitlines() if line.startswith("| `")]
+        options = [row.startswith("| `--") for row in rows]
+        assert options == sorted(options), section.splitlines()[0]
+        assert not any(row.endswith("| `` |") for row in rows)
+
+
 def test_names_in_tables_break_after_underscores_and_dots_and_nowhere_else():
     page = new_document("page")
     names = [nodes.literal("", "law.optimal_tracking"), nodes.literal("", "0.5 s; a, b")]

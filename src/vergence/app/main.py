@@ -233,7 +233,7 @@ def reproduce(
     seeds: Annotated[
         int,
         typer.Option(
-            help="Number of seeds, from --seed on; tells with how many of them each check holds.",
+            help="Number of seeds, counted from --seed; each check says with how many it holds.",
             min=1,
             max=1000,
         ),

@@ -40,7 +40,7 @@ class ImagingTable(Table):
     auto_exposure_grey: Annotated[float, Field(ge=1, le=254)] = 110.0
     # Fraction of the light lost in the corners; it grows with the square of the radius.
     vignetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    # Electrons of a white pixel at unit gain; their number scatters by its root (shot noise).
+    # Electrons of a white pixel at unit gain; shot noise is the square root of their number.
     full_well_electrons: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     jpeg_quality: Annotated[int, Field(ge=0, le=100)] = 0  # quality of the compression
     dropped: Annotated[float, Field(ge=0, lt=1)] = 0.0  # fraction of the images that never arrive

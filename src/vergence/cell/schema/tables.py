@@ -82,11 +82,13 @@ class ArmTable(Placement):
 
 
 class DepthTable(Table):
-    """What a camera measures of depth, at each pixel of its image."""
+    """The depth that a camera measures at each pixel of its image."""
 
-    noise_m: Distance = 0.002  # standard deviation at 1 m, in simulation; grows with the square
-    range_m: tuple[Length, Length] = (0.15, 6.0)  # nearest and farthest that is measured
-    holes: Annotated[float, Field(ge=0, le=1)] = 0.0  # share of the image without, in simulation
+    # Standard deviation at 1 m, in simulation; it grows with the square of the distance.
+    noise_m: Distance = 0.002
+    range_m: tuple[Length, Length] = (0.15, 6.0)  # smallest and largest depth that is measured
+    # Fraction of the image without a depth, in simulation.
+    holes: Annotated[float, Field(ge=0, le=1)] = 0.0
 
     @field_validator("range_m")
     @classmethod
@@ -101,20 +103,21 @@ class CameraTable(Placement):
 
     arm: Text | None = None  # the arm that carries it; fixed in the world if absent
     body: Text | None = None  # which body of that arm; its last if absent
-    # Of a ball around it that must touch nothing; if absent only its arm must not.
+    # Radius of a sphere around it that must touch nothing; if absent, only its arm is checked.
     radius_m: Length | None = None
     resolution: tuple[_Side, _Side] = (640, 480)  # width and height of the image
     focal_mm: _Lens | None = None  # focal length of the lens; needs pixel_um
     pixel_um: tuple[_Lens, _Lens] | None = None  # width and height of a pixel
-    focal_px: tuple[_Focal, _Focal] | None = None  # replaces focal_mm and pixel_um
-    principal_px: Point2 | None = None  # the middle of the image if absent
-    # K1, k2, p1, p2, k3 of OpenCV.
+    focal_px: tuple[_Focal, _Focal] | None = None  # focal lengths fx, fy; instead of the two above
+    principal_px: Point2 | None = None  # principal point cx, cy; the image's middle if absent
+    # Coefficients k1, k2, p1, p2, k3 of OpenCV.
     distortion: tuple[Annotated[float, Field(ge=-1e4, le=1e4)], ...] = Field(
         default=(), max_length=5
     )
-    calibration: Path | None = None  # a camera file, also ROS's, for the six keys above
+    # Camera file, also in ROS's format; instead of the six keys above.
+    calibration: Path | None = None
     rate_hz: Rate = 30.0  # images per second
-    # From exposure until the image arrives.
+    # Delay from exposure to arrival, in frames.
     latency_frames: Annotated[int, Field(ge=0, le=1000)] = 0
     depth: DepthTable | None = None  # settings of a depth camera; see `law.depth`
     noise_grey: Annotated[float, Field(ge=0, le=255)] = (
@@ -122,10 +125,10 @@ class CameraTable(Placement):
     )
     # How its images differ from ideal ones, in simulation: a table, or "real_camera".
     imaging: Imaging | None = None
-    # From when to when its images are black.
+    # Intervals [start, end] in which its images are black, in simulation.
     blind_s: Annotated[tuple[tuple[Time, Time], ...], Field(max_length=1000)] = ()
-    calibration_error_m: Distance = 0.0  # of its placement, in simulation
-    calibration_error_deg: _Angle = 0.0  # and of its angles
+    calibration_error_m: Distance = 0.0  # error of its position, in simulation
+    calibration_error_deg: _Angle = 0.0  # error of its orientation, in simulation
 
     @model_validator(mode="after")
     def _one_lens(self) -> "CameraTable":
@@ -191,7 +194,7 @@ class ToolTable(Placement):
 
     model: Path  # MJCF
     camera: Text  # fixed camera that observes the tool
-    # X, y, z of each point in the tool's frame.
+    # Points x, y, z in the tool's frame.
     features: tuple[Vector3, ...] = Field(min_length=1, max_length=MOST_POINTS)
     desired: _Desired = "initial"  # desired points in that camera, as for the task
 
@@ -316,7 +319,7 @@ class OutputTable(Placement):
 
     arm: Text  # arm that carries it
     model: Path | None = None  # MJCF of what it looks like; nothing is drawn if absent
-    # In simulation, closed it holds a target whose origin is so near, rigidly.
+    # In simulation, a closed gripper rigidly holds a target whose origin is within this distance.
     reach_m: Length = 0.02
 
 

@@ -63,7 +63,7 @@ class OptimalTracking:
         knob(10.0, "1/m², 1/rad²")
     )
     # Weight of 1/w', where w' is the penalised manipulability.
-    S: float = knob(0.0, "cost × w'", least=0, upto=1e3, needs="avoidance_axes")
+    S: float = knob(0.0, "cost × w′", least=0, upto=1e3, needs="avoidance_axes")
     # Penalty for joint limits: eq. (27), or per joint.
     penalty: Literal["product", "per_joint"] = knob("product", needs="S")
     # Measure of manipulability: eq. (26), or eq. (24), with |det J| in place of its square.

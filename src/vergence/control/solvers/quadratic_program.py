@@ -39,7 +39,7 @@ class QuadraticProgram:
     """
 
     # Weight of 1/w', the inverse of the manipulability with the penalty per joint.
-    S: float = knob(0.0, "cost × w'", least=0, upto=1e3)
+    S: float = knob(0.0, "cost × w′", least=0, upto=1e3)
     # Highest joint rate caused by S.
     avoidance_rate_max: float = knob(0.5, "rad/s", above=0, upto=100, needs="S")
     damping: float = knob(1e-6, above=0, upto=1, live=False)  # μ, weight of the joint rates
