@@ -1,5 +1,8 @@
 """What a page asks of a running cell, without a browser: nothing that it asks ends the command."""
 
+import signal
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +13,7 @@ from steered import NoScene, Steered, wait
 from vergence.app.watch.commands import Pause, Reset, TrackPoints, TurnKnob
 from vergence.app.watch.law_editor import LawEditor
 from vergence.app.watch.live import Live
+from vergence.app.watch.protocol import Request
 from vergence.assembly import LawContext
 from vergence.assembly.started_driver import StartedDriver
 from vergence.errors import InputError
@@ -53,6 +57,32 @@ def test_points_that_cannot_be_tracked_are_refused_and_a_reset_takes_up_the_cell
     assert page.refused == []
     assert run.outcome.kind is OutcomeKind.STOPPED
     assert run.cameras["wrist"].points_px.shape[1] == 1
+
+
+def test_a_ctrl_c_that_another_thread_takes_ends_the_rest_after_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vergence.app.watch.live.Scene", NoScene)
+    live = Live(LawEditor("puma560", SMALL, None), False, tmp_path / "run", 0)
+    live._again = False
+    late: list[str] = []
+
+    def press() -> None:
+        time.sleep(0.3)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
+    def rescue() -> None:
+        late.append("still at rest")
+        live._again = True
+        live.ask(Request(Pause(do="pause"), late.append))
+
+    timer = threading.Timer(10.0, rescue)
+    timer.start()
+    threading.Thread(target=press).start()
+    live._rest()
+    timer.cancel()
+    live.close()
+    assert late == []
 
 
 def test_a_switch_that_the_law_does_not_take_is_not_offered() -> None:

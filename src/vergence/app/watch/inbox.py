@@ -30,12 +30,14 @@ class Inbox:
         """Whether nothing is waiting."""
         return self._queue.empty()
 
-    def obey(self, do: Callable[[Command], None], timeout_s: float | None) -> None:
+    def obey(self, do: Callable[[Command], None], timeout_s: float) -> None:
         """Do the next thing that is asked for, if one comes in time.
+
+        An endless wait would not hear of a Ctrl-C that the system hands to another thread.
 
         Args:
             do: does it.
-            timeout_s: None to wait for as long as it takes.
+            timeout_s: the longest wait.
         """
         try:
             request = self._queue.get(timeout=timeout_s)

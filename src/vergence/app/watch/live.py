@@ -180,7 +180,7 @@ class Live:
         """Do what is asked after a run has ended, until it shall begin again, or Ctrl-C."""
         with contextlib.suppress(KeyboardInterrupt):
             while not self._again:
-                self._inbox.obey(self._do, timeout_s=None)
+                self._inbox.obey(self._do, timeout_s=_LOOK_UP_S)
                 self._tell()
 
     def _between(self, time: float) -> None:
