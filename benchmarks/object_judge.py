@@ -12,7 +12,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.camera.lens import pack_lens
 from vergence.vision.known_object import ObjectModel
-from vergence.vision.known_object.edge_samples import sample_edges
+from vergence.vision.known_object.edge_samples import LEAST_COSINE, sample_edges
 
 PLACES, BESIDE_PX, NEAR_PX, LEAST_SLOPE, HELD_SHARE = 20, 10.0, 2.0, 4.0, 0.6
 _AWAY = np.arange(-BESIDE_PX, BESIDE_PX + 0.01, 0.5)
@@ -27,7 +27,7 @@ def explained_share(smooth: ImageArray, T: FloatArray, model: ObjectModel, camer
     places = np.full(len(model.edges), PLACES)
     seen = sample_edges(
         np.ascontiguousarray(T), pack_lens(camera), model.edges, model.edge_normals, model.surface,
-        places,
+        places, LEAST_COSINE,
     )  # fmt: skip
     across = seen.points_px[:, None] + _AWAY[:, None] * seen.normals[:, None]
     inside = ((across > 2.0) & (across < (camera.width - 3, camera.height - 3))).all((1, 2))

@@ -8,7 +8,7 @@ from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.vision.known_object import EdgeTracker, ObjectModel
 from vergence.vision.known_object.edge_kernel import measure_edges
-from vergence.vision.known_object.edge_samples import EdgeSamples, Steps, sample_edges
+from vergence.vision.known_object.edge_samples import LEAST_COSINE, EdgeSamples, Steps, sample_edges
 from vergence.vision.known_object.profiles import find_steps, read_profile
 from vergence.vision.known_object.shift_vote import SUPPORT_PX, vote_shift
 
@@ -86,8 +86,9 @@ def test_without_steps_nothing_is_shifted() -> None:
 def test_only_edges_that_are_seen_are_expected() -> None:
     places = np.full(12, 10)
     samples = sample_edges(
-        pose(), pack_lens(CAMERA), MODEL.edges, MODEL.edge_normals, MODEL.surface, places
-    )
+        pose(), pack_lens(CAMERA), MODEL.edges, MODEL.edge_normals, MODEL.surface, places,
+        LEAST_COSINE,
+    )  # fmt: skip
     assert len(np.unique(samples.edge)) == 9  # of a box that shows three faces
 
 

@@ -1,6 +1,7 @@
 """A lost target with corners, found in whole images by its edges."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.estimation import Measure
 from vergence.estimation.known_object.half_hidden import enough_seen
-from vergence.estimation.known_object.object_rivals import choose_pose
+from vergence.estimation.known_object.object_rivals import chance_of, choose_pose
 from vergence.estimation.known_object.object_search import ObjectSearch, SearchPace
 from vergence.geometry import angle_between, transform_points
 from vergence.signals import Frame, ImagePoints
@@ -65,10 +66,14 @@ class ObjectFinder:
         if fits is None:
             return None
         self._names.append(self._names.pop(0))
-        enough = enough_seen(fits, None, _LEAST_SHARE)
+        chance = chance_of(fits)
+        compare = partial(
+            self._tracker.log_ratio, camera=self._cameras[frame.camera], chance=chance
+        )
+        enough = enough_seen(fits, None, _LEAST_SHARE, compare, chance)
         if isinstance(enough, str):
             return None
-        chosen = choose_pose(enough, T_camera_target, self._turns, search.free_axes)
+        chosen = choose_pose(enough, T_camera_target, self._turns, search.free_axes, compare)
         return (
             None
             if chosen is None or chosen.rivals

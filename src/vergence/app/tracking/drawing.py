@@ -12,7 +12,7 @@ from vergence.camera.lens import pack_lens
 from vergence.estimation.known_object.object_follower import Sighting, Step
 from vergence.estimation.known_object.object_tracker import ObjectTracker
 from vergence.vision.known_object import ObjectModel, SilhouetteTracker
-from vergence.vision.known_object.edge_samples import sample_edges
+from vergence.vision.known_object.edge_samples import LEAST_COSINE, sample_edges
 from vergence.vision.known_object.silhouette import outline_of
 
 _SHIFT = 4  # fractional bits of a place
@@ -68,7 +68,7 @@ def _edges(
 
     places = np.full(len(model.edges), _PLACES)
     seen = sample_edges(
-        T, pack_lens(camera), model.edges, model.edge_normals, model.surface, places
+        T, pack_lens(camera), model.edges, model.edge_normals, model.surface, places, LEAST_COSINE
     )
     along = (np.diff(seen.edge) == 0) & (np.diff(seen.place) == 1)
     for n in np.flatnonzero(along):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vergence.estimation.known_object.object_follower import pose_distance
-from vergence.estimation.known_object.object_rivals import is_near
+from vergence.estimation.known_object.object_rivals import DECIDED, Compare, is_near
 from vergence.estimation.known_object.object_search import Fit, Near
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
@@ -14,11 +14,12 @@ from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
 # thousand times. Of a hidden object four edges never suffice: many things are rectangles.
 _SURE = float(np.log(1e5) + np.log(1e3))
 _SURE_HALF = _SURE + float(np.log(1e2))
-_DECIDED = float(np.log(1e3))  # over every other pose
 _PREDICTED = 22.5  # χ² with six degrees of freedom: 999 of 1000
 
 
-def enough_seen(fits: Sequence[Fit], near: Near | None, least_share: float) -> list[Fit] | str:
+def enough_seen(
+    fits: Sequence[Fit], near: Near | None, least_share: float, compare: Compare, chance: float
+) -> list[Fit] | str:
     """Return the poses that explain what is seen of a lost object, or why there is none.
 
     What is seen must be too much for chance. Of an object that is partly hidden, the part that is
@@ -29,11 +30,12 @@ def enough_seen(fits: Sequence[Fit], near: Near | None, least_share: float) -> l
         fits: poses fitted to the edges of an image, at least one.
         near: where the object is predicted; without it, one that is partly hidden is not found.
         least_share: fraction of the visible part that must be found.
+        compare: two of them.
+        chance: fraction of the places that is found at wrong poses.
 
     Returns:
         The likeliest pose and those as likely; or why there is none, empty if too little is seen.
     """
-    chance = float(np.median([fit.share for fit in fits]))
     views = [
         partial_view(fit.seen, chance) if isinstance(fit.seen, EdgeMeasurement) else NOT_SEEN
         for fit in fits
@@ -45,9 +47,11 @@ def enough_seen(fits: Sequence[Fit], near: Near | None, least_share: float) -> l
     if nats[best] < (_SURE if whole else _SURE_HALF) or views[best].share < least_share:
         return ""
     order = np.argsort(-nats, kind="stable")
-    alike = [fits[k] for k in order if nats[k] > nats[best] - _DECIDED]
+    alike = [
+        fits[k] for k in order if k == best or compare(fits[best].seen, fits[k].seen) < DECIDED
+    ]
     if whole:
-        return alike
+        return [fit for fit in alike if fit.share >= least_share]
     if near is None:
         return ""
     if not all(is_near(fit.T_camera_target, T) for fit in alike):

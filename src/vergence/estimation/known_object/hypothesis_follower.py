@@ -16,8 +16,8 @@ from vergence.estimation.known_object.object_follower import (
 from vergence.estimation.known_object.object_rivals import (
     DECIDED,
     Chosen,
-    Evidence,
     Rival,
+    chance_of,
     choose_pose,
     compare_poses,
     covered,
@@ -33,7 +33,7 @@ from vergence.estimation.known_object.object_search import (
     ObjectSearch,
     SearchPace,
 )
-from vergence.estimation.known_object.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import angle_between, se3_compose
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.look_alikes import Turn, between
@@ -86,7 +86,7 @@ class HypothesisFollower:
         self._by_edges = isinstance(tracker, EdgeTracker)
         self._turns = tracker.symmetries()
         self._rivals: list[Rival] = []
-        self._evidence = Evidence()
+        self._chance = 0.0  # fraction of the object that is found at wrong poses
         self._compared_at: FloatArray | None = None  # pose in the last image that gave evidence
         self._last: FloatArray | None = None  # its last position
         self._last_time = self._hidden_until = time  # s, when it was seen last and then appeared
@@ -159,25 +159,26 @@ class HypothesisFollower:
 
     def _compare(self, image: ImageArray, time: float) -> None:
         """Select among rotated poses, and keep those that cannot be distinguished."""
-        chosen, rivals, note = compare_poses(
+        compared = compare_poses(
             self._tracker, image, self._camera, self._main.T_camera_target,
             self._main.start_covariance, self._turns, self._others, self._rule.least_of_all,
         )  # fmt: skip
         memory = self._main.memory
-        if note:
-            self.note = note
-            self._main = self._begin(chosen, time, memory)
-        self._rivals = [Rival(self._begin(T, time, memory), Evidence()) for T in rivals]
-        self._evidence, self._compared, self._others = Evidence(), True, ()
+        if compared.note:
+            self.note = compared.note
+            self._main = self._begin(compared.T_camera_target, time, memory)
+        self._rivals = [Rival(self._begin(T, time, memory)) for T in compared.rivals]
+        self._chance, self._compared, self._others = compared.chance, True, ()
 
     def _settle(self, image: ImageArray, time: float, step: Step) -> None:
         """Track beside the pose those nearby that cannot be distinguished from it."""
+        assert self._main.seen is not None
         near = neighbours(
-            self._tracker, image, self._camera, step, self._main.start_covariance,
-            self._rule.least_of_all,
+            self._tracker, image, self._camera, step, self._main.seen, self._main.start_covariance,
+            self._rule.least_of_all, self._chance,
         )  # fmt: skip
         memory = self._tracker.elsewhere(self._main.memory)
-        self._rivals += [Rival(self._begin(T, time, memory), Evidence()) for T in near]
+        self._rivals += [Rival(self._begin(T, time, memory)) for T in near]
         self._settled = True
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
@@ -195,15 +196,19 @@ class HypothesisFollower:
         fits = search.look(image, near)
         if fits is None:
             return replace(step, reason=self._undecided or step.reason)
-        self._undecided = ""
-        enough = enough_seen(fits, near, self._rule.found_again) if near else self._whole(fits)
+        self._undecided, self._chance = "", chance_of(fits)
+        enough: list[Fit] | str = self._whole(fits)
+        if near:
+            enough = enough_seen(fits, near, self._rule.found_again, self._log_ratio, self._chance)
         if isinstance(enough, str):
             self._undecided = enough
             return replace(step, reason=enough or step.reason)
         if not enough:
             return step
         most_rad = _TURN_RAD + _TURN_RATE * (self._hidden_until - self._last_time)
-        chosen = choose_pose(enough, self._last, self._turns, search.free_axes, most_rad)
+        chosen = choose_pose(
+            enough, self._last, self._turns, search.free_axes, self._log_ratio, most_rad
+        )
         return step if chosen is None else self._found(image, time, step, chosen)
 
     def _found(self, image: ImageArray, time: float, step: Step, chosen: Chosen) -> Step:
@@ -218,10 +223,14 @@ class HypothesisFollower:
         if len(rivals) > _MOST_RIVALS:
             self._undecided = f"{len(rivals) + 1} poses explain the image equally well"
             return replace(step, reason=self._undecided)
-        self._main, self._lost, self._evidence = main, False, Evidence()
+        self._main, self._lost = main, False
         self._compared_at, self._settled = None, not self._by_edges
-        self._rivals = [Rival(self._begin(T, time, memory, deviation), Evidence()) for T in rivals]
+        self._rivals = [Rival(self._begin(T, time, memory, deviation)) for T in rivals]
         return found
+
+    def _log_ratio(self, seen: Measurement, other: Measurement) -> float:
+        """Return by how many nats an image supports one pose more than another."""
+        return self._tracker.log_ratio(seen, other, self._camera, self._chance)
 
     def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return the poses of which enough is found; what is outside the image is not."""
@@ -234,25 +243,25 @@ class HypothesisFollower:
         new = is_new_view(step.T_camera_target, self._compared_at)
         if new:
             self._compared_at = step.T_camera_target
-            self._evidence = self._evidence.and_seen(step.share, len(step.samples_found))
         kept: list[tuple[Rival, Step]] = []
         for rival in self._rivals:
             seen = rival.follower.follow(image, time)
-            evidence = rival.evidence
-            if new:
-                evidence = evidence.and_seen(seen.share, len(seen.samples_found))
+            if new and self._main.seen is not None and rival.follower.seen is not None:
+                rival = rival.and_seen(self._log_ratio(self._main.seen, rival.follower.seen))
             same = step.sighting is Sighting.SEEN and covered(step, seen.T_camera_target)
             gone = same or seen.sighting is Sighting.LOST
-            if not gone and self._evidence.over(evidence) < DECIDED:
-                kept.append((Rival(rival.follower, evidence), seen))
-        better = [each for each in kept if each[0].evidence.over(self._evidence) > DECIDED]
-        if better:
-            taken, step_of_it = max(better, key=lambda each: each[0].evidence.over(self._evidence))
+            if not gone and rival.nats < DECIDED:
+                kept.append((rival, seen))
+        taken, step_of_it = min(kept, key=lambda each: each[0].nats, default=(None, step))
+        if taken is not None and taken.nats < -DECIDED:
             turn = between(step.T_camera_target, step_of_it.T_camera_target)
             self.note = f"the object is turned by {turn}: this explains the images better"
-            self._main, self._evidence, step = taken.follower, taken.evidence, step_of_it
-            kept = [each for each in kept if taken.evidence.over(each[0].evidence) < DECIDED]
-            kept = [each for each in kept if each[0] is not taken]
+            self._main, step = taken.follower, step_of_it
+            kept = [
+                (rival._replace(nats=rival.nats - taken.nats), seen)
+                for rival, seen in kept
+                if rival is not taken and rival.nats - taken.nats < DECIDED
+            ]
         self._rivals = [rival for rival, _ in kept]
         if step.sighting is not Sighting.SEEN:
             return step

@@ -145,6 +145,7 @@ class ObjectFollower:
         )
         self._shared = np.zeros((6, 6))
         self._missed, self._reason = 0, ""
+        self.seen: Measurement | None = None  # in the last image, if it was examined
 
     @property
     def tracker(self) -> ObjectTracker:
@@ -226,7 +227,7 @@ class ObjectFollower:
         seen: Measurement | None,
         share_decided: bool,
     ) -> Step:
-        belief, self._reason = self._belief, reason
+        belief, self._reason, self.seen = self._belief, reason, seen
         astray = np.zeros((6, 6)) if seen is None else seen.astray
         return Step(
             time,

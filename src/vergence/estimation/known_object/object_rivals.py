@@ -1,11 +1,10 @@
 """Rotated poses of an object that an image supports as well as the believed one.
 
-They are searched for when there is no memory, at the start and after a loss. Places along the edges
-are found or not for each pose, and neighbouring places mostly agree, so the fractions found are
-compared by the number of independent places.
+They are searched for when there is no memory, at the start and after a loss. One criterion decides:
+the log likelihood ratio of two poses, summed over the images until it exceeds `DECIDED`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation.known_object.object_follower import ObjectFollower, Step, pose_distance
 from vergence.estimation.known_object.object_search import Fit
-from vergence.estimation.known_object.object_tracker import ObjectTracker
+from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import angle_between, moved_pose, pose_difference, se3_compose
 from vergence.vision.known_object.look_alikes import (
     Turn,
@@ -24,52 +23,42 @@ from vergence.vision.known_object.look_alikes import (
     turns_of,
 )
 
-DECIDED = 3.0  # standard deviations between two fractions
-_ALIKE = 4.0  # neighbouring places that are found or missed together
-_IMAGES_ALIKE = 5.0  # and consecutive images
+# Log likelihood ratio at which a sequential test ends: one error in a thousand [Wald1945].
+DECIDED = float(np.log(1e3))
+_IMAGES_ALIKE = 5.0  # consecutive images that count as one
+_CHANCE = 0.5  # fraction found at wrong poses, where no other pose is known
 _NEW_VIEW_RAD, _NEW_VIEW = 0.03, 0.02  # turn and motion, relative to the distance, of a new view
 _SAME_RAD = 0.1
 _SAME = 0.05  # relative to the distance
 _TILT_RAD = 0.1  # shows a face that was seen edge-on, or hides it: more than `LEAST_COSINE`
 _TILTS = 8  # directions
-_OF_BEST = 0.85  # fraction of the best share below which a pose is no rival
 _COVERED = 16.8  # χ² with six degrees of freedom: 99 of 100
 
 
-class Evidence(NamedTuple):
-    """How much of an object was found where a pose predicts it."""
-
-    found: float = 0.0  # independent places
-    expected: float = 0.0
-
-    def and_seen(self, share: float, places: int) -> "Evidence":
-        """Return the evidence with one more image."""
-        count = places / _ALIKE / (_IMAGES_ALIKE if self.expected else 1.0)
-        return Evidence(self.found + share * count, self.expected + count)
-
-    def over(self, other: "Evidence") -> float:
-        """Return by how many standard deviations more was found than for another pose."""
-        if not (self.expected and other.expected):
-            return 0.0
-        shares = np.array([self.found / self.expected, other.found / other.expected])
-        counts = np.array([self.expected, other.expected])
-        inner = (shares * counts + 0.5) / (counts + 1.0)  # never quite 0 or 1
-        return float((shares[0] - shares[1]) / np.sqrt(np.sum(inner * (1.0 - inner) / counts)))
+Compare = Callable[[Measurement, Measurement], float]
+"""Returns the log likelihood ratio of one pose to another, from the same image."""
 
 
 class Rival(NamedTuple):
     """A rotated pose that is tracked in parallel to the believed one."""
 
     follower: ObjectFollower
-    evidence: Evidence
+    nats: float = 0.0  # log likelihood ratio of the believed pose to it
+    compared: bool = False  # in an image
+
+    def and_seen(self, nats: float) -> "Rival":
+        """Return the rival after another image, which supports the believed pose so much more."""
+        weight = 1.0 / _IMAGES_ALIKE if self.compared else 1.0
+        return Rival(self.follower, self.nats + weight * nats, compared=True)
 
 
-class Candidate(NamedTuple):
-    """A pose fitted to an image."""
+class Compared(NamedTuple):
+    """What an image says about rotated poses."""
 
-    T_camera_target: FloatArray  # (4, 4)
-    share: float  # fraction of what should be visible that was found
-    evidence: Evidence
+    T_camera_target: FloatArray  # (4, 4) the best
+    rivals: list[FloatArray]  # (4, 4) each, those that cannot be distinguished from it
+    note: str  # why it is not the given one; empty if it is
+    chance: float  # fraction that is found at the others
 
 
 class Chosen(NamedTuple):
@@ -84,6 +73,7 @@ def choose_pose(
     T_last: FloatArray,
     symmetries: Sequence[Turn],
     free: FloatArray,
+    compare: Compare,
     most_rad: float = np.inf,
 ) -> Chosen | None:
     """Choose among the poses at which a lost object was found.
@@ -96,6 +86,7 @@ def choose_pose(
         T_last: last pose, (4, 4).
         symmetries: rotations that map the object onto itself.
         free: axes of the object about which its rotation is not observable, (K, 3).
+        compare: two of them.
         most_rad: how far it may have turned since.
 
     Returns:
@@ -111,18 +102,16 @@ def choose_pose(
         turned = axes_apart_rad(T[:3, :3], other[None, :3, :3], free)[0]
         return bool(turned < _SAME_RAD) and _near(T, other)
 
-    best = Evidence().and_seen(fits[0].share, fits[0].expected)
+    best = fits[0]
     fits = [fit for fit in fits if twins(fit.T_camera_target, T_last)[0][0] <= most_rad]
-    fits = [fit for fit in fits if fit.share >= _OF_BEST * fits[0].share]
-    evidences = [Evidence().and_seen(fit.share, fit.expected) for fit in fits]
-    if not fits or best.over(evidences[0]) > DECIDED:
+    if not fits or compare(best.seen, fits[0].seen) > DECIDED:
         return None
     (turned, chosen), *others = twins(fits[0].T_camera_target, T_last)
     rivals = [T for angle, T in others if angle < min(2.0 * turned, most_rad)]
-    for fit, evidence in zip(fits[1:], evidences[1:], strict=True):
+    for fit in fits[1:]:
         T = twins(fit.T_camera_target, chosen)[0][1]
         alike = any(same(T, other) for other in (chosen, *rivals))
-        if evidences[0].over(evidence) < DECIDED and not alike:
+        if not alike and compare(fits[0].seen, fit.seen) < DECIDED:
             rivals.append(T)
     return Chosen(chosen, rivals)
 
@@ -157,7 +146,7 @@ def compare_poses(
     symmetries: Sequence[Turn],
     others: Sequence[FloatArray],
     least_share: float,
-) -> tuple[FloatArray, list[FloatArray], str]:
+) -> Compared:
     """Compare a pose with rotated ones on an image.
 
     Args:
@@ -169,10 +158,6 @@ def compare_poses(
         symmetries: rotations that map the object onto itself.
         others: further candidate poses.
         least_share: fraction of what should be visible, required of any pose.
-
-    Returns:
-        The best pose; the poses that cannot be distinguished from it; and, if it is not the given
-        one, the reason, else "".
     """
     alike = [np.eye(4), *(turn.T_target_turned for turn in symmetries)]
     starts = [*others, *(T @ turn.T_target_turned for turn in turns_of(tracker.model))]
@@ -181,17 +166,29 @@ def compare_poses(
         _fitted(tracker, image, camera, np.ascontiguousarray(start), covariance)
         for start in _distinct([T], starts, alike)
     ]
-    fits = sorted((fit for fit in fits if fit.share >= least_share), key=lambda fit: -fit.share)
+    chance = chance_of(fits)
+    fits = [fit for fit in fits if fit.share >= least_share]
+    nats = [tracker.log_ratio(fit, given, camera, chance) for fit in fits]
     chosen, note = given, ""
-    if fits and fits[0].evidence.over(given.evidence) > DECIDED:
-        chosen = fits[0]
+    if fits and max(nats) > DECIDED:
+        chosen = fits[int(np.argmax(nats))]
         turn = between(given.T_camera_target, chosen.T_camera_target)
         note = (
             f"the first pose fits {given.share:.0%} of the edges; turned by {turn} it fits "
             f"{chosen.share:.0%}, and that pose is used"
         )
-    near = [fit.T_camera_target for fit in fits if chosen.evidence.over(fit.evidence) < DECIDED]
-    return chosen.T_camera_target, _distinct([chosen.T_camera_target], near, alike), note
+    near = [
+        fit.T_camera_target
+        for fit in fits
+        if fit is not chosen and tracker.log_ratio(chosen, fit, camera, chance) < DECIDED
+    ]
+    rivals = _distinct([chosen.T_camera_target], near, alike)
+    return Compared(chosen.T_camera_target, rivals, note, chance)
+
+
+def chance_of(fits: Sequence[Fit | Measurement]) -> float:
+    """Return the fraction of an object that is found at wrong poses: at most of these."""
+    return float(np.median([fit.share for fit in fits])) if fits else _CHANCE
 
 
 def _fitted(
@@ -200,11 +197,10 @@ def _fitted(
     camera: Camera,
     start: FloatArray,
     covariance: FloatArray,
-) -> Candidate:
-    """Return the pose that fits an image, searched for around a start without any memory."""
-    seen = tracker.measure(image, camera, start, covariance, tracker.blank())
-    evidence = Evidence().and_seen(seen.share, seen.expected)
-    return Candidate(seen.T_camera_target, seen.share, evidence)
+) -> Measurement:
+    """Return what an image shows near a start, searched for without any memory."""
+    seen: Measurement = tracker.measure(image, camera, start, covariance, tracker.blank())
+    return seen
 
 
 def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
@@ -225,8 +221,10 @@ def neighbours(
     image: ImageArray,
     camera: Camera,
     step: Step,
+    seen: Measurement,
     covariance: FloatArray,
     least_share: float,
+    chance: float,
 ) -> list[FloatArray]:
     """Return poses (4, 4) nearby that explain an image as well as the one found.
 
@@ -239,17 +237,18 @@ def neighbours(
         image: grey, (height, width).
         camera: the camera's model.
         step: what was found in the image.
+        seen: the measurement of it.
         covariance: (6, 6), size of the search around each pose.
         least_share: fraction of what should be visible, required of any pose.
+        chance: fraction that is found at wrong poses.
     """
     T = step.T_camera_target
     found: list[FloatArray] = []
-    own = Evidence().and_seen(step.share, len(step.samples_found))
     for k in range(_TILTS):
         angle = 2.0 * np.pi * k / _TILTS
         tilt = _TILT_RAD * np.array((0.0, 0.0, 0.0, np.cos(angle), np.sin(angle), 0.0))
         fit = _fitted(tracker, image, camera, moved_pose(T, tilt), covariance)
-        if fit.share < least_share or own.over(fit.evidence) > DECIDED:
+        if fit.share < least_share or tracker.log_ratio(seen, fit, camera, chance) > DECIDED:
             continue
         if not any(_covers(step, fit.T_camera_target, other) for other in (T, *found)):
             found.append(fit.T_camera_target)

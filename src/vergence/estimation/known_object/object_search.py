@@ -50,12 +50,12 @@ class Fit(NamedTuple):
     T_camera_target: FloatArray  # (4, 4)
     share: float  # fraction of what should be visible that was found
     expected: int  # places that should be visible
-    seen: Measurement | None = None  # the whole measurement
+    seen: Measurement
 
     @property
     def whole(self) -> float:
         """Fraction found of all places, those outside the image among them."""
-        places = 0 if self.seen is None else len(self.seen.samples_found)
+        places = len(self.seen.samples_found)
         return self.share * min(1.0, self.expected / places) if places else 0.0
 
 

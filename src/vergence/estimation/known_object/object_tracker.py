@@ -98,6 +98,17 @@ class ObjectTracker(Protocol):
         """Return the `Measurement` of an image."""
         ...
 
+    def log_ratio(self, seen: Any, other: Any, camera: Camera, chance: float) -> float:
+        """Return the log likelihood ratio of one pose to another from the same image, nats.
+
+        Args:
+            seen: the measurement at the first pose.
+            other: the measurement at the second.
+            camera: the camera's model.
+            chance: fraction that is found at wrong poses.
+        """
+        ...
+
     def remember(self, memory: Any, seen: Any) -> Any:
         """Return the memory after an accepted image."""
         ...

@@ -13,6 +13,7 @@ from vergence.vision.known_object.edge_measurement import (
     EdgeRule,
 )
 from vergence.vision.known_object.edge_samples import (
+    LEAST_COSINE,
     EdgeSamples,
     Steps,
     chosen_samples,
@@ -105,7 +106,7 @@ def _seen_samples(
     T: FloatArray, lens: FloatArray, geometry: EdgeGeometry, apart_px: float
 ) -> EdgeSamples:
     samples = sample_edges(
-        T, lens, geometry.edges, geometry.normals, geometry.surface, geometry.places
+        T, lens, geometry.edges, geometry.normals, geometry.surface, geometry.places, LEAST_COSINE
     )
     return without_doubles(T, samples, geometry.normals, apart_px)
 

@@ -53,6 +53,7 @@ def sample_edges(
     edge_normals: FloatArray,
     surface: FloatArray,
     places: IntArray,
+    least_cosine: float,
 ) -> EdgeSamples:
     """Return the places on sharp edges that are visible at a pose.
 
@@ -63,6 +64,7 @@ def sample_edges(
         edge_normals: of the faces at each, (E, 2, 3).
         surface: occluding triangles, (F, 3, 3), m.
         places: number of places on each edge, evenly spaced, (E,).
+        least_cosine: between the line of sight and the normal of a face that makes edges.
     """
     most = int(np.sum(places))
     edge, place = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
@@ -74,7 +76,7 @@ def sample_edges(
         for k in range(places[e]):
             X = edges[e, 0] + ((k + 0.5) / places[e]) * along
             x, y, z = in_camera(T, X)
-            if z <= 1e-6 or not edge_faces_camera(T, X, edge_normals[e], LEAST_COSINE):
+            if z <= 1e-6 or not edge_faces_camera(T, X, edge_normals[e], least_cosine):
                 continue
             u, v = pixel_of(lens, x / z, y / z)
             within = (

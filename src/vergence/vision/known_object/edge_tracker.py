@@ -20,14 +20,21 @@ from vergence.vision.known_object.edge_measurement import (
     EdgeMemory,
     EdgeRule,
 )
-from vergence.vision.known_object.edge_samples import TEMPLATE, sample_edges
+from vergence.vision.known_object.edge_samples import (
+    LEAST_COSINE,
+    TEMPLATE,
+    EdgeSamples,
+    sample_edges,
+)
 from vergence.vision.known_object.look_alikes import Turn, symmetries
 from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.pose_evidence import edge_nats
 
 _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
 _FEW = 0.7  # fraction of the edges found, below which some of them are probably something else
 _WIDER = 4.0  # power by which the variances then grow
+_EDGE_ON = 0.0  # cosine of a face that may be seen: edges of such faces may show
 _UNKNOWN_RATE = 0.5  # weight of a place that has not been examined yet
 
 
@@ -124,12 +131,30 @@ class EdgeTracker:
 
     def contour(self, T_camera_target: FloatArray, camera: Camera) -> Contour:
         """Return places on the edges that are visible at a pose (4, 4)."""
-        geometry = self.geometry
-        samples = sample_edges(
-            np.ascontiguousarray(T_camera_target), pack_lens(camera),
-            geometry.edges, geometry.normals, geometry.surface, geometry.places,
-        )  # fmt: skip
+        samples = self._samples(T_camera_target, camera, LEAST_COSINE)
         return contour_of(samples.points_px, samples.normals)
+
+    def log_ratio(
+        self, seen: EdgeMeasurement, other: EdgeMeasurement, camera: Camera, chance: float
+    ) -> float:
+        """Return by how many nats the edges in an image support one pose more than another."""
+        return edge_nats(seen, self._shown_at(other, camera), camera, chance) - edge_nats(
+            other, self._shown_at(seen, camera), camera, chance
+        )
+
+    def _shown_at(self, seen: EdgeMeasurement, camera: Camera) -> EdgeSamples:
+        """Return all places on edges that may show at the pose of a measurement."""
+        return self._samples(seen.T_camera_target, camera, _EDGE_ON)
+
+    def _samples(
+        self, T_camera_target: FloatArray, camera: Camera, least_cosine: float
+    ) -> EdgeSamples:
+        geometry = self.geometry
+        samples: EdgeSamples = sample_edges(
+            np.ascontiguousarray(T_camera_target), pack_lens(camera),
+            geometry.edges, geometry.normals, geometry.surface, geometry.places, least_cosine,
+        )  # fmt: skip
+        return samples
 
     def maps(self, image: ImageArray, shape: tuple[int, int], _memory: EdgeMemory) -> Maps:
         """Return how strongly each of (rows, columns) cells of a grey image shows an edge."""

@@ -11,14 +11,11 @@ import numpy as np
 
 from vergence.arrays import BoolArray, FloatArray
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
+from vergence.vision.known_object.pose_evidence import ALIKE, MOST_OF_EDGE, place_nats
 
 _FOUND = 0.95  # fraction of the places found on visible edges
 _PRECISE_PX = 0.5  # standard deviation of their residuals
-_TOLERANCE_PX = 1.5  # within which others are found by chance
-_ALIKE = 4.0  # places that count as one
-_MOST_OF_EDGE = 3.0  # independent places that an edge counts as, at most: it may lie on a line
 _DIRECTIONS, _BOUNDS = 12, 24  # of the borders that are tried, and their places along each
-_LEAST_CHANCE, _MOST_CHANCE = 0.3, 0.9
 
 
 class PartialView(NamedTuple):
@@ -35,10 +32,9 @@ NOT_SEEN = PartialView(0.0, np.zeros(0, dtype=np.bool_), 0.0)
 def partial_view(seen: EdgeMeasurement, chance: float) -> PartialView:
     """Return the visible part under which the pose is most likely.
 
-    For each place that is visible, the log likelihood ratio of the pose to chance is
-    log(s N(r; 0, σ) / (c U(r))) with a residual r if it was found, and log((1 - s) / (1 - c)) if
-    it was not; a hidden place tells nothing. Neighbouring places are not independent, and an edge
-    may coincide with another line, so that an edge counts as three places at most.
+    A hidden place says nothing; for the others see `place_nats`. Neighbouring places are not
+    independent, and an edge may coincide with another line, so that an edge counts as three places
+    at most.
 
     Args:
         seen: the measurement at the pose.
@@ -47,13 +43,9 @@ def partial_view(seen: EdgeMeasurement, chance: float) -> PartialView:
     count, found = len(seen.samples_px), seen.samples_found
     if not found.any():
         return PartialView(0.0, np.zeros(count, dtype=np.bool_), 0.0)
-    chance = float(np.clip(chance, _LEAST_CHANCE, _MOST_CHANCE))
-    residuals = np.where(found, seen.fit.residuals, 0.0)
-    precise = np.exp(-0.5 * (residuals / _PRECISE_PX) ** 2) / (_PRECISE_PX * np.sqrt(2.0 * np.pi))
-    of_found = np.log(_FOUND * precise / (chance / (2.0 * _TOLERANCE_PX)))
-    nats = np.where(found, of_found, np.log((1.0 - _FOUND) / (1.0 - chance)))
+    nats = place_nats(seen, chance, _FOUND, _PRECISE_PX)
     _, edge, places = np.unique(seen.samples.edge, return_inverse=True, return_counts=True)
-    nats *= (np.minimum(places / _ALIKE, _MOST_OF_EDGE) / places)[edge]
+    nats *= (np.minimum(places / ALIKE, MOST_OF_EDGE) / places)[edge]
     visible = _visible(np.asarray(seen.samples_px), nats)
     share = float(np.mean(found[visible])) if visible.any() else 0.0
     return PartialView(float(nats[visible].sum()), visible, share)

@@ -38,6 +38,35 @@ class SilhouetteMemory(NamedTuple):
     share: float  # of its outline that was found recently, 0 … 1
 
 
+def share_log_ratio(
+    seen: SilhouetteMeasurement, other: SilhouetteMeasurement, independent: float
+) -> float:
+    """Return by how many nats more of the outline is found at one pose than at another.
+
+    The log likelihood ratio of two fractions, each of its own lines, to one fraction of all.
+
+    Args:
+        seen: the measurement at the first pose.
+        other: the measurement at the second.
+        independent: fraction of the lines that err independently.
+    """
+    counts = independent * np.array([[each.found, each.expected] for each in (seen, other)])
+    if not (counts[:, 1] > 0.0).all():
+        return 0.0
+    found, missed = counts[:, 0], counts[:, 1] - counts[:, 0]
+    nats = _fraction_nats(found, missed).sum() - _fraction_nats(found.sum(), missed.sum())
+    return float(np.copysign(nats, seen.share - other.share))
+
+
+def _fraction_nats(found: FloatArray, missed: FloatArray) -> FloatArray:
+    """Return the log likelihood of the fraction that is found, at its maximum."""
+    from scipy.special import xlogy
+
+    total = found + missed
+    nats: FloatArray = xlogy(found, found / total) + xlogy(missed, missed / total)
+    return nats
+
+
 def nothing_found(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
     """Return the measurement of an image without the object."""
     none = np.zeros((0, 2))

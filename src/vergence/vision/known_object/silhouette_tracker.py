@@ -41,6 +41,7 @@ from vergence.vision.known_object.silhouette_measurement import (
     SilhouetteMeasurement,
     SilhouetteMemory,
     nothing_found,
+    share_log_ratio,
 )
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes, symmetric_turns
 from vergence.vision.known_object.weak_turns import USUAL, least_shown_of, weak_turns
@@ -177,6 +178,16 @@ class SilhouetteTracker:
     def symmetries(self) -> list[Turn]:
         """Return the rotations that leave the outline unchanged, other than about a free axis."""
         return symmetric_turns(self.shape, self.axes, turns_of(self.shape))
+
+    def log_ratio(
+        self,
+        seen: SilhouetteMeasurement,
+        other: SilhouetteMeasurement,
+        camera: Camera,
+        chance: float,
+    ) -> float:
+        """Return by how many nats an image supports one pose more than another."""
+        return share_log_ratio(seen, other, _INDEPENDENT / self.lines)
 
     def remember(self, memory: SilhouetteMemory, seen: SilhouetteMeasurement) -> SilhouetteMemory:
         """Return the memory after an image that was accepted."""
