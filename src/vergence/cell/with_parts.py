@@ -31,7 +31,8 @@ def with_parts(cell: "Cell") -> "Cell":
         """Return a table with the parts at some of its keys, each of its role."""
         update = {}
         for key, role in roles.items():
-            given, usual = getattr(table, key), type(table).model_fields[key].default
+            usual = type(table).model_fields[key].default
+            given = usual if getattr(table, key) is None else getattr(table, key)
             if given is not None:
                 update[key] = load_part(role, given, place.at(f"{at}.{key}"), usual or "")
         return table.model_copy(update=update)

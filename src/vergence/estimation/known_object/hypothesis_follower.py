@@ -12,6 +12,7 @@ from vergence.estimation.known_object.object_follower import (
     ObjectFollower,
     Sighting,
     Step,
+    missing_again,
 )
 from vergence.estimation.known_object.object_rivals import (
     DECIDED,
@@ -233,8 +234,9 @@ class HypothesisFollower:
         return self._tracker.log_ratio(seen, other, self._camera, self._chance)
 
     def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return the poses of which enough is found; what is outside the image is not."""
-        return [fit for fit in fits if fit.whole >= self._rule.found_again]
+        """Return the poses of which enough is found."""
+        sought, rule = self._tracker.sought, self._rule
+        return [fit for fit in fits if not missing_again(fit.seen, sought, rule)]
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
         """Track the rotated poses too; drop worse ones, adopt one that explains more."""

@@ -66,6 +66,8 @@ class FollowRule:
     least_share: float = 0.57  # of what is usually found, to accept an image
     least_of_all: float = 0.5  # of all that should be visible
     surprising_share: float = 0.75  # of both, if the image contradicts the prediction
+    # Of what nothing covers, after an image without it; 0 if it is followed again with any share.
+    uncovered_again: float = 0.0
     least_points: int = 6  # measured, to accept an image; an edge has two
     found_again: float = 0.85  # of all, and of what is usually found, to find a lost object
     missed_max: int = 12  # consecutive images without the object, after which it is lost
@@ -86,7 +88,12 @@ class FollowRule:
 
 # Lines across an outline are found independently, and half of it may be occluded.
 OUTLINE_RULE = FollowRule(
-    least_share=0.35, least_of_all=0.35, surprising_share=0.5, least_points=25, found_again=0.7
+    least_share=0.35,
+    least_of_all=0.35,
+    surprising_share=0.5,
+    uncovered_again=0.85,
+    least_points=25,
+    found_again=0.7,
 )
 
 
@@ -260,6 +267,8 @@ class ObjectFollower:
             return _Doubt("the object is outside the image")
         surprise = min(1.0, _surprise(belief, seen.T_camera_target) / _SURPRISING)
         reason = self._shortfall(seen, surprise, self._rule)
+        if not reason and self._missed and self._rule.uncovered_again:
+            return _Doubt(missing_again(seen, self._tracker.sought, self._rule))
         lowest = self._rule.with_least_share(LEAST_SHARE)
         return _Doubt(reason, reason != "" and not self._shortfall(seen, surprise, lowest))
 
@@ -298,6 +307,24 @@ class ObjectFollower:
                 f"deviations of {place:.3g} m and {turned}"
             )
         return ""
+
+
+def missing_again(seen: Measurement, sought: str, rule: FollowRule) -> str:
+    """Return what is missing of an object that was not found before; empty if nothing is.
+
+    Something similar may have come instead. Its contour is elsewhere, with the object's colours
+    inside, or the object would have to be covered for the most part. What is outside the image is
+    not found.
+    """
+    places = len(seen.samples_found)
+    whole = seen.share * min(1.0, seen.expected / places) if places else 0.0
+    for share, least, what in (
+        (whole, rule.found_again, f"all of {sought}"),
+        (seen.uncovered, rule.uncovered_again, f"what nothing covers of {sought}"),
+    ):
+        if share < least:
+            return f"{share:.0%} of {what} found; {least:.0%} needed after images without it"
+    return ""
 
 
 def _surprise(belief: Belief, T_camera_target: FloatArray) -> float:

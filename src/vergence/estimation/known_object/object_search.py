@@ -52,12 +52,6 @@ class Fit(NamedTuple):
     expected: int  # places that should be visible
     seen: Measurement
 
-    @property
-    def whole(self) -> float:
-        """Fraction found of all places, those outside the image among them."""
-        places = len(self.seen.samples_found)
-        return self.share * min(1.0, self.expected / places) if places else 0.0
-
 
 class _Template(NamedTuple):
     """The contour at one rotation, drawn on the optical axis."""

@@ -44,6 +44,11 @@ class Measurement(Protocol):
         """Fraction of what should be visible that was found, 0 … 1."""
         ...
 
+    @property
+    def uncovered(self) -> float:
+        """Fraction found of what nothing covers, as far as the image tells, 0 … 1."""
+        ...
+
 
 class ObjectTracker(Protocol):
     """Measures an object near its predicted pose: `EdgeTracker`, `SilhouetteTracker`."""

@@ -72,3 +72,8 @@ class EdgeMeasurement(NamedTuple):
     def share(self) -> float:
         """Fraction of what should be visible that was found, 0 … 1."""
         return self.found / self.expected if self.expected else 0.0
+
+    @property
+    def uncovered(self) -> float:
+        """Fraction found of what nothing covers: of all, since edges do not tell."""
+        return self.share

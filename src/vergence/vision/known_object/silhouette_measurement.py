@@ -18,6 +18,7 @@ class SilhouetteMeasurement(NamedTuple):
     expected: int  # lines across the outline that can be read
     found: int  # of them, where the colours change at the fitted outline
     usual: float  # the same as a share
+    contradicted: int  # lines with the object's colours inside, but no contour at the outline
     samples_px: FloatArray  # (N, 2) the places on the outline
     samples_found: BoolArray  # (N,)
     colors: ColorModel  # of this image, along the lines found
@@ -29,6 +30,11 @@ class SilhouetteMeasurement(NamedTuple):
     def share(self) -> float:
         """How much of what should be seen was found, 0 … 1."""
         return self.found / self.expected if self.expected else 0.0
+
+    @property
+    def uncovered(self) -> float:
+        """How much was found of what nothing covers, 0 … 1."""
+        return self.found / max(self.found + self.contradicted, 1)
 
 
 class SilhouetteMemory(NamedTuple):
@@ -71,6 +77,6 @@ def nothing_found(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
     """Return the measurement of an image without the object."""
     none = np.zeros((0, 2))
     return SilhouetteMeasurement(
-        np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, none,
+        np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, 0, none,
         np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
     )  # fmt: skip

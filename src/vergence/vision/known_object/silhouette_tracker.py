@@ -288,6 +288,7 @@ class SilhouetteTracker:
             expected,
             count,
             count / max(expected, 1),
+            int(np.sum(lines.usable & ~found & (lines.deep_odds > DEEP_ODDS))),
             outline.points_px,
             found,
             self._counted(pixels, outline, learned, covered, _GAP_PX),
