@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vergence.cell import load_cell
 from vergence.cell.schema import Placement
 from vergence.parts import kind_of
 from vergence.simulation import placement_pose, target_pose, target_poses
@@ -81,3 +82,9 @@ def test_a_random_motion_is_its_seeds_own_and_sets_off_from_rest() -> None:
     assert 0.02 < np.abs(one).max() <= 0.2
     soon = positions(MOTIONS[4], np.array([1.0, 1.0 + 1e-4]))
     assert np.linalg.norm(soon[1] - soon[0]) / 1e-4 < 1e-3
+
+
+def test_none_means_the_usual_part() -> None:
+    cell = load_cell("ur5").replace(target={"motion": None}, perception={"filter": None})
+    assert kind_of(cell.target.motion) == "stationary"
+    assert kind_of(cell.perception.filter) == "pose"
