@@ -156,7 +156,7 @@ def checks_of(images: Sequence[Followed]) -> tuple[Check, ...]:
         ),
         Check(
             "region.reasons", "each image without it says why", float(len(images) - len(seen)),
-            "", all(image.reason for image in images if not image.seen),
+            "images", all(image.reason for image in images if not image.seen),
         ),
     ]  # fmt: skip
     for condition in CONDITIONS:
