@@ -177,6 +177,16 @@ def test_axe_finds_nothing_to_complain_of(browser: Browser, scheme: str) -> None
     assert accessibility.complaints(browser, scheme) == []
 
 
+def test_a_narrow_window_shows_the_whole_page(browser: Browser) -> None:
+    browser.resize(390)
+    browser.wait("document.documentElement.scrollWidth", lambda width: width <= 390)
+    choice = "document.getElementById('law-choice')"
+    browser.value(f"{choice}.add(new Option('x'.repeat(80), 'long'))")
+    assert browser.value("document.documentElement.scrollWidth") <= 390
+    browser.value(f"{choice}.remove({choice}.length - 1)")
+    browser.resize(1000)
+
+
 def test_every_control_is_reached_by_the_keyboard_and_has_a_name(browser: Browser) -> None:
     controls = (
         "[...document.querySelectorAll('button, input, select')]"

@@ -190,6 +190,18 @@ class TestKnobs:
         for law in load_cell(name).laws.values() or [load_cell(name).law]:
             assert all(knob["meaning"] for knob in knobs(law))
 
+    def test_each_of_several_objectives_has_its_knobs_under_a_key_that_the_cell_file_takes(
+        self,
+    ) -> None:
+        shown = {knob["key"]: knob for knob in knobs(load_cell("wrist_and_wall").law)}
+        gain = shown["objectives.1.gain"]
+        assert gain["label"] == "image based 1: gain"
+        cell = load_cell("wrist_and_wall")
+        changed = cell.replace(law={"objectives": {"1": {"gain": 0.5}}})
+        assert changed.law == load_cell("wrist_and_wall", {"law.objectives.1.gain": "0.5"}).law
+        now = {knob["key"]: knob["value"] for knob in knobs(changed.law)}
+        assert now == {key: knob["value"] for key, knob in shown.items()} | {gain["key"]: 0.5}
+
     def test_a_weight_has_a_unit(self) -> None:
         cell = load_cell("puma560").replace(law={"solver": "quadratic_program"})
         units = {knob["key"]: knob["unit"] for knob in knobs(cell.law)}

@@ -36,11 +36,18 @@ def with_value(values: Any, keys: list[str], value: Any, place: str) -> Any:
 
 
 def merged_tables(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with changes put in; see `is_whole` for those that replace one."""
+    """Return tables with changes put in; see `is_whole` for those that replace one.
+
+    An element of a list is named by its number, as in `--set law.objectives.0.gain=2`.
+    """
     merged = dict(values)
     for key, change in changes.items():
         old = merged.get(key)
-        if isinstance(change, Mapping) and isinstance(old, dict) and not is_whole(change):
-            change = merged_tables(old, change)
+        if isinstance(change, Mapping) and not is_whole(change):
+            if isinstance(old, dict):
+                change = merged_tables(old, change)
+            elif isinstance(old, list) and set(change) <= {str(n) for n in range(len(old))}:
+                items = {str(n): item for n, item in enumerate(old)}
+                change = list(merged_tables(items, change).values())
         merged[key] = change
     return merged

@@ -9,7 +9,7 @@ import numpy as np
 
 def is_whole(table: Mapping[str, Any]) -> bool:
     """Return whether a table replaces another whole: it names its kind, or a law's objectives."""
-    return "kind" in table or "objectives" in table
+    return "kind" in table or isinstance(table.get("objectives"), list | tuple)
 
 
 def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> str:
@@ -24,7 +24,7 @@ def settings_text(changes: Mapping[str, Any], values: Any, above: str = "") -> s
     """
     text = ""
     for key, change in changes.items():
-        now = values[key]
+        now = values[int(key)] if isinstance(values, list) else values[key]
         if isinstance(change, Mapping) and not is_whole(change):
             text += settings_text(change, now, f"{above}{key}.")
         else:

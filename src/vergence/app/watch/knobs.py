@@ -52,6 +52,12 @@ def knobs(law: Any) -> list[dict[str, Any]]:
     found = []
     if len(law.objectives) == 1:
         found += list(_of_part("", law.objective))
+    else:
+        for number, term in enumerate(law.objectives):
+            what = f"{kind_of(term.objective).replace('_', ' ')} {number}: "
+            for knob in _of_part("", term.objective):
+                key = f"objectives.{number}.{knob['key']}"
+                found.append(knob | {"key": key, "label": what + knob["label"]})
     found += list(_of_part("solver.", law.solver))
     if isinstance(law.solver, QuadraticProgram) and law.limits is not None:
         found += list(_of_part("limits.", law.limits))
