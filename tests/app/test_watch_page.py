@@ -133,6 +133,7 @@ def test_the_view_in_space_shows_the_arm_and_moves_with_the_mouse(browser: Brows
     before = looks[-1].astype(float)
     assert before.std() > 20.0
     outline = browser.value("JSON.stringify(watch.scene.outline)")
+    browser.wait(SHOWN)
     browser.drag(corner, (corner[0] + 80, corner[1] - 20))
     browser.wait("JSON.stringify(watch.scene.outline)", lambda text: text != outline)
     changed = np.abs(browser.image("#stage").astype(float) - before).max(axis=2) > 30
