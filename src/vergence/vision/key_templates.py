@@ -6,7 +6,7 @@ from numba import njit
 from vergence.arrays import FloatArray, ImageArray
 from vergence.vision.alignment import fill_template
 from vergence.vision.pyramid import anchor_of
-from vergence.vision.settled_place import LOST_CORRELATION, fits, settle
+from vergence.vision.settled_place import LOST_CORRELATION, correlation_at, fits, settle
 from vergence.vision.ssd import SAME_PX, make_template, template_in
 from vergence.vision.ssd_surface import blot_out, lowest, ssd_around
 from vergence.vision.tracker_state import (
@@ -31,8 +31,7 @@ REFRESH_STRETCH = 1.2  # a new key template when any direction has stretched or 
 REFRESH_CORRELATION = 0.85  # and the old one is still recognised this well
 PROMISING = 0.3  # smallest correlation before an alignment that makes it worthwhile
 TWIN_RANGE_PX = 48  # within which they are searched for: farther than a point moves and is sought
-PERHAPS_TWIN = 0.6  # correlation at whole pixels from which an alignment is worthwhile
-MOST_TWINS = 100  # positions in the first image that are aligned to find twins
+MOST_TWINS = 100  # positions in the first image that are examined to find twins
 
 
 @njit(cache=True)
@@ -50,21 +49,20 @@ def start_points(image: ImageArray, state: TrackerState) -> None:
 def remember_twins(image: ImageArray, k: int, state: TrackerState) -> None:
     """Find positions in the first image that could be confused with point k.
 
-    They are minima of the SSD at full resolution. Of those that an alignment confirms, the nearest
-    and the likest are kept.
+    They are minima of the SSD at full resolution, however high: its window is wider than what an
+    alignment compares. Of those that an alignment confirms, the nearest and the likest are kept.
     """
     found, place, count = np.empty((MOST_TWINS, 4)), np.empty(COLUMNS + 4), 0
     x, y = state.places[k, 0], state.places[k, 1]
     template = template_in(state.search[k]).full
     surface = ssd_around(image, anchor_of(x), anchor_of(y), template, TWIN_RANGE_PX)
-    limit = 2.0 * (1.0 - PERHAPS_TWIN) * template.size * np.var(template)
     blot_out(surface, TWIN_RANGE_PX, TWIN_RANGE_PX)
     for _ in range(MOST_TWINS):
         row, column = lowest(surface, len(surface), len(surface))
-        if surface[row, column] > limit:
-            break
         blot_out(surface, row, column)
         start_x, start_y = x + column - TWIN_RANGE_PX, y + row - TWIN_RANGE_PX
+        if correlation_at(image, start_x, start_y, k, state) < PROMISING:
+            continue
         settle(image, start_x, start_y, k, state, LOST_CORRELATION, place)
         if place[VERDICT] == FOUND:
             off_x, off_y = place[0] - x, place[1] - y

@@ -31,7 +31,7 @@ from vergence.vision.tracker_state import (
 )
 from vergence.vision.two_by_two import apply2, inverse2
 
-MOST_PLACES = 20  # candidate positions of a point: search, expected, neighbours' motion, twins
+MOST_PLACES = 32  # candidate positions of a point: search, expected, neighbours' motion, twins
 ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
 NEIGHBOURS = 5  # points whose motion decides between look-alikes
 AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
@@ -165,9 +165,8 @@ def settle_all(
             start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
             if nearest(places[:count, :2], start_x, start_y) < SAME_PX:
                 continue
-            if correlation_at(image, start_x, start_y, k, state) >= PROMISING:
-                settle(image, start_x, start_y, k, state, worth_finding(places), places[count])
-                count += places[count, VERDICT] == FOUND
+            settle(image, start_x, start_y, k, state, worth_finding(places), places[count])
+            count += places[count, VERDICT] == FOUND
     return count
 
 

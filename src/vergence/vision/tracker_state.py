@@ -20,7 +20,7 @@ from vergence.vision.pyramid import Patch
 from vergence.vision.ssd import TEMPLATE_SIZE, WORKSPACE_SIZE
 
 KEYS = 16  # key templates kept for each point
-TWINS = 6  # look-alikes of a point that are stored: half of them the nearest, half the likest
+TWINS = 12  # look-alikes of a point that are stored: half of them the nearest, half the likest
 
 FOUND, LEFT, NO_MATCH, ALONE, DISAGREES, DEFORMED, CONTRAST, NO_TEMPLATE, AT_BORDER = range(9)
 # Columns of the kernels' result for each point.
@@ -36,7 +36,7 @@ class TrackerState(NamedTuple):
     parts.
     """
 
-    places: FloatArray  # (M, 20) px where last found; affine 2 × 2 from first image to last; search
+    places: FloatArray  # (M, 32) px where last found; affine 2 × 2 from first image to last; search
     # offset: point less centre of the search template, px; offsets of its twins, first image, px
     search: Patch  # (M, 448) search template
     jacobian: Patch  # (M, K, 8, n) of the key templates
