@@ -16,7 +16,6 @@ from vergence.validation import explain
 C = TypeVar("C", bound=type)
 
 Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 
 
 class Slot(NamedTuple):

@@ -27,7 +27,6 @@ from vergence.camera.pinhole import Camera
 from vergence.errors import InputError
 
 FEWEST_IMAGES = 4
-FEWEST_CORNERS = 6
 MODELS = {  # which distortion coefficients are estimated
     "none": (),
     "k1": ("k1",),

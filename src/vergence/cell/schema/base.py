@@ -12,7 +12,6 @@ Coordinate = Annotated[float, Field(ge=-1e3, le=1e3)]  # m
 Angle = Annotated[float, Field(ge=-3.6e4, le=3.6e4)]  # degrees; also metres of a sliding joint
 Vector3 = tuple[Coordinate, Coordinate, Coordinate]
 Angles3 = tuple[Angle, Angle, Angle]
-Velocity3 = tuple[Coordinate, Coordinate, Coordinate]  # m/s
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]  # m
 Distance = Annotated[float, Field(ge=0, le=1e3)]  # m
 Speed = Annotated[float, Field(ge=1e-6, le=100)]  # m/s
@@ -21,9 +20,6 @@ Time = Annotated[float, Field(ge=0, le=86400)]  # s
 Duration = Annotated[float, Field(ge=1e-3, le=86400)]  # s
 Rate = Annotated[float, Field(ge=1e-2, le=1e4)]  # Hz
 Gain = Annotated[float, Field(ge=1e-4, le=1e3)]  # 1/s, or without a unit
-Weight = Annotated[float, Field(ge=1e-15, le=1e15)]  # of a term that is minimised
-OptionalWeight = Annotated[float, Field(ge=0, le=1e15)]  # 0 leaves the term out
-SingularValue = Annotated[float, Field(ge=0, le=10)]
 Pixels = Annotated[float, Field(ge=0, le=1e4)]
 PixelCoordinate = Annotated[float, Field(ge=-1e5, le=1e5)]
 Point2 = tuple[PixelCoordinate, PixelCoordinate]

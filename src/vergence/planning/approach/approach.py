@@ -6,7 +6,6 @@ import numpy as np
 
 from vergence.estimation.goal_fit import points_in
 from vergence.planning.approach.answers import Answer, Arrived, Told, view_of
-from vergence.planning.approach.arrival import GoalPoints
 from vergence.planning.approach.closing import Closing
 from vergence.planning.approach.finisher import Finisher
 from vergence.planning.approach.goal import ApproachSettings, GoalImage
@@ -91,11 +90,6 @@ class Approach:
     def trajectory(self) -> Trajectory | None:
         """The path being followed."""
         return self._trajectory
-
-    @property
-    def goal_points(self) -> GoalPoints | None:
-        """The photograph's own points."""
-        return self._closing.points
 
     def observe(self, frames: tuple[Frame, ...]) -> Observation | None:
         """Return the tracked points in the images that arrived."""
