@@ -10,27 +10,28 @@ from vergence.cell.schema.base import (
     TaskTable,
     Vector3,
 )
+from vergence.cell.schema.cameras import CameraTable, DepthTable
 from vergence.cell.schema.imaging import ImagingTable
 from vergence.cell.schema.tables import (
-    AdvanceTable,
     ArmTable,
-    CameraTable,
     CollisionTable,
-    DepthTable,
     DriverTable,
-    FollowTable,
-    LengthTable,
     OutputTable,
     PerceptionTable,
-    ReachTable,
     SceneTable,
-    SwitchTable,
     TargetTable,
+)
+from vergence.cell.schema.tag import TagTable
+from vergence.cell.schema.tasks import (
+    AdvanceTable,
+    FollowTable,
+    LengthTable,
+    ReachTable,
+    SwitchTable,
     Task,
     ToolTable,
     TrackTable,
 )
-from vergence.cell.schema.tag import TagTable
 
 __all__ = [
     "AdvanceTable",

@@ -6,12 +6,17 @@ from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstr
 
 from vergence.parts import is_part, written
 
+MOST_JOINTS = 64
+MOST_POINTS = 1000
+
 # Ranges are those of machines: values outside are mistakes of the number or the unit, and would
 # take terabytes or years to simulate.
 Coordinate = Annotated[float, Field(ge=-1e3, le=1e3)]  # m
 Angle = Annotated[float, Field(ge=-3.6e4, le=3.6e4)]  # degrees; also metres of a sliding joint
+HalfTurn = Annotated[float, Field(ge=0, le=180)]  # degrees, however it is turned
 Vector3 = tuple[Coordinate, Coordinate, Coordinate]
 Angles3 = tuple[Angle, Angle, Angle]
+Joints = Annotated[tuple[Angle, ...], Field(max_length=MOST_JOINTS)]
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]  # m
 Distance = Annotated[float, Field(ge=0, le=1e3)]  # m
 Speed = Annotated[float, Field(ge=1e-6, le=100)]  # m/s
@@ -27,9 +32,6 @@ Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 Text = Annotated[str, StringConstraints(max_length=200)]
 # Of what messages speak of. Bounded in the pattern itself it would take ten times as long to load.
 Name = Annotated[str, StringConstraints(pattern=r"^\w[\w .-]*$", max_length=64)]
-
-MOST_JOINTS = 64
-MOST_POINTS = 1000
 
 
 def _written(part: Any) -> Any:
