@@ -47,7 +47,9 @@ def farthest_joint(
         tick: number of earlier set-points.
     """
     recent = memory[1:]
-    recent[tick % len(recent)] = setpoint
+    oldest = recent[tick % len(recent)]
+    for i in range(len(setpoint)):  # a slice assigned would compile its error message as well
+        oldest[i] = setpoint[i]
     worst, joint = 0.0, -1
     for i in range(len(measured)):
         if abs(measured[i] - setpoint[i]) <= memory[0, i]:

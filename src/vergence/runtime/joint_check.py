@@ -37,7 +37,8 @@ def first_implausible(
             return i
         if abs(position[i] - memory[0, i]) > memory[1, i] * elapsed + _NOISE:
             return n + i
-    memory[0] = position
+    for i in range(n):  # a slice assigned would compile its error message: two seconds
+        memory[0, i] = position[i]
     return -1
 
 
