@@ -154,7 +154,7 @@ def _manipulability(trials: list[Trial], x: str, x_label: str) -> Any:
 
 
 def _penalty(trials: list[Trial], x: str, x_label: str) -> Any:
-    drawing, axes = _axes(x_label, "P")
+    drawing, axes = _axes(x_label, "penalty P")
     for trial in trials:
         axes.plot(getattr(trial, x), trial.arm.penalty, **curve(0))
     axes.set_ylim(bottom=0.0)
