@@ -25,3 +25,12 @@ def test_other_levels_are_refused_rather_than_turned_white_or_black(image: np.nd
 def test_a_black_image_is_an_image() -> None:
     grey, _ = grey_image(np.zeros((64, 64)))
     assert grey is not None
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_an_image_is_read_only_and_that_of_the_caller_is_not(kind: type) -> None:
+    image = RAMP.astype(kind)
+    grey, _ = grey_image(image)
+    assert grey is not None
+    assert not grey.flags.writeable
+    assert image.flags.writeable
