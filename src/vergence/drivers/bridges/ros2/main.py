@@ -114,8 +114,9 @@ def _work(wire: Wire, settings: dict[str, Any], topics_of: "type[Topics]") -> No
     wire.send(found)
     if "refused" in found:
         topics.stop()
-        return
-    settings["rate_hz"] = found["rate_hz"]
-    bridge = Bridge(wire, topics, settings)
-    signal.signal(signal.SIGTERM, bridge.stop)
-    bridge.serve()
+    else:
+        settings["rate_hz"] = found["rate_hz"]
+        bridge = Bridge(wire, topics, settings)
+        signal.signal(signal.SIGTERM, bridge.stop)
+        bridge.serve()
+    topics.leave()

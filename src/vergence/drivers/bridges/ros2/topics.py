@@ -34,6 +34,7 @@ _NODE = "vergence_"  # and when it started
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a node that is being discovered
 _STOP_S = 2.0  # for the service that stops the robot
 _INFO_S = 1.0  # for which camera info is waited after the first image
+_LEAVE_S = 1.0  # for the middleware to tell the others
 _STOPPED, _RUNNING = "protective stop", "running"
 
 
@@ -105,6 +106,20 @@ class Topics:
         """Call the service that stops the robot, if there is one and it was started."""
         if (stop := self._settings["stop"]) and (self._started or not self._settings["start"]):
             trigger(self._node, stop, _STOP_S)
+
+    def leave(self) -> None:
+        """Tell all others that this node is gone.
+
+        They would send it images for some 20 s more, and whoever comes next would get none.
+        """
+        leaving = Thread(target=self._leave, daemon=True)
+        leaving.start()
+        leaving.join(_LEAVE_S)
+
+    def _leave(self) -> None:
+        self._executor.shutdown(_LEAVE_S)
+        self._node.destroy_node()
+        rclpy.try_shutdown()
 
     def barred(self) -> str:
         """Return why the arm may not be moved: others move it, or it does not run."""
