@@ -33,6 +33,13 @@ def frozen(
     return array
 
 
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only view of an array, or of a copy where it is not contiguous."""
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
+
+
 def as_floats(
     values: ArrayLike, shape: tuple[int | None, ...] | None = None, name: str = "array"
 ) -> FloatArray:

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from vergence.arrays import BoolArray, DepthArray, FloatArray, ImageArray, frozen
+from vergence.arrays import BoolArray, DepthArray, FloatArray, ImageArray, frozen, read_only
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +34,8 @@ class Frame:
     def __post_init__(self) -> None:
         # Read-only like every value, whoever took the image: kernels are compiled for such once.
         if self.image is not None:
-            image = np.ascontiguousarray(self.image).view()
-            image.flags.writeable = False
-            object.__setattr__(self, "image", image)
+            object.__setattr__(self, "image", read_only(self.image))
         if self.depth_m is not None:
-            depth = np.ascontiguousarray(self.depth_m).view()
-            depth.flags.writeable = False
-            object.__setattr__(self, "depth_m", depth)
+            object.__setattr__(self, "depth_m", read_only(self.depth_m))
         joints = {arm: frozen(position) for arm, position in self.joints.items()}
         object.__setattr__(self, "joints", joints)

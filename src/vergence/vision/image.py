@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vergence.arrays import ImageArray
+from vergence.arrays import ImageArray, read_only
 
 SMALLEST_PX = 24  # side of the aligned patch
 _BRIGHTEST = 300.0  # somewhat above 255, as after sharpening
@@ -25,7 +25,7 @@ def grey_image(image: object) -> tuple[ImageArray | None, str]:
         height, width = array.shape
         return None, f"image smaller than the window: {width} x {height}, {SMALLEST_PX} needed"
     if array.dtype == np.uint8:
-        return _read_only(np.ascontiguousarray(array)), ""
+        return read_only(array), ""
     if array.dtype.kind not in "biuf":
         return None, f"image without grey levels: {array.dtype}"
     if not np.isfinite(array).all():
@@ -33,10 +33,4 @@ def grey_image(image: object) -> tuple[ImageArray | None, str]:
     brightest = float(array.max())
     if brightest > _BRIGHTEST or (array.dtype.kind == "f" and 0.0 < brightest <= 1.0):
         return None, f"image with levels up to {brightest:g}: scale them to 0 … 255"
-    return _read_only(np.clip(np.rint(array), 0, 255).astype(np.uint8)), ""
-
-
-def _read_only(array: ImageArray) -> ImageArray:
-    view = array.view()
-    view.flags.writeable = False
-    return view
+    return read_only(np.clip(np.rint(array), 0, 255).astype(np.uint8)), ""
