@@ -13,17 +13,17 @@ from vergence.assembly.limits_on_plan import (
     PLAN_MARGIN_PX,
     limits_on_plan,
 )
+from vergence.assembly.mounting_of import mounting_of
+from vergence.assembly.objectives_at_start import require_cameras, require_defined
 from vergence.assembly.target_faces import TargetFaces
 from vergence.cell import Cell
 from vergence.cell.schema import ReachTable, TrackTable
 from vergence.control import (
-    CameraMounting,
     CarriedDepth,
     Depth,
     DepthFromCamera,
     DepthFromFeatures,
     HeldDepth,
-    ImageBased,
     Law,
     LawSetting,
     Limits,
@@ -40,7 +40,6 @@ from vergence.control import (
 from vergence.control.depth.from_features import fixes_pose
 from vergence.errors import InputError
 from vergence.features import interaction_matrix_points
-from vergence.geometry import se3_inverse
 from vergence.loading import asking
 from vergence.parts import kind_of
 from vergence.registry import kinds
@@ -59,6 +58,7 @@ def build_law(context: LawContext) -> Law:
     if not isinstance(cell.law, ServoSettings):
         return _own_law(context)
     require_suitable(cell)
+    require_cameras(context)
     try:
         law = _pose_servo(context) if _is_pose(cell.law) else _servo(context)
     except InputError as error:
@@ -124,10 +124,7 @@ def _servo(context: LawContext) -> Servo:
     cell, settings = context.cell, context.cell.law
     names = [context.camera_name]
     names += [name for term in context.terms if (name := term.camera) and name not in names]
-    for name in names:
-        if name not in cell.cameras:
-            raise InputError("law", "objectives", name, ", ".join(cell.cameras))
-    _require_features_made_of_points(context)
+    require_defined(context)
     reaches = isinstance(cell.task, ReachTable)
     depth = _depth(context, names)
     first = context.camera_name
@@ -152,22 +149,6 @@ def _servo(context: LawContext) -> Servo:
             {} if faces is None else {first: faces.faces},
         ),
     )
-
-
-def _require_features_made_of_points(context: LawContext) -> None:
-    """Refuse a visual feature that the points in the first image do not make."""
-    cell = context.cell
-    for term in context.terms:
-        name = term.camera or context.camera_name
-        if not isinstance(term.objective, ImageBased) or name not in context.points_px:
-            continue
-        points_px = context.points_px[name]
-        points = context.cameras[name].normalize(points_px[np.isfinite(points_px).all(axis=1)])
-        try:
-            term.objective.feature(points).value()
-        except InputError as error:
-            given = f"{kind_of(term.objective.feature)} of {error.given}"
-            raise InputError(str(cell.path), "law.feature", given, error.allowed) from None
 
 
 def _depth(context: LawContext, names: list[str]) -> Depth:
@@ -223,20 +204,6 @@ def _pose_servo(context: LawContext) -> PoseServo:
             clearance=context.clearance,
         ),
     )
-
-
-def mounting_of(context: LawContext, name: str) -> CameraMounting:
-    """Return where a camera is: the task's at the arm's tip unless it is fixed."""
-    camera = context.camera(name)
-    fixed = context.T_world_camera(name)
-    if fixed is not None:
-        return CameraMounting(camera, T_world_camera=fixed)
-    if name == context.camera_name:
-        return CameraMounting(camera)
-    q = context.joints[context.cell.task.arm]
-    T_world_tip = context.arm.forward_kinematics(q)
-    T_world_camera = context.arm_to_camera(name).forward_kinematics(q)
-    return CameraMounting(camera, T_tip_camera=se3_inverse(T_world_tip) @ T_world_camera)
 
 
 def _limits(context: LawContext) -> Limits | None:

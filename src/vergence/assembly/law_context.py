@@ -48,6 +48,8 @@ class LawContext:
     followed: dict[str, FollowedPose] = field(default_factory=dict)
     # Whether the points may lie on anything in the cell, so that nothing is known to hide them.
     points_on_anything: bool = False
+    # (M, 2) desired places of the features, by camera name, where the task states them.
+    desired_px: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -91,9 +93,18 @@ class LawContext:
             bodies,
         )
 
-    def with_points(self, points_px: Mapping[str, FloatArray]) -> Self:
-        """Return the context with the features in the first image, (M, 2) by camera name."""
-        return replace(self, points_px=points_px)
+    def with_points(
+        self,
+        points_px: Mapping[str, FloatArray],
+        desired_px: Mapping[str, FloatArray] | None = None,
+    ) -> Self:
+        """Return the context with the features in the first image, and where they are desired.
+
+        Args:
+            points_px: (M, 2) by camera name.
+            desired_px: the same, if the task states it.
+        """
+        return replace(self, points_px=points_px, desired_px=desired_px or {})
 
     @property
     def camera_name(self) -> str:

@@ -1,6 +1,6 @@
 """The servo as a cell file declares it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Self
 
 from vergence.control.depth import Depth
@@ -14,6 +14,7 @@ from vergence.loading import Place, load_part, make_part, part_class
 from vergence.parts import field_names, kind_of, knob, part, slot, table_of
 
 _MOST_OBJECTIVES = 32
+_OF_TERM = ("weight", "camera")  # keys in an objective's table that are not its own
 
 
 @part("term", "term")
@@ -101,7 +102,8 @@ class ServoSettings:
                 _term(item, place.at("objectives").at(str(i))) for i, item in enumerate(listed)
             )
         else:
-            own["objectives"] = (_term(rest, place),)
+            of_law = {*field_names(cls)} - {"objectives"}
+            own["objectives"] = (_term(rest, place, of_law),)
         made: Self = make_part(cls, own, place)
         return made
 
@@ -119,20 +121,26 @@ class ServoSettings:
         return {"objectives": terms, **own}
 
 
-def _term(given: Any, place: Place) -> WeightedObjective:
-    """Return an objective from its table, which also contains its weight and camera."""
+def _term(given: Any, place: Place, of_law: Collection[str] = ()) -> WeightedObjective:
+    """Return an objective from its table, which also contains its weight and camera.
+
+    Args:
+        given: the table, or what stands in its place.
+        place: of it.
+        of_law: keys of the law that may stand in the same table.
+    """
     if isinstance(given, WeightedObjective):
         return given
     if not isinstance(given, Mapping):
         term: WeightedObjective = WeightedObjective(objective=load_part("objective", given, place))
         return term
-    beside = {key: given[key] for key in ("weight", "camera") if key in given}
+    beside = {key: given[key] for key in _OF_TERM if key in given}
     rest = {key: value for key, value in given.items() if key not in beside}
     if "kind" not in rest:
         key = f"{place.key}.kind"
         raise InputError(place.source, key, NOTHING, "a value")
     objective = part_class("objective", rest.pop("kind"), place)
-    known = {*field_names(objective), *field_names(ServoSettings)}
+    known = {*field_names(objective), *_OF_TERM, *of_law}
     for key in rest:
         if key not in known:
             full = f"{place.key}.{key}"
@@ -149,5 +157,5 @@ def _flat(term: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table of a term: that of its objective with weight and camera added."""
     return {
         **term["objective"],
-        **{key: term[key] for key in ("weight", "camera") if key in term},
+        **{key: term[key] for key in _OF_TERM if key in term},
     }

@@ -69,6 +69,16 @@ def moments_of_points(name: str, points: FloatArray) -> CentralMoments:
     return CentralMoments(centre, size, mu, dense=False)
 
 
+def require_same_points(name: str, points: FloatArray, desired: FloatArray) -> None:
+    """Refuse sizes of different numbers of points, which are sums over them.
+
+    Raises:
+        InputError: if there are not as many desired points.
+    """
+    if len(points) != len(desired):
+        raise InputError(name, "desired", f"{len(desired)} points", f"{len(points)}, as here")
+
+
 def moments_of_polygon(name: str, corners: FloatArray) -> CentralMoments:
     """Return the moments of the interior of a polygon, from its corners in order, (M, 2).
 

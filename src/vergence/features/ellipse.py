@@ -37,6 +37,9 @@ class Ellipse(Feature):
         centre, n = self._shape()
         plane = inverse_depth_plane(self.points, self.depth_m)
         near = plane[:2] @ centre + plane[2]
+        if not near > 0.0:
+            given = "depths by which the centre is behind the camera"
+            raise InputError("ellipse", "depth_m", given, "depths of a circle in front of it")
         L = np.empty((5, 6))
         L[:2] = interaction_matrix_points(centre[None], np.array([1.0 / near]))
         for i, (G, c) in enumerate(_fields(centre, plane[:2], near)):

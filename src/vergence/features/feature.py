@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vergence.arrays import FloatArray, frozen
+from vergence.arrays import FloatArray, as_floats, frozen
 from vergence.errors import InputError
 from vergence.features.interaction import depth_interaction, interaction_matrix_points
 
@@ -26,18 +26,22 @@ class Feature(ABC):
         depth_m: (M,).
 
     Raises:
-        InputError: if a depth is not positive, or the number of points does not suit the feature.
+        InputError: if there are no points, one is not finite, a depth is not positive, or the
+            points do not make the feature.
     """
 
     of_curve: ClassVar[bool] = False
 
     def __init__(self, points: ArrayLike, depth_m: ArrayLike = 1.0) -> None:
         self.points = frozen(points, (None, 2), "points")
-        depth = np.asarray(depth_m, dtype=np.float64)
+        if not len(self.points) or not np.isfinite(self.points).all():
+            given = "one that is not finite" if len(self.points) else "none"
+            raise InputError(type(self).__name__, "points", given, "one finite point or more")
+        depth = as_floats(depth_m, name="depth_m")
         self.depth_m = frozen(np.full(len(self.points), depth) if depth.ndim == 0 else depth,
                               (len(self.points),), "depth_m")  # fmt: skip
-        if not (self.depth_m > 0).all():
-            raise InputError(type(self).__name__, "depth_m", depth_m, "positive depths")
+        if not ((self.depth_m > 0) & np.isfinite(self.depth_m)).all():
+            raise InputError(type(self).__name__, "depth_m", depth_m, "positive, finite depths")
 
     @abstractmethod
     def value(self) -> FloatArray:
@@ -62,8 +66,16 @@ class Feature(ABC):
         return np.column_stack(columns)
 
     def error(self, desired: Self) -> FloatArray:
-        """Return e = s - s_star, (k,); features that contain angles wrap them here."""
-        difference: FloatArray = self.value() - desired.value()
+        """Return e = s - s_star, (k,); features that contain angles wrap them here.
+
+        Raises:
+            InputError: if the desired feature has another number of values.
+        """
+        s, s_star = self.value(), desired.value()
+        if s.shape != s_star.shape:
+            given = f"{len(s_star)} values"
+            raise InputError(type(self).__name__, "desired", given, f"{len(s)}, as here")
+        difference: FloatArray = s - s_star
         return difference
 
     def outline(self) -> FloatArray:

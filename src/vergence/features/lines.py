@@ -28,7 +28,7 @@ class Lines(Feature):
 
     def error(self, desired: "Lines") -> FloatArray:
         """Return e = s - s_star, (M,), with differences of θ within half a turn."""
-        difference = self.value() - desired.value()
+        difference = super().error(desired)
         difference[1::2] = wrapped(difference[1::2])
         return difference
 

@@ -18,6 +18,7 @@ from vergence.features._moments import (
     moments_of_points,
     moments_of_polygon,
     orientation,
+    require_same_points,
     tilt_invariants,
 )
 from vergence.features.feature import Feature
@@ -44,17 +45,17 @@ class Moments(Feature):
         """Return s, (7,); α in rad, known up to half a turn."""
         moments = self._moments()
         a_n = 1.0 / np.sqrt(moments.size)
+        turn = orientation(self._name, moments.mu)  # refuses extents that are alike
         tilt = tilt_invariants(moments)
-        turn = orientation(self._name, moments.mu)
         long = _ELONGATION * elongation(moments.mu)
         return np.array([*(moments.centre * a_n), a_n, *tilt, turn, long])
 
     def interaction(self) -> FloatArray:
         """Return L (7, 6): the derivatives of s as the points, or corners, move with the camera."""
         moments = self._moments()
+        orientation(self._name, moments.mu)  # refuses extents that are alike
         rates = self._rates(moments)
         a_n, tilt = 1.0 / np.sqrt(moments.size), tilt_invariants(moments)
-        orientation(self._name, moments.mu)  # refuses extents that are alike
         L = np.empty((7, 6))
         L[2] = -0.5 * a_n / moments.size * rates.size
         L[:2] = a_n * rates.centre + np.outer(moments.centre, L[2])
@@ -65,7 +66,9 @@ class Moments(Feature):
 
     def error(self, desired: "Moments") -> FloatArray:
         """Return e = s - s_star, (7,), with the difference of α within a quarter turn."""
-        difference = self.value() - desired.value()
+        if not self.of_curve:
+            require_same_points(self._name, self.points, desired.points)
+        difference = super().error(desired)
         difference[5:6] = wrapped(difference[5:6], np.pi)
         return difference
 

@@ -27,4 +27,4 @@ class Orientation(Feature):
 
     def error(self, desired: "Orientation") -> FloatArray:
         """Return e = s - s_star, (1,), within a quarter turn."""
-        return wrapped(self.value() - desired.value(), np.pi)
+        return wrapped(super().error(desired), np.pi)

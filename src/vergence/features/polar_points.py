@@ -8,6 +8,8 @@ from vergence.features._angles import wrapped
 from vergence.features.feature import Feature
 from vergence.parts import as_part
 
+_AT_CENTRE = 1e-9  # normalized; far below a pixel
+
 
 @as_part("feature", "polar_points")
 class PolarPoints(Feature):
@@ -20,14 +22,11 @@ class PolarPoints(Feature):
     def value(self) -> FloatArray:
         """Return ρ and θ in turn, (2M,), rad."""
         x, y = self.points.T
-        return np.column_stack((np.hypot(x, y), np.arctan2(y, x))).ravel()
+        return np.column_stack((self._rho(), np.arctan2(y, x))).ravel()
 
     def interaction(self) -> FloatArray:
         """Return L (2M, 6): the rows of the points, along and across the ray from the centre."""
-        L = self.flows()
-        rho = np.hypot(*self.points.T)
-        if not rho.all():
-            raise InputError("polar_points", "points", "one at the centre", "points off it")
+        L, rho = self.flows(), self._rho()
         c, s = self.points.T / rho
         along = c[:, None] * L[:, 0] + s[:, None] * L[:, 1]
         across = (c[:, None] * L[:, 1] - s[:, None] * L[:, 0]) / rho[:, None]
@@ -35,6 +34,12 @@ class PolarPoints(Feature):
 
     def error(self, desired: "PolarPoints") -> FloatArray:
         """Return e = s - s_star, (2M,), with differences of θ within half a turn."""
-        difference = self.value() - desired.value()
+        difference = super().error(desired)
         difference[1::2] = wrapped(difference[1::2])
         return difference
+
+    def _rho(self) -> FloatArray:
+        rho: FloatArray = np.hypot(*self.points.T)
+        if not (rho > _AT_CENTRE).all():
+            raise InputError("polar_points", "points", "one at the image centre", "points off it")
+        return rho

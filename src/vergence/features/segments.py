@@ -37,6 +37,6 @@ class Segments(Feature):
 
     def error(self, desired: "Segments") -> FloatArray:
         """Return e = s - s_star, (2M,), with differences of α within half a turn."""
-        difference = self.value() - desired.value()
+        difference = super().error(desired)
         difference[3::4] = wrapped(difference[3::4])
         return difference

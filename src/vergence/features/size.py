@@ -4,7 +4,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.features._moment_rates import rates_of_points
-from vergence.features._moments import moments_of_points
+from vergence.features._moments import moments_of_points, require_same_points
 from vergence.features.feature import Feature
 from vergence.parts import as_part
 
@@ -19,6 +19,11 @@ class Size(Feature):
     def value(self) -> FloatArray:
         """Return s, (1,)."""
         return np.array([moments_of_points("size", self.points).size ** -0.5])
+
+    def error(self, desired: "Size") -> FloatArray:
+        """Return e = s - s_star, (1,)."""
+        require_same_points("size", self.points, desired.points)
+        return super().error(desired)
 
     def interaction(self) -> FloatArray:
         """Return L (1, 6), by the chain rule from those of the points."""

@@ -9,6 +9,8 @@ from vergence.features.feature import Feature
 from vergence.features.interaction import skew_matrices
 from vergence.parts import as_part
 
+_ROUND = 1e-9  # rad; planes through the camera and a line that differ by less are one
+
 
 @as_part("feature", "vanishing_point")
 class VanishingPoint(Feature):
@@ -28,10 +30,18 @@ class VanishingPoint(Feature):
         planes = np.cross(np.hstack((first, ones)), np.hstack((second, ones)))
         ray = np.cross(*planes)
         length = np.linalg.norm(ray)
-        if not length:
+        if not length > _ROUND * np.prod(np.linalg.norm(planes, axis=1)):
             raise InputError("vanishing_point", "points", "one line twice", "two lines")
-        towards = np.sum((second - first) * (ray[:2] - ray[2] * first))
-        unit: FloatArray = ray / (length if towards > 0.0 else -length)
+        # Seen from each of the four points, it lies ahead on both lines or behind on both.
+        ahead = [
+            np.sum((second - first) * (ray[:2] - ray[2] * end), axis=1) for end in (first, second)
+        ]
+        towards = np.sign(ahead)
+        if abs(towards.sum()) != towards.size:
+            given = "lines in opposite directions, or that cross between their points"
+            allowed = "parallel lines in the same direction"
+            raise InputError("vanishing_point", "points", given, allowed)
+        unit: FloatArray = ray / (towards[0, 0] * length)
         return unit
 
     def interaction(self) -> FloatArray:

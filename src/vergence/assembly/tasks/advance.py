@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.assembly.build_law import mounting_of
 from vergence.assembly.law_context import LawContext
+from vergence.assembly.mounting_of import mounting_of
 from vergence.assembly.parts import Parts
 from vergence.assembly.pose import follow_pose
 from vergence.assembly.started_driver import StartedDriver

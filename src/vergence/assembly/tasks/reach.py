@@ -68,7 +68,7 @@ def reach_parts(
     if faces is not None:
         faces = faces.only(view.inliers)
     pair = pair.only(view.inliers)
-    context = context.with_points({task.camera: pair.points_px})
+    context = context.with_points({task.camera: pair.points_px}, {task.camera: pair.desired_px})
     law = build_law(context)
     plan = _plan(context, task, view, context.joints[task.arm], faces)
     if isinstance(plan, PlanFailure):

@@ -32,6 +32,7 @@ def track_parts(
     points_px, perception = first_points(context, "target", task.camera, driver, images)
     points, tool = {task.camera: points_px}, task.tool
     desired_px = _desired_points(context, "task.desired", task, points_px)
+    desired_points = {task.camera: desired_px}
     depth = None if isinstance(task.desired, str) else desired_depth(context, task, desired_px)
     reference = Reference(0.0, desired_px, desired_depth_m=depth)
     planner = approach_to(context, task, points_px, reference, driver.worker())
@@ -41,9 +42,9 @@ def track_parts(
         points_px, second = first_points(context, "task.tool", tool.camera, driver, images)
         desired = _desired_points(context, "task.tool.desired", tool, points_px)
         planner = FixedReference(replace(reference, elsewhere_px={tool.camera: desired}))
-        points[tool.camera] = points_px
+        points[tool.camera], desired_points[tool.camera] = points_px, desired
         perception = SeveralCameras((perception, second))
-    context = context.with_points(points)
+    context = context.with_points(points, desired_points)
     law = build_law(context)
     return Parts(driver, perception, planner, law, context)
 

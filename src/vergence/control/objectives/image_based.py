@@ -53,7 +53,7 @@ class ImageBased:
         desired = state.desired_points
         assert desired is not None
         desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
-        if self.feature is Points:
+        if self.feature is Points or not len(state.points):
             velocity, weights = state.desired_velocity, state.weights
             result: Quadratic = point_quadratic(
                 self.numbers,
