@@ -62,6 +62,13 @@ def no_file(path: Path) -> str:
     return "a folder" if path.is_dir() else Absent("no such file")
 
 
+def other_file(path: Path) -> str:
+    """Return what is given where a file of another kind is expected."""
+    if not path.is_file():
+        return no_file(path)
+    return f"a file of kind {path.suffix}" if path.suffix else "a file without an ending"
+
+
 def is_track(path: str | Path) -> bool:
     """Whether a folder holds what `vergence track` has written."""
     return (Path(path) / TRACK).is_file()

@@ -13,7 +13,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.errors import NOTHING, InputError, nearest
-from vergence.places import no_file
+from vergence.places import no_file, other_file
 
 KINDS = (".toml", ".json", ".yaml", ".yml")
 _MOST_BYTES = 1_000_000
@@ -49,7 +49,7 @@ def read_tables(path: Path, what: str, kinds: tuple[str, ...]) -> list[dict[str,
     kind = path.suffix.lower()
     if kind not in kinds:
         allowed = f"{what} in a file of kind " + ", ".join(kinds)
-        raise InputError(str(path), "", f"a file of kind {kind or '(none)'}", allowed)
+        raise InputError(str(path), "", other_file(path), allowed)
     text = read_text(path, what)
     tables = _parsed(text, kind, str(path))
     for table in tables:

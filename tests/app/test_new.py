@@ -116,6 +116,26 @@ def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsy
     assert ("no body is named; needed: the last body of the arm; " in said) == (body == "")
 
 
+@pytest.mark.parametrize(
+    ("target", "given"),
+    [
+        ("nofile.obj", "nofile.obj, no such file"),
+        ("shapes", "shapes, a folder"),
+        ("plain", "plain, a file without an ending"),
+        ("wedge.xml", "wedge.xml, a file of kind .xml"),
+    ],
+)
+def test_a_target_that_is_no_mesh_is_refused_with_what_may_be_one(
+    command, capsys: pytest.CaptureFixture[str], target: str, given: str
+) -> None:
+    Path("shapes").mkdir()
+    for file in ("plain", "wedge.xml"):
+        Path(file).write_text("<mujoco/>")
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1], "--target", target) == 2
+    expected = f"vergence new: --target: given {given}; allowed: a mesh: .obj or .stl"
+    assert expected in capsys.readouterr().err
+
+
 def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         draft_cell(tmp_path / "no.urdf", "tool")

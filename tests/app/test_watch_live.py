@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 from steered import NoScene, Steered, wait
 
-from vergence.app.watch.commands import Pause, Reset, TrackPoints, TurnKnob
+from vergence.app.watch.commands import (
+    Grab,
+    Move,
+    Pause,
+    Release,
+    Reset,
+    TrackPoints,
+    TurnKnob,
+)
 from vergence.app.watch.law_editor import LawEditor
 from vergence.app.watch.live import Live
 from vergence.app.watch.protocol import Request
@@ -57,6 +65,36 @@ def test_points_that_cannot_be_tracked_are_refused_and_a_reset_takes_up_the_cell
     assert page.refused == []
     assert run.outcome.kind is OutcomeKind.STOPPED
     assert run.cameras["wrist"].points_px.shape[1] == 1
+
+
+def test_a_run_that_has_ended_refuses_a_drag_and_a_wrong_value_by_its_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vergence.app.watch.live.Scene", NoScene)
+    live = Live(LawEditor("puma560", SMALL, None), False, tmp_path / "run", 0)
+    page = Steered(live)
+
+    def steps() -> None:
+        wait(lambda: live._loop is not None)
+        page.ask(TurnKnob(do="knob", key="Q", value=0.0))
+        page.ask(TurnKnob(do="knob", key="solver.singular_below", value=9.9))
+        wait(lambda: page.status().get("outcome"))
+        page.ask(Grab(do="grab", view="", u=0.0, v=0.0))
+        page.ask(Move(do="move", view="", u=0.1, v=0.0, along=False))
+        page.ask(Release(do="release"))
+        wait(lambda: len(page.refused) == 2)
+
+    def end() -> None:
+        live._again = True
+        wait(lambda: live._loop is not None)
+        live._loop.stop()
+        live._again = False
+
+    page.run(steps, end)
+    assert page.refused == [
+        "law.Q: given 0.0; allowed: greater than 0",
+        "The run has ended; Reset begins another.",
+    ]
 
 
 def test_a_ctrl_c_that_another_thread_takes_ends_the_rest_after_a_run(

@@ -290,7 +290,7 @@ def test_gain_and_law_change_while_it_runs(browser: Browser) -> None:
     browser.key("ArrowUp")
     browser.wait("document.getElementById('settings').textContent", lambda t: "law.gain=3.93" in t)
     browser.wait("document.getElementById('log').children.length", lambda count: count == told + 1)
-    assert browser.value(f"{field}.ariaDescription").endswith("0 to 100 1/s")
+    assert browser.value(f"{field}.ariaDescription").endswith("above 0, up to 100 1/s")
     slider = "document.querySelector('.knob[data-key=gain] [type=range]')"
     browser.wait(f"{slider}.ariaValueText", lambda text: text == "3.93 1/s")
     before = browser.value(TIME)

@@ -164,7 +164,13 @@ class TestKnobs:
         shown = {knob["key"]: knob for knob in knobs(load_cell("eye_to_hand").law)}
         assert shown["gain"]["unit"] == "1/s"
         assert (shown["gain"]["low"], shown["gain"]["high"]) == (0.0, 100.0)
+        assert (shown["gain"]["low_open"], shown["gain"]["high_open"]) == (True, False)
         assert shown["interaction"]["choices"] == ["current", "desired", "mean"]
+
+    def test_an_objective_that_only_supplements_others_is_no_law(self) -> None:
+        choices = law_choices(load_cell("line"))
+        assert "image_based" in choices
+        assert not {"camera_velocity", "posture"} & set(choices)
 
     def test_only_what_acts_is_a_knob(self) -> None:
         keys = {knob["key"] for knob in knobs(load_cell("puma560").law)}

@@ -62,6 +62,20 @@ def test_with_the_goals_velocity_the_filter_keeps_up_and_without_lags_by_its_tim
     assert behind == pytest.approx(twist * 2.0 / OMEGA, rel=0.02, abs=1e-4)
 
 
+@pytest.mark.parametrize("hertz", [0.1, 5.0, 100.0])
+@pytest.mark.parametrize("damping", [0.7, 1.0, 10.0, 100.0])
+def test_no_frequency_or_damping_that_is_allowed_makes_the_filter_diverge(
+    hertz: float, damping: float
+) -> None:
+    rng = np.random.default_rng(3)
+    reference = MovingPose(pose(rng), np.zeros(6))
+    goal = MovingPose(pose(rng), np.zeros(6))
+    first = np.linalg.norm(pose_difference(goal.T, reference.T))
+    for _ in range(2000):
+        reference = interpolate(reference, goal, 2 * np.pi * hertz, damping, DT)
+        assert np.linalg.norm(pose_difference(goal.T, reference.T)) < 1.2 * first
+
+
 def test_the_reference_stays_a_rigid_motion() -> None:
     rng = np.random.default_rng(7)
     reference, _ = settle(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vergence.experiments import CellSource, Trial, TrialResult
 
 
+FAILED = "Why runs failed"
 _MAP_PX = 2.0  # tolerance where the target is at rest, as in a map
 
 
@@ -37,16 +38,6 @@ class Running:
         """Return what features were."""
         return "tracked in rendered images" if self.images else "exact projections"
 
-    @property
-    def motion(self) -> str:
-        """Return how arms moved."""
-        if self.options.physics or self.images:
-            return "arms moved in simulated physics"
-        return (
-            "single-arm, single-camera cells follow commands perfectly; all others run in MuJoCo "
-            "physics"
-        )
-
 
 class Campaign(NamedTuple):
     """What came of a campaign, and how fast."""
@@ -58,6 +49,12 @@ class Campaign(NamedTuple):
     def made_in(self) -> dict[str, int]:
         """How many runs were made in what: "kernel", "loop" or "physics"."""
         return dict(Counter(made for result in self.results if (made := result.made_in)))
+
+    @property
+    def motion(self) -> str:
+        """Return how arms moved."""
+        physics = "physics" in self.made_in
+        return "arms move in simulated physics" if physics else "the arm follows commands exactly"
 
     @property
     def in_words(self) -> str:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from vergence.app import markup
 from vergence.app.campaign import (
+    FAILED,
     Running,
     html_table,
     names_in,
@@ -45,7 +46,7 @@ def compare(options: "CompareOptions") -> int:
     found = Comparison(campaign.results)
     data = write_table(how.folder / "compare.csv", found.runs)
     remark = _REMARK.format(
-        drawn=", ".join(sampling.vary), features=how.features, motion=how.motion
+        drawn=", ".join(sampling.vary), features=how.features, motion=campaign.motion
     )
     report = _write_page(source, found, how, remark)
     if options.as_json:
@@ -107,8 +108,9 @@ def _write_page(
         markup.section(
             "Result",
             tables,
-            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end. Time "
-            f"until then and the camera's path are medians over the runs that converged.{lag}</p>",
+            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end; off goal: "
+            f"farther away. Time until then and the camera's path are medians over the runs that "
+            f"converged.{lag}</p>",
             markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),
         markup.section(
@@ -120,7 +122,7 @@ def _write_page(
                 "in the image, with a cross at its goal.",
             ),
         ),
-        markup.section("Why", reasons_table(found.runs, "{law}, start {start}")),
+        markup.section(FAILED, reasons_table(found.runs, "{law}, start {start}")),
     ]
     laws, starts = len(found.scores), found.scores[0].trials
     title = f"{cell.name}: {laws} law{'s' * (laws > 1)} from {starts} start{'s' * (starts > 1)}"

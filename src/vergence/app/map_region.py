@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from vergence.app import markup
 from vergence.app.campaign import (
+    FAILED,
+    Campaign,
     Running,
     html_table,
     names_in,
@@ -47,7 +49,7 @@ def map_region(options: "MapOptions") -> int:
     campaign = run(source, _trials(cell, region), how)
     results = campaign.results
     data = write_table(how.folder / "map.csv", results)
-    report, image = _write_page(cell, region, results, how)
+    report, image = _write_page(cell, region, campaign, how)
     found = scores(results)
     if options.as_json:
         answer = {"command": "map", "cell": cell.name, "over": region.over}
@@ -99,26 +101,29 @@ def _trials(cell: "Cell", region: Region) -> "list[Trial]":
 
 
 def _write_page(
-    cell: "Cell", region: Region, results: "Sequence[TrialResult]", how: Running
+    cell: "Cell", region: Region, campaign: "Campaign", how: Running
 ) -> "tuple[Path, Path]":
     from vergence.drawing import save
-    from vergence.experiments import OWN, scores
+    from vergence.experiments import OWN, Ending, scores
 
+    results = campaign.results
     panels, caption, name = _image(cell, region, results)
     image = how.folder / "map.png"
     save(panels.figure, image)
-    rows = [[score.law, _in_words(score)] for score in scores(results)]
+    found = scores(results)
+    endings = [ending for ending in Ending if any(score.count(ending) for score in found)]
+    rows = [[s.law, str(s.trials), *(str(s.count(ending)) for ending in endings)] for s in found]
     parts = [
         markup.section("Where it works", markup.figure(panels, caption)),
-        markup.section("Endings", html_table(("law", "endings"), rows)),
-        markup.section("Why", reasons_table(results, name)),
+        markup.section("Endings", html_table(("law", "runs", *endings), rows)),
+        markup.section(FAILED, reasons_table(results, name)),
     ]
     laws = ["its own law" if law == OWN else law for law in region.laws]
     verb = "does" if len(laws) == 1 else "do"
     title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
-        f"{len(results)} runs; features are {how.features}; {how.motion}; converged: every "
-        f"feature within {how.tolerance_px:g} px at the end."
+        f"{len(results)} runs; features are {how.features}; {campaign.motion}. Converged: every "
+        f"feature within {how.tolerance_px:g} px at the end; off goal: farther away."
     )
     return write_page(how.folder, "vergence map", title, remark, parts), image
 
@@ -131,10 +136,10 @@ def _image(
 
     if region.over == "headings":
         caption = (
-            "Distance in m that the target moved in each direction, for each speed; the colour "
-            "shows how the run ended."
+            "How far (m) the target moved over the floor before the run ended, in each direction: "
+            "x is 0°, y is 90°. The colour shows how the run ended."
         )
-        return headings_figure(results), caption, "{law}, {heading_deg:g}° at {speed_m_s:g} m/s"
+        return headings_figure(results), caption, "{law}, {heading_deg:.0f}° at {speed_m_s:g} m/s"
     bases = {
         name: (
             arm.position_m[0] - cell.target.position_m[0],

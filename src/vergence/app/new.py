@@ -13,7 +13,7 @@ import numpy as np
 
 from vergence.app.output import SUCCESS, emit, say
 from vergence.errors import InputError
-from vergence.places import CELL
+from vergence.places import CELL, other_file
 from vergence.registry import kinds
 
 if TYPE_CHECKING:
@@ -210,9 +210,9 @@ class _Target:
         """
         from vergence.vision.known_object import load_object_model
 
-        if path.suffix.lower() not in (".obj", ".stl"):
-            kind = path.suffix or "(none)"
-            raise InputError("--target", "", f"a file of kind {kind}", "a mesh: .obj or .stl")
+        if path.suffix.lower() not in (".obj", ".stl") or not path.is_file():
+            given = f"{path}, {other_file(path)}"
+            raise InputError("vergence new", "--target", given, "a mesh: .obj or .stl")
         vertices = load_object_model(path, scale).vertices
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         return cls(path, scale, (low + high) / 2, 0.5 * float((high - low)[:2].max()))

@@ -60,12 +60,12 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
         ),
         "joints": (
             plan_joints_figure(trajectory),
-            "Joints against their limits at −1 and 1, and their rates.",
+            "Joint positions and rates, as shares of their ranges and limits; limits are at ±1.",
         ),
         "space": (
             plan_space_figure(path),
-            "The camera's path; strokes show its viewing direction. The scale follows from "
-            "the assumed distance d*.",
+            "The camera's path; strokes show its viewing direction. The scale is as the task has "
+            "it: from the target's model, task.distance_m or task.length.",
         ),
     }
     figures = []

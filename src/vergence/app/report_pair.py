@@ -6,6 +6,7 @@ from pathlib import Path
 
 from vergence.app import markup
 from vergence.app.figures.pair import arms_chart, errors_chart
+from vergence.app.marks_legend import marks_legend
 from vergence.app.recorded_images import camera_images
 from vergence.app.report import page_at
 from vergence.app.robot_film import robot_film
@@ -115,11 +116,16 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
     lines = []
     for name in names:
         cells = [own.get(name, Row(name, "–")) for own in by_name]
-        numbers = "".join(f'<td class="number">{escape(cell.value)}</td>' for cell in cells)
+        notes = {cell.note for cell in cells if cell.note}
+        shared = _note(notes.pop()) if len(notes) == 1 else ""
+        numbers = "".join(
+            f'<td class="number">{escape(cell.value)}{"" if shared else _note(cell.note)}</td>'
+            for cell in cells
+        )
         unit = next((cell.unit for cell in cells if cell.unit), "")
         lines.append(
-            f'<tr><th scope="row">{escape(name)}</th>{numbers}<td class="unit">{escape(unit)}</td>'
-            "</tr>"
+            f'<tr><th scope="row">{escape(name)}{shared}</th>{numbers}'
+            f'<td class="unit">{escape(unit)}</td></tr>'
         )
     body = "\n".join(lines)
     return (
@@ -127,6 +133,10 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
         f"<thead><tr><td></td>{heading}<td></td></tr></thead>"
         f"<tbody>{body}</tbody></table>"
     )
+
+
+def _note(text: str) -> str:
+    return f'<span class="note">{escape(text)}</span>' if text else ""
 
 
 def _robot(runs: Runs) -> str:
@@ -140,7 +150,11 @@ def _robot(runs: Runs) -> str:
 
 def _camera(runs: Runs, name: str) -> str:
     films = [
-        markup.film(camera_images(run, name).film, f"{name}, {label}", escape(label))
+        markup.film(
+            camera_images(run, name).film,
+            f"{name}, {label}",
+            f"{escape(label)}{marks_legend(run.cameras[name])}",
+        )
         for label, run in runs.items()
     ]
     traces = {label: run.cameras[name] for label, run in runs.items()}

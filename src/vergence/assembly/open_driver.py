@@ -23,9 +23,8 @@ def open_driver(cell: Cell, named: str, *, mounted_as_told: bool = True) -> Driv
     Args:
         cell: whose arms and cameras it drives; its table `[driver]` has the settings, if it is of
             the same kind.
-        named: ``NAME``, or ``module:Class`` of a user's own in a file beside the cell, in this
-        folder
-            or in an installed package; with ``:ADDRESS`` behind it where the driver takes one.
+        named: ``NAME``, or ``module:Class`` of your own in a file beside the cell, in the current
+            folder or in an installed package; followed by ``:ADDRESS`` if the driver takes one.
         mounted_as_told: whether cameras have to be mounted as the robot says, if it says.
 
     Raises:

@@ -57,7 +57,7 @@ class Replanner:
         """Replan, unless that has been done too often.
 
         Args:
-            time: s.
+            time: now, s.
             points_px: positions of the features, (M, 2).
             q: joint positions, (n,).
         """

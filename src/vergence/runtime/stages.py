@@ -48,7 +48,7 @@ class PlansAgain(Protocol):
         """Receive the information that the arm is at rest away from its goal.
 
         Args:
-            time: s.
+            time: now, s.
             points_px: positions of the features, (M, 2).
             q: joint positions, (n,).
         """

@@ -33,7 +33,7 @@ def near_distances(
         data: with kinematics.
         geoms: both shapes of each pair, (P, 2).
         radius: of the ball around each shape, (G,), m; -1 for a plane.
-        near_m: m.
+        near_m: farther distances are not computed, m.
 
     Returns:
         Which pairs, (K,); their nearest points in the world, (K, 6), m; their distances, (K,), m.

@@ -13,6 +13,11 @@ from vergence.app.report import REPORT
 from vergence.app.table import Row
 from vergence.camera.calibration import coverage
 
+_LENS = (
+    "fx, fy: focal lengths; cx, cy: principal point, from the centre of the top left pixel; k1, "
+    "k2, k3: radial distortion; p1, p2: tangential distortion."
+)
+_MOUNTING = " x, y, z, roll, pitch, yaw: pose of the camera in {mount}."
 _ASSUMES = (
     "Deviations are standard deviations from the normal equations. They assume that the errors of "
     "corners are independent and as large as the residuals, that the board is flat and has the "
@@ -27,7 +32,7 @@ def write_calibration_page(folder: Path, name: str, found: Calibration) -> Path:
     """Write a page that needs nothing but itself into a folder; return where it is."""
     parts = [
         _header(name, found),
-        markup.section("Result", _result(found), f"<p>{escape(_ASSUMES)}</p>"),
+        markup.section("Result", _result(found), *_explained(found)),
         markup.section("How well it fits", markup.cards(_numbers(found))),
         markup.section("Left out", _left_out(found)),
         markup.section("Residuals", *_figures(found)),
@@ -65,6 +70,14 @@ def _result(found: Calibration) -> str:
     head += f'<th scope="col">{heads[-1]}</th>'
     rows = "\n".join(_row(e, found.truth is not None) for e in found.estimates)
     return f"<table><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>"
+
+
+def _explained(found: Calibration) -> list[str]:
+    names = _LENS
+    if found.mounting is not None:
+        mount = "the arm's base" if found.mounting.fixed else "the arm's flange"
+        names += _MOUNTING.format(mount=mount)
+    return [f"<p>{escape(text)}</p>" for text in (names, _ASSUMES)]
 
 
 def _row(e: Estimate, truth: bool) -> str:
@@ -134,9 +147,9 @@ def _figures(found: Calibration) -> list[str]:
     figures = [
         markup.figure(
             residual_field_figure(lens.camera, lens.sightings, lens.residuals),
-            "Where corners were found, and by what they miss the fit of the lens. Arrows that "
-            "agree with their neighbours show a lens that the model does not describe, or a bent "
-            "board.",
+            "Where corners were found, and how far each is from where the fitted lens puts it. "
+            "Arrows that agree with their neighbours show a lens that the model does not describe, "
+            "or a bent board.",
         ),
         markup.figure(
             residual_bars_figure(lens.sightings, lens.residuals, lens.left_out_px),

@@ -13,6 +13,7 @@ from vergence.camera.grey_levels import color_levels, grey_levels, grey_values, 
 from vergence.camera.image_file import image_files, require_size
 from vergence.camera.image_folder import leveled_images, require_like
 from vergence.errors import Absent, InputError
+from vergence.places import other_file
 from vergence.runtime.bags import COMPRESSED, IMAGE, Bag, is_bag
 
 VIDEOS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
@@ -94,7 +95,7 @@ def open_footage(
         )
     if where.suffix.lower() not in VIDEOS:
         allowed = "a folder of images, or a video: " + ", ".join(VIDEOS)
-        raise InputError(str(path), "", f"a file of kind {where.suffix or '(none)'}", allowed)
+        raise InputError(str(path), "", other_file(where), allowed)
     return _open_video(where, rate_hz)
 
 

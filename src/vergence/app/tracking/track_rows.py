@@ -65,7 +65,9 @@ def pose_rows(record: TrackRecord, pose: TrackedPose) -> list[Row]:
     place, turn = 1e3 * deviations[seen, :3].max(), np.degrees(deviations[seen, 3:].max())
     note = "standard deviation along the least certain axis, where it was seen"
     rows.append(Row("largest σ of the position", _rounded(place, place), "mm", note))
-    rows.append(Row("largest σ of the rotation", _rounded(turn, turn), "°", "likewise"))
+    rows.append(
+        Row("largest σ of the rotation", _rounded(turn, turn), "°", note.replace("along", "about"))
+    )
     return rows
 
 

@@ -10,12 +10,11 @@ from vergence.control import PositionBased, QuadraticProgram, ServoSettings
 from vergence.errors import InputError
 from vergence.field_comments import field_comments
 from vergence.parts import is_part, kind_of, written
-from vergence.registry import kinds
+from vergence.registry import find, kinds
 
 # Of the servo, beside the numbers of its parts: those that act in a task with a filter, and the
 # others, which act on features in the image.
 _ALWAYS = ("feed_forward", "prediction")
-_ALONE_IDLE = ("camera_velocity", "posture")  # objectives that do nothing by themselves
 _UNITS = ("_m_s", "_rad_s", "_deg_s", "_hz", "_deg", "_px", "_m", "_s")  # endings of keys
 _ON_FEATURES = (*_ALWAYS, "flow_smoothing_s", "depth_m")
 
@@ -119,23 +118,26 @@ def _label(key: str, unit: str) -> str:
     return key.removesuffix(ending).replace("_", " ").replace(".", ": ")
 
 
-def _range(about: Any) -> dict[str, float]:
-    """Return the lowest and the highest value that a field takes as a number."""
-    found = {}
+def _range(about: Any) -> dict[str, float | bool]:
+    """Return the ends of a field's range as a number, and which of them do not belong to it."""
+    found: dict[str, float | bool] = {}
     options = (getattr(option, "__metadata__", ()) for option in get_args(about.annotation))
     inside = [bound for option in options for each in option for bound in each.metadata]
     for bound in (*about.metadata, *inside):
         for name, end in (("gt", "low"), ("ge", "low"), ("lt", "high"), ("le", "high")):
             if (value := getattr(bound, name, None)) is not None:
                 found[end] = float(value)
+                found[f"{end}_open"] = name in ("gt", "lt")
     return found
 
 
 def _suits(cell: Cell, kind: str) -> bool:
     """Whether a cell takes an objective with the numbers it has by itself."""
-    if (kind == "position_based") != (cell.task.kind == "follow") or kind in _ALONE_IDLE:
+    if (kind == "position_based") != (cell.task.kind == "follow"):
         return False
     try:
+        if getattr(find("objective", kind), "supplements", False):
+            return False
         cell.replace(law={"kind": kind})
     except InputError:
         return False

@@ -12,7 +12,7 @@ from vergence.assembly.tasks.photograph import is_by_photograph, without_target_
 from vergence.cell import Cell, load_cell
 from vergence.cell.toml_text import setting
 from vergence.control import Law, Servo
-from vergence.errors import InputError, nearest
+from vergence.errors import InputError, KeyConflict, nearest
 
 _BY_LAW = ("track", "reach", "follow")  # kinds of task that go by the law of the cell file
 
@@ -189,8 +189,14 @@ class LawEditor:
         self.begin_task(0)
 
     def _change(self, changed: dict[str, str], context: LawContext) -> Law:
-        cell = _with(self._base, changed)
-        law = self._law_of(cell, context)
+        try:
+            cell = _with(self._base, changed)
+            law = self._law_of(cell, context)
+        except KeyConflict:
+            raise
+        except InputError as error:  # the page says "law", not in which file on which disk
+            where = error.key or error.source
+            raise InputError(where, "", error.given, error.allowed) from None
         self.cell, self._changed = cell, changed
         return law
 

@@ -37,7 +37,7 @@ from vergence.app.watch.watched_driver import WatchedDriver
 from vergence.assembly import LawContext, Parts, run_driver
 from vergence.assembly.started_driver import StartedDriver
 from vergence.control import Law
-from vergence.errors import Absent, InputError
+from vergence.errors import Absent, InputError, VergenceError
 from vergence.runtime import Loop, Recorder, Run
 from vergence.signals import Frame, Outcome, OutcomeKind
 
@@ -251,6 +251,10 @@ class Live:
                 self._change_law(lambda context: self._editor.choose(name, context))
             case TurnKnob(key=key, value=value):
                 self._change_law(lambda context: self._editor.turn(key, value, context))
+            case Move() | Release() if self._loop is None:
+                pass  # of a drag that was refused, or that the end of the run interrupted
+            case Grab() | LetGo() if self._loop is None:
+                raise VergenceError("The run has ended; Reset begins another.")
             case _ if self._driver.world.target_is_free():
                 self._move_target(command)
 

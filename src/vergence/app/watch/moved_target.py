@@ -3,7 +3,7 @@
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.geometry import so3_exp
+from vergence.geometry import moved_pose
 from vergence.simulation import TargetPose
 
 _TIME_CONSTANT_S = 0.08  # of the target behind the mouse
@@ -40,9 +40,8 @@ class MovedTarget:
             self._own_time += dt
         self._shift_now += _step(self.shift_m - self._shift_now, dt, _FASTEST_M_S)
         self._turn_now += _step(self.turn_rad - self._turn_now, dt, _FASTEST_RAD_S)
-        T = self._own(self._own_time).copy()
-        T[:3, 3] += self._shift_now
-        T[:3, :3] = so3_exp(self._turn_now) @ T[:3, :3]
+        step = np.concatenate((self._shift_now, self._turn_now))
+        T: FloatArray = moved_pose(self._own(self._own_time), step)
         return T
 
 

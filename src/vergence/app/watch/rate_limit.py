@@ -10,7 +10,7 @@ class RateLimit:
     Args:
         rate_hz: messages a second in the long run.
         burst: messages that may come at once.
-        clock: s.
+        clock: returns the time, s.
     """
 
     def __init__(self, rate_hz: float, burst: int, clock: Callable[[], float] = monotonic) -> None:

@@ -17,6 +17,8 @@ class CameraVelocity:
     place, the camera moves along that line.
     """
 
+    supplements = True  # other objectives; alone it serves no task
+
     # Velocity along x, y, z.
     linear_m_s: tuple[float, ...] = knob((0.0, 0.0, 0.0), "m/s", live=False)
 

@@ -41,8 +41,10 @@ class ImageBased:
     Points are weighted by their measurement accuracy; other features use all points equally.
     """
 
-    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
-    interaction: InteractionModel = knob("mean")  # where L is evaluated
+    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    gain: Gain = knob(1.0, "1/s")
+    # Points at which the interaction matrix L is evaluated; mean: that of both.
+    interaction: InteractionModel = knob("mean")
     # Feature computed from the image points.
     feature: type[Feature] = slot("feature", Points, by_class=True)
     # Damping of the twist, for directions that the features do not determine.

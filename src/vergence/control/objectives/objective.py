@@ -119,7 +119,10 @@ def state_of(features: Points, desired: Points) -> CameraState:
 
 @runtime_checkable
 class Objective(Protocol):
-    """What the camera, or the arm, should do."""
+    """What the camera, or the arm, should do.
+
+    A class attribute `supplements = True` marks one that only adds to others, such as a posture.
+    """
 
     def quadratic(self, state: CameraState) -> Quadratic | JointQuadratic:
         """Return the quadratic for this tick."""

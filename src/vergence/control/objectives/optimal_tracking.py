@@ -64,11 +64,11 @@ class OptimalTracking:
     )
     # Weight of 1/w', where w' is the penalised manipulability.
     S: float = knob(0.0, "cost × w′", least=0, upto=1e3, needs="avoidance_axes")
-    # Penalty for joint limits: eq. (27), or per joint.
+    # Penalty for joint limits: [Nelson1995] eq. (27), or per joint.
     penalty: Literal["product", "per_joint"] = knob("product", needs="S")
-    # Measure of manipulability: eq. (26), or eq. (24), with |det J| in place of its square.
+    # Manipulability: [Nelson1995] eq. (26), or eq. (24) with |det J| in place of its square.
     measure: Literal["squared", "absolute"] = knob("squared", needs="S")
-    # Steepness k of the penalty in eq. (27).
+    # Steepness k of the penalty.
     penalty_k: float = knob(1e5, above=0, upto=1e9, needs="S")
     # Highest camera speed for avoidance.
     avoidance_speed_max_m_s: float = knob(0.5, "m/s", above=0, upto=10, needs="S")

@@ -27,7 +27,8 @@ class PointPose:
     it is the law of [Malis1999], "2½D".
     """
 
-    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
+    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    gain: Gain = knob(1.0, "1/s")
     # Camera axes that it controls; it leaves the others to other objectives.
     axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(AXES)
 

@@ -16,7 +16,10 @@ class Posture:
     With the pseudo-inverse it acts in the null space of the other objectives.
     """
 
-    gain: Gain = knob(1.0, "1/s")  # λ; a number, or a table of near, far and slope
+    supplements = True  # other objectives; alone it serves no task
+
+    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    gain: Gain = knob(1.0, "1/s")
     # Desired joint positions, rad or m; the middle of each range if absent.
     position: tuple[float, ...] | None = knob(None)
     strength: float = knob(1e-4, above=0, upto=1e3)  # weight

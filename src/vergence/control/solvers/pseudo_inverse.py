@@ -49,7 +49,8 @@ class PseudoInverse:
     Ends the run near a singularity.
     """
 
-    singular_below: float = knob(0.02, least=0, upto=10)  # smallest singular value of J
+    # Smallest singular value of the Jacobian at which the arm still moves.
+    singular_below: float = knob(0.02, least=0, upto=10)
 
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm."""

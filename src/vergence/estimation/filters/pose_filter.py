@@ -160,7 +160,7 @@ class PoseFilter:
         """Return the belief to start from.
 
         Args:
-            time: s.
+            time: of the pose, s.
             T_world_target: a rough pose, (4, 4).
             velocity: (v, ω) along world axes, (6,); zero by default.
             covariance: of (δp, δθ, δv, δω), (12, 12), symmetric and at least semidefinite; by

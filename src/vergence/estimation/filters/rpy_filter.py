@@ -105,7 +105,7 @@ class RpyPoseFilter:
         """Return the initial belief, at rest or with a twist (v, ω).
 
         Args:
-            time: s.
+            time: of the pose, s.
             T_world_target: a rough pose, (4, 4).
             velocity: (v, ω) along world axes, (6,); zero by default.
             covariance: of (δp, δθ, δv, δω), world axes, (12, 12); by default 3 cm, 0.1 rad, 0.2

@@ -8,7 +8,7 @@ import numpy as np
 
 from vergence.arrays import FloatArray, IntArray
 from vergence.errors import Absent, InputError
-from vergence.places import no_file
+from vergence.places import no_file, other_file
 from vergence.vision.known_object.object_model import SHARP_RAD, ObjectModel
 from vergence.vision.known_object.primitives import box, capsule, cylinder, ellipsoid
 
@@ -37,7 +37,7 @@ def load_object_model(
     kind = file.suffix.lower()
     if kind not in MESHES + SCENES:
         allowed = "an object model: " + ", ".join(MESHES + SCENES)
-        raise InputError(str(path), "", f"a file of kind {kind or '(none)'}", allowed)
+        raise InputError(str(path), "", other_file(file), allowed)
     if not file.is_file():
         raise InputError(str(path), "", no_file(file), "an OBJ, STL or MJCF file that exists")
     if not (np.isfinite(scale) and scale > 0.0):

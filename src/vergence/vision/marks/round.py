@@ -260,7 +260,7 @@ def circle_centre_bias(
         camera: the camera's model.
         centre: of the circle, camera frame, (3,), m.
         normal: of its plane, camera frame, (3,).
-        radius: m.
+        radius: of the mark, m.
     """
     n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
     a = np.cross(n, [1.0, 0.0, 0.0] if abs(n[0]) < 0.9 else [0.0, 1.0, 0.0])

@@ -75,7 +75,6 @@ export class Law {
     const row = document.createElement("div");
     row.className = `knob ${knob.kind}`;
     row.dataset.key = knob.key;
-    row.title = knob.meaning;
     const name = document.createElement("label");
     name.textContent = knob.label;
     /** @type {Turn} */
@@ -84,7 +83,9 @@ export class Law {
     const { field, beside = [], below = [] } = make.call(this, knob, turn);
     field.id = name.htmlFor = `knob ${knob.key}`.replace(" ", "-");
     field.ariaDescription = [knob.meaning, knob.kind === "number" ? range(knob) : ""].filter(Boolean).join("; ");
-    row.append(name, field, ...beside, this.undo(knob, turn), ...below);
+    const meaning = text("meaning", knob.meaning);
+    meaning.ariaHidden = "true"; // it is in the field's description
+    row.append(name, field, ...beside, this.undo(knob, turn), ...below, meaning);
     return row;
   }
 
@@ -123,7 +124,7 @@ export class Law {
       if (!(event.key in ARROWS)) return;
       event.preventDefault();
       const next = rounded(Number(field.value) * 10 ** ARROWS[event.key]);
-      field.value = short(Math.min(next, knob.high ?? next));
+      field.value = short(Math.min(next, highest(knob)));
       turn(Number(field.value));
     });
     /** @type {number} */
@@ -135,10 +136,10 @@ export class Law {
     const slider = document.createElement("input");
     slider.type = "range";
     slider.min = String(-DECADES);
-    slider.max = String(Math.min(DECADES, Math.log10((knob.high ?? Infinity) / middle)));
+    slider.max = String(Math.min(DECADES, Math.log10(highest(knob) / middle)));
     slider.step = "0.01";
     slider.ariaLabel = knob.label;
-    const chosen = () => rounded(Math.min(middle * 10 ** Number(slider.value), knob.high ?? Infinity));
+    const chosen = () => rounded(Math.min(middle * 10 ** Number(slider.value), highest(knob)));
     /** @param {number} value */
     const say = (value) => { slider.ariaValueText = `${short(value)} ${knob.unit}`.trim(); };
     slider.addEventListener("input", () => { field.value = short(chosen()); say(chosen()); });
@@ -195,12 +196,17 @@ function command(settings) {
  * Says between which values a number may be.
  * @param {KnobAbout} knob
  */
-function range({ low, high, unit }) {
-  const ends = low !== undefined && high !== undefined
-    ? [`${short(low)} to ${short(high)}`]
-    : [low !== undefined ? `from ${short(low)}` : "", high !== undefined ? `up to ${short(high)}` : ""];
-  return [...ends, unit].filter(Boolean).join(" ");
+function range({ low, high, low_open, high_open, unit }) {
+  const from = low === undefined ? "" : `${low_open ? "above" : "from"} ${short(low)}`;
+  const to = high === undefined ? "" : `${high_open ? "below" : "up to"} ${short(high)}`;
+  return [[from, to].filter(Boolean).join(", "), unit].filter(Boolean).join(" ");
 }
+
+/**
+ * The highest value of a number's range that a slider gives.
+ * @param {KnobAbout} knob
+ */
+function highest({ high = Infinity, high_open }) { return high_open ? 0.99 * high : high; }
 
 /**
  * @param {string} kind

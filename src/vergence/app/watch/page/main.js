@@ -83,10 +83,11 @@ function limits({ limits: now }) {
 }
 
 /**
- * While the mouse has stopped the target's own motion, offers to let it go on.
+ * While the mouse has stopped the target's own motion, offers to let it go on; after the run nothing moves.
  * @param {Status} status
  */
-function loose({ held }) {
+function loose({ held, outcome }) {
+  element("drag-hint").hidden = Boolean(outcome);
   const button = document.getElementById("let-go");
   if (!held) { button?.remove(); return; }
   if (button) return;

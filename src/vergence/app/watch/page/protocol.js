@@ -39,6 +39,8 @@
  * @property {any} own  what the law has by itself
  * @property {number} [low]  of a number's range
  * @property {number} [high]
+ * @property {boolean} [low_open]  whether the end itself is outside the range
+ * @property {boolean} [high_open]
  * @property {string[]} [choices]
  *
  * @typedef {{ choices: string[], choice: string, knobs: KnobAbout[], settings: string[] }} LawStatus

@@ -34,7 +34,8 @@ export class Transport {
     document.addEventListener("keydown", (event) => {
       if (event.key !== " " || event.defaultPrevented || (event.target instanceof Element && event.target.matches("input, select, button"))) return;
       event.preventDefault();
-      this.toggle();
+      const button = this.robot ? this.stop : this.pause;
+      if (!button.disabled) this.toggle();
     });
   }
 
@@ -56,7 +57,7 @@ export class Transport {
 
   /** @param {boolean} open */
   connected(open) {
-    if (!open) this.mark("not connected", "plain", "vergence does not answer");
+    if (!open) this.mark("not connected", "plain", "vergence has ended or does not answer; this page connects again by itself");
   }
 
   /** @param {number} waited_ms  since something came from vergence */
