@@ -125,6 +125,8 @@ def _write_page(
         f"{len(results)} runs; features are {how.features}; {campaign.motion}. Converged: every "
         f"feature within {how.tolerance_px:g} px at the end; off goal: farther away."
     )
+    if OWN in region.laws:
+        remark += f" “{OWN}” is the law in the cell file."
     return write_page(how.folder, "vergence map", title, remark, parts), image
 
 

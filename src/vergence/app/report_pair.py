@@ -153,7 +153,7 @@ def _camera(runs: Runs, name: str) -> str:
         markup.film(
             camera_images(run, name).film,
             f"{name}, {label}",
-            f"{escape(label)}{marks_legend(run.cameras[name])}",
+            f"{escape(label)}<br>{marks_legend(run.cameras[name])}",
         )
         for label, run in runs.items()
     ]

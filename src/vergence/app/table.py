@@ -64,7 +64,7 @@ def camera_rows(trace: CameraTrace) -> list[Row]:
         )
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
-        note = f"farthest point, last image{_lag(trace)}"
+        note = f"farthest point, last image that shows one{_lag(trace)}"
         rows.append(Row("final error", f"{error[-1]:.2f}", "px", note))
         rows.append(Row("largest error", f"{error.max():.2f}", "px", "farthest point, any image"))
     if len(drift):

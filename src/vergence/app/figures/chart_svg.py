@@ -242,6 +242,10 @@ def _legend(chart: Chart) -> str:
             entries.setdefault(one.label, _swatch(f"c{one.color}"))
     for shade in chart.shades:
         entries.setdefault(shade.label, _swatch(f"c{shade.color} shade"))
+    if chart.events:
+        entries["event, with its number in the list of events"] = (
+            '<path class="event" d="M12 1V15"/>'
+        )
     entries.pop("", None)
     keys = "".join(
         f'<span><svg viewBox="0 0 24 16" aria-hidden="true">{ink}</svg>{escape(label)}</span>'

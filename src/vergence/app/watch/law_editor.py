@@ -129,7 +129,7 @@ class LawEditor:
                 it was.
         """
         self._require_law("key", key)
-        keys = [knob["key"] for knob in self._knobs]
+        keys = [knob["key"] for knob in self._offered]
         if key not in keys:
             raise InputError("message", "key", key, nearest(key, keys))
         own, at = self._edited[self._at].own, f"{self._at}.{key}"
@@ -148,8 +148,7 @@ class LawEditor:
             "choice": edited.choice,
             "knobs": [
                 {**knob, "own": edited.own.get(knob["key"], knob["value"])}
-                for knob in self._knobs
-                if knob["key"] not in self._withheld
+                for knob in self._offered
             ],
             "settings": self.settings,
         }
@@ -162,6 +161,10 @@ class LawEditor:
     @property
     def _knobs(self) -> list[dict[str, Any]]:
         return knobs(self.stage.law)
+
+    @property
+    def _offered(self) -> list[dict[str, Any]]:
+        return [knob for knob in self._knobs if knob["key"] not in self._withheld]
 
     @property
     def _at(self) -> str:

@@ -225,7 +225,7 @@ class Plot {
       if (value !== null && (most < 0 || Math.abs(value) > Math.abs(values[most] ?? 0))) most = j;
     });
     const whose = values.length > 1 ? this.about.series[most] : "";
-    this.value.textContent = most < 0 ? "" : [whose, values[most]?.toPrecision(3).replace("-", "−")].filter(Boolean).join(" ");
+    this.value.textContent = most < 0 ? "" : [whose, values[most]?.toPrecision(3).replace("-", "−")].filter(Boolean).join(": ");
   }
 }
 
