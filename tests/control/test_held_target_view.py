@@ -29,7 +29,11 @@ def push(scene, v_world, seconds):
     mounting = CameraMounting(camera, T_world_camera=T_world_camera)
     limits = Limits(view_margin_px=MARGIN_PX, manipulability_share=0.0)
     solver = QuadraticProgram().bind(Setting(arm, mounting, limits, PERIOD))
-    view, q, rates = TargetView(mounting, CORNERS, *solver.view), joints.position, np.zeros(6)
+    view, q, rates = (
+        TargetView(mounting, CORNERS, *solver.view),
+        joints.position.copy(),
+        np.zeros(6),
+    )
     seen = []
     for k in range(int(seconds / PERIOD)):
         T = arm.forward_kinematics(q)

@@ -41,7 +41,12 @@ def test_points_are_in_view_where_the_clearance_is_positive() -> None:
     agreed = 0
     for _ in range(400):
         q, _ = pull_into_view(
-            gantry().chain, somewhere(random), view, 0.3, gantry().q_min, gantry().q_max
+            gantry().chain,
+            somewhere(random),
+            view,
+            0.3,
+            gantry().q_min.copy(),
+            gantry().q_max.copy(),
         )
         q = q + 0.1 * random.normal(size=6)
         T = gantry().forward_kinematics(q)
@@ -182,7 +187,16 @@ def test_tree_finds_a_way_on_edges_that_stay_in_view() -> None:
     samples = np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (2000, 6))
     view, scale = problem.view(), 1 / arm.rate_max
     path = connect_trees(
-        arm.chain, view, 0.01, arm.q_min, arm.q_max, scale, problem.q_start, goals, samples, 0.15
+        arm.chain,
+        view,
+        0.01,
+        arm.q_min.copy(),
+        arm.q_max.copy(),
+        scale,
+        problem.q_start.copy(),
+        goals,
+        samples,
+        0.15,
     )
     assert len(path) > 2
     np.testing.assert_allclose(path[0], problem.q_start)

@@ -189,7 +189,7 @@ class Servo:
             for name in fresh
         }
         if self._kernel is not None:
-            return self._kernel.command(states[self._first], joints.position)
+            return self._kernel.command(states[self._first], joints.position.copy())
         return self._solve(states, joints, reference.joint_rates)
 
     def rates(
@@ -256,9 +256,9 @@ class Servo:
         if not total.H.any():  # no camera sees any feature
             return JointCommand(self._rest, np.zeros(6))
         faces = None if first is None else first.faces
-        problem = Problem(
-            joints.position,
-            joints.velocity,
+        problem = Problem(  # kernels are compiled for arrays that may be written to
+            joints.position.copy(),
+            joints.velocity.copy(),
             total.H,
             total.g,
             NO_FEATURES

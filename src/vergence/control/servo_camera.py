@@ -184,6 +184,7 @@ class ServoCamera:
 
     def _pose(self, q: FloatArray) -> dict[str, Any]:
         """Return the arm's part of the camera's data."""
+        q = q.copy()  # kernels are compiled for arrays that may be written to
         if self.mounting.at_tip:
             return {"arm": self._arm, "q": q}
         T_world_tip = self._arm.forward_kinematics(q)

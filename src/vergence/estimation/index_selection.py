@@ -138,6 +138,7 @@ class IndexSelection:
         if len(chosen):
             diagonal = candidates.diagonal_px[cameras, None]
             places = candidates.points_px[cameras, features] / diagonal
-            chosen = exchange(places, cameras, chosen, self.margin, self.rounds)
+            each = np.ascontiguousarray(cameras)
+            chosen = exchange(places, each, chosen, self.margin, self.rounds)
             mask[cameras[chosen], features[chosen]] = True
         return mask

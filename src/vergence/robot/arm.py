@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vergence.arrays import BoolArray, FloatArray, as_floats, frozen
+from vergence.arrays import BoolArray, FloatArray, as_floats, frozen, read_only
 from vergence.errors import Absent, InputError, nearest
 from vergence.robot.chain import Chain, forward_kinematics, jacobian
 
@@ -34,6 +34,7 @@ class Arm:
     def __post_init__(self) -> None:
         n = len(self.names)
         object.__setattr__(self, "axis_names", self.axis_names or self.names)
+        object.__setattr__(self, "chain", Chain(*map(read_only, self.chain)))
         for name in ("q_min", "q_max", "rate_max", "acceleration_max"):
             object.__setattr__(self, name, frozen(getattr(self, name), (n,), name))
         for joint, low, high in zip(self.names, self.q_min, self.q_max, strict=True):

@@ -88,7 +88,7 @@ def goal_configurations(
     low, high = finite_range(arm, near)
     random = np.random.default_rng(0)
     seeds = np.vstack((near, random.uniform(low, high, (SEEDS, len(near)))))
-    solutions = solve_from_seeds(arm.chain, seeds, np.ascontiguousarray(T), low, high)
+    solutions = solve_from_seeds(arm.chain, seeds, np.array(T, order="C"), low, high)
     turned = np.vstack([solutions, *(_full_turns(arm, q, low, high) for q in solutions)])
     order = np.argsort(np.abs((turned - near) / arm.rate_max).max(axis=1), kind="stable")
     fitting = islice((q for q in _once(turned[order]) if allowed is None or allowed(q)), most)
@@ -108,7 +108,7 @@ def nearest_configuration(arm: Arm, T: FloatArray, near: FloatArray) -> tuple[Fl
     """
     low, high = finite_range(arm, near)
     seeds = np.vstack((near, np.random.default_rng(0).uniform(low, high, (SEEDS, len(near)))))
-    T = np.ascontiguousarray(T)
+    T = np.array(T, order="C")
     ends = (solve_pose(arm.chain, seed, T, low, high, 40) for seed in seeds)
     q, missing = min(ends, key=lambda end: end[1])
     return q, float(missing)

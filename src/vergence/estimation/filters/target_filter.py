@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray, frozen
+from vergence.arrays import BoolArray, FloatArray, as_floats
 from vergence.errors import InputError
 from vergence.estimation.filters.consistency import Consistency
 from vergence.estimation.view import Seen, View
@@ -168,9 +168,10 @@ def first_values(
     """
     if covariance is None:
         covariance = np.diag(np.repeat([0.03, 0.1, 0.2, 0.5], 3) ** 2)
-    covariance = frozen(covariance, (12, 12), "covariance")
-    pose = frozen(T_world_target, (4, 4), "T_world_target")
-    twist = frozen(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
+    # Copies that may be written to, as those are that the kernels return.
+    covariance = as_floats(covariance, (12, 12), "covariance").copy()
+    pose = as_floats(T_world_target, (4, 4), "T_world_target").copy()
+    twist = as_floats(np.zeros(6) if velocity is None else velocity, (6,), "velocity").copy()
     _require_finite(pose, source, "T_world_target")
     _require_finite(twist, source, "velocity")
     _require_covariance(covariance, source)
