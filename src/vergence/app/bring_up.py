@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.app import markup
+from vergence.app.check import table_with_notes
 from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.app.report import REPORT
 from vergence.app.run import overrides
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
 _REMINDERS = (
     "Set payload and centre of gravity of camera and bracket on the robot's own panel.",
     "Set the robot's own speed limits and safety planes; vergence's limits do not replace them.",
+)
+
+
+_FIRST = (
+    "Correct what does not hold and check again: joints are moved only once everything at rest "
+    "holds."
 )
 
 
@@ -58,10 +65,14 @@ def check(options: "CheckOptions") -> int:
     if options.as_json:
         emit(_answer(loaded.name, options.driver, findings, page))
     else:
-        for reminder in _REMINDERS:
+        for reminder in _to_do(holds):
             say(f"  to do  {reminder}")
         say(f"report  {page}")
     return SUCCESS if holds else FAILURE
+
+
+def _to_do(holds: bool) -> Sequence[str]:
+    return _REMINDERS if holds else (_FIRST, *_REMINDERS)
 
 
 def carried_camera(cell: "Cell") -> "CarriedCamera | None":
@@ -80,8 +91,8 @@ def carried_camera(cell: "Cell") -> "CarriedCamera | None":
 
 def _words(found: "Finding") -> str:
     sign = "ok   " if found.holds else "WRONG"
-    note = f"; {found.note}" if found.note and not found.holds else ""
-    return f"  {sign}  {found.name}: {found.measured:.4g} {found.unit} ({found.allowed}){note}"
+    note = f"; {advice}" if (advice := _advice(found)) else ""
+    return f"  {sign}  {found.name}: {_number(found)} {found.unit} ({found.allowed}){note}"
 
 
 def _answer(
@@ -105,7 +116,8 @@ def _write_page(folder: Path, cell: str, driver: str, findings: Sequence["Findin
     folder.mkdir(parents=True, exist_ok=True)
     held = sum(found.holds for found in findings)
     badge = markup.badge(f"{held} of {len(findings)} checks hold", held == len(findings))
-    reminders = "".join(f"<li>{escape(text)}</li>" for text in _REMINDERS)
+    todo = _to_do(held == len(findings))
+    reminders = "".join(f"<li>{escape(text)}</li>" for text in todo)
     body = [
         markup.header("vergence check", cell, f"{badge}driver {escape(driver)}"),
         markup.section("Checks", _table(findings)),
@@ -117,17 +129,16 @@ def _write_page(folder: Path, cell: str, driver: str, findings: Sequence["Findin
 
 
 def _table(findings: Sequence["Finding"]) -> str:
-    heads = ("check", "measured", "unit", "allowed", "holds", "note")
-    head = "".join(f'<th scope="col">{text}</th>' for text in heads)
-    rows = "\n".join(map(_row, findings))
-    return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{rows}\n</tbody></table>'
+    headings = ("check", "measured", "unit", "allowed", "holds")
+    rows = [(f.name, _number(f), f.unit, f.allowed, "yes" if f.holds else "NO") for f in findings]
+    holds = [bool(found.holds) for found in findings]
+    return table_with_notes(headings, rows, holds, [_advice(found) for found in findings])
 
 
-def _row(found: "Finding") -> str:
-    word = markup.badge("yes" if found.holds else "NO", found.holds)
-    return (
-        f'<tr><th scope="row">{escape(found.name)}</th>'
-        f'<td class="number">{found.measured:.4g}</td><td class="unit">{escape(found.unit)}</td>'
-        f"<td>{escape(found.allowed)}</td><td>{word}</td>"
-        f'<td class="note">{escape(found.note)}</td></tr>'
-    )
+def _advice(found: "Finding") -> str:
+    """Return what to do about a check that does not hold."""
+    return "" if found.holds else found.note
+
+
+def _number(found: "Finding") -> str:
+    return f"{round(float(found.measured), 3) + 0.0:.4g}".replace("-", "−")

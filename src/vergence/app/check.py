@@ -46,15 +46,27 @@ def _cells(check: Check) -> tuple[str, ...]:
 def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
     headings, rows = table(checks)
+    notes = [check.note for check in checks]
+    return table_with_notes(headings, rows, [check.holds for check in checks], notes)
+
+
+def table_with_notes(
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    holds: Sequence[bool],
+    notes: Sequence[str],
+) -> str:
+    """Return a table of a page: of each check a row, and its note below it."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(
-        _html_row(headings, cells, check.holds) + _note(check.note, len(headings))
-        for cells, check in zip(rows, checks, strict=True)
+        _html_row(headings, cells, held) + _note(note, len(headings))
+        for cells, held, note in zip(rows, holds, notes, strict=True)
     )
     return f'<table class="checks"><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>'
 
 
-_KINDS = {**dict.fromkeys(NUMBERS, "number"), **{word: word for word in ("claim", "bound", "unit")}}
+_KINDS = {**dict.fromkeys(NUMBERS, "number"), "claim": "claim", "unit": "unit"}
+_KINDS |= dict.fromkeys(("bound", "allowed"), "bound")
 
 
 def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str:

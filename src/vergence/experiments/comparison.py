@@ -49,7 +49,7 @@ class Comparison:
         return [score.law, *counts, *("–" if isnan(m) else f"{m:.2f}" for m in medians)]
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return a pandas table with a row a run; needs pandas.
+        """Return a pandas table with one row per run; needs pandas.
 
         Raises:
             InputError: if pandas is not installed.

@@ -82,7 +82,7 @@ def open_footage(
     if topic is not None and not is_bag(where):
         raise InputError("vergence track", "--topic", topic, "only with a ROS 2 bag")
     if rate_hz is not None and not _SLOWEST_HZ <= rate_hz <= _FASTEST_HZ:
-        allowed = f"from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} images a second"
+        allowed = f"from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} images per second"
         raise InputError("vergence track", "--rate", rate_hz, allowed)
     if is_bag(where):
         return _open_bag(where, rate_hz, topic)

@@ -35,13 +35,13 @@ from vergence.places import TRACK
 
 _MOST_LISTED = 20  # stretches without the object or a curve
 _FILES = {  # by the key of the answer: what is in it
-    "poses": "pose and standard deviations, a row an image",
-    "poses_with_covariance": "the same with covariances and unobservable motions, a line an image",
-    "ellipses": "values and standard deviations of ellipses, a row an image and curve",
-    "lines": "values and standard deviations of lines, a row an image and curve",
-    "regions": "values and standard deviations of regions, a row an image and curve",
-    "marks": "values and standard deviations of marks, a row an image and curve",
-    "curves_with_covariance": "all values with covariances, a line an image",
+    "poses": "pose and standard deviations, one row per image",
+    "poses_with_covariance": "the same with covariances and unobservable motions, one line per image",
+    "ellipses": "values and standard deviations of ellipses, one row per image and curve",
+    "lines": "values and standard deviations of lines, one row per image and curve",
+    "regions": "values and standard deviations of regions, one row per image and curve",
+    "marks": "values and standard deviations of marks, one row per image and curve",
+    "curves_with_covariance": "all values with covariances, one line per image",
     "overlay": "the film in full size",
 }
 

@@ -51,7 +51,7 @@ def clock_findings(seen: Watched, rate_hz: float) -> Iterator[Finding]:
         "%",
         "at most 1",
         abs(drift) <= _CLOCK_TOLERANCE,
-        "time stamps come from another clock or have another unit",
+        "time stamps of another clock or in another unit; or a simulated robot is too slow",
     )
 
 
@@ -100,7 +100,7 @@ def image_findings(
         )
         rate = len(frames) / seconds
         yield Finding(
-            f"images a second of {name}",
+            f"image rate of {name}",
             rate,
             "Hz",
             f"{rate_hz:g} ± 20 %",
