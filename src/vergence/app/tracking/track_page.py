@@ -36,7 +36,7 @@ from vergence.places import TRACK
 _MOST_LISTED = 20  # stretches without the object or a curve
 _FILES = {  # by the key of the answer: what is in it
     "poses": "pose and standard deviations, one row per image",
-    "poses_with_covariance": "the same with covariances and unobservable motions, one line per image",
+    "poses_with_covariance": "the same with covariances and unseen motions, one line per image",
     "ellipses": "values and standard deviations of ellipses, one row per image and curve",
     "lines": "values and standard deviations of lines, one row per image and curve",
     "regions": "values and standard deviations of regions, one row per image and curve",
