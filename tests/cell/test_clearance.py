@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vergence.assembly.clearance import cell_clearance
-from vergence.cell import load_cell
+from vergence.cell import built_in_cells, load_cell
 from vergence.errors import InputError
 from vergence.signals import JointState
 from vergence.simulation.cell_model import CellModel
@@ -172,6 +172,30 @@ def test_what_overlaps_at_the_start_is_left_out_and_told(cell, caplog):
     pairs = {clearance.name(k) for k in range(len(clearance.margin))}
     assert "scene/plinth and arm/upper" not in pairs
     assert "scene/plinth overlaps arm/upper at the start" in caplog.text
+
+
+def start_refused(cell):
+    with pytest.raises(InputError) as caught:
+        cell_clearance(cell, CellModel(cell, hulls=True), dict)
+    assert caught.value.key == "arms.arm.start_deg"
+    return str(caught.value)
+
+
+def test_a_start_in_collision_is_refused_with_the_names_of_the_pair(cell):
+    cell_clearance(cell, CellModel(cell, hulls=True), dict)
+    said = start_refused(cell.replace(arms={"arm": {"start_deg": [20.0, 150.0, 0.0]}}))
+    assert "scene/floor and arm/end overlap by 29 mm" in said
+    assert "collision.avoid (self, arms, fixtures)" in said
+    folded = cell.replace(arms={"arm": {"start_deg": [20.0, -150.0, -0.1]}})
+    assert "arm/upper and arm/fore overlap by 32 mm" in start_refused(folded)
+    cell_clearance(folded.replace(collision={"avoid": ["fixtures"]}), CellModel(folded), dict)
+
+
+def test_every_cell_that_ships_starts_free_of_collisions():
+    for name in built_in_cells():
+        cell = load_cell(name)
+        assert {"self", "arms", "fixtures"} <= set(cell.collision.avoid)
+        cell_clearance(cell, CellModel(cell, hulls=True), dict)
 
 
 def test_a_pair_that_starts_nearer_than_twice_the_margin_keeps_half_its_distance(model):

@@ -8,6 +8,8 @@ from vergence.errors import InputError
 from vergence.parts import kind_of
 from vergence.signals import JointState
 
+_MOST_PAIRS = 3  # that a message names
+
 if TYPE_CHECKING:
     from vergence.simulation.cell_model import CellModel
     from vergence.simulation.clearance import CellClearance
@@ -24,7 +26,8 @@ def cell_clearance(
         states: gives the joints of all arms now, by name.
 
     Raises:
-        InputError: if a target that moves is to be avoided: where it is nobody knows for sure.
+        InputError: if the arm's start is in collision, or a target that moves is to be avoided:
+            where it is nobody knows for sure.
     """
     from vergence.simulation.clearance import CellClearance
 
@@ -33,4 +36,10 @@ def cell_clearance(
     if "target" in table.avoid and moving:
         given = f"target, with motion {kind_of(cell.targets[moving[0]].motion)}"
         raise InputError(str(cell.path), "collision.avoid", given, "a stationary target")
-    return CellClearance(model, cell.task.arm, table.avoid, table.margin_m, states)
+    name = cell.task.arm
+    clearance = CellClearance(model, name, table.avoid, table.margin_m, states)
+    if clearance.colliding:
+        given = f"a start in collision: {'; '.join(clearance.colliding[:_MOST_PAIRS])}"
+        allowed = f"a start without; collision.avoid ({', '.join(table.avoid)}) says what counts"
+        raise InputError(str(cell.path), f"arms.{name}.start_deg", given, allowed)
+    return clearance

@@ -49,6 +49,7 @@ class CellClearance:
 
     Attributes:
         geoms: both shapes of each pair, numbered as the model has them, (P, 2).
+        colliding: names of the pairs that collide at the start, and how deep; no pairs of `geoms`.
 
     Args:
         model: of the cell, its arms at their start; its state is copied.
@@ -67,7 +68,8 @@ class CellClearance:
         states: Callable[[], Mapping[str, JointState]] | None = None,
     ) -> None:
         self._model, self._data, self._arm = model, copy(model.data), arm
-        self.geoms, self._kind, self.margin = collision_pairs(model, arm, avoid, margin_m)
+        pairs = collision_pairs(model, arm, avoid, margin_m)
+        self.geoms, self._kind, self.margin, self.colliding = pairs
         m = model.model
         self._bodies = np.asarray(m.geom_bodyid[self.geoms], dtype=np.int64).reshape(-1, 2)
         self._radius = np.where(m.geom_type == _PLANE, -1.0, m.geom_rbound)

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator
+from copy import copy
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 KINDS = ("self", "arms", "fixtures", "target")
+_POSTURES = 16
 _UNKNOWN = (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)  # distances are not known
 
 
@@ -26,6 +28,7 @@ class CollisionPairs(NamedTuple):
     geoms: IntArray  # (P, 2)
     kind: IntArray  # (P,) which of `KINDS`
     margin: FloatArray  # (P,) m, the distance that is kept
+    colliding: tuple[str, ...]  # left out, as they collide now: their names, and how deep
 
 
 def collision_pairs(
@@ -34,8 +37,9 @@ def collision_pairs(
     """Return the pairs of shapes that an arm can bring together, with the arms as they are now.
 
     Links that one joint connects are neighbours and no pair. Neither are shapes that overlap
-    already: the arm is there, so the models are wider than the things. A pair that is nearer
-    than twice the margin keeps half its distance.
+    already. By up to the margin, or in most postures of the arm, that is because models are wider
+    than the things; otherwise they collide. A pair that is nearer than twice the margin keeps half
+    its distance.
 
     Args:
         model: of the cell, its arms at their start.
@@ -48,13 +52,18 @@ def collision_pairs(
     kinds = np.array([pair[2] for pair in found], dtype=np.int64)
     far = 2.0 * margin_m
     distance = np.array([_distance(model, pair, far) for pair in geoms])
-    for pair in geoms[(distance <= 0.0) & (kinds > 0)]:
-        _LOG.warning(
-            "%s overlaps %s at the start: collisions between them are not avoided",
-            *(name_of(model.model, int(geom)) for geom in pair),
-        )
     apart = distance > 0.0
-    return CollisionPairs(geoms[apart], kinds[apart], np.minimum(margin_m, 0.5 * distance[apart]))
+    colliding = []
+    for pair, depth, kind in zip(geoms[~apart], -distance[~apart], kinds[~apart], strict=True):
+        names = [name_of(model.model, int(geom)) for geom in pair]
+        if depth > margin_m and not _mostly_overlap(model, arm, pair):
+            colliding.append(f"{names[0]} and {names[1]} overlap by {1e3 * depth:.0f} mm")
+        elif kind > 0:
+            _LOG.warning(
+                "%s overlaps %s at the start: collisions between them are not avoided", *names
+            )
+    margin = np.minimum(margin_m, 0.5 * distance[apart])
+    return CollisionPairs(geoms[apart], kinds[apart], margin, tuple(colliding))
 
 
 def name_of(model: Any, geom: int) -> str:
@@ -123,6 +132,18 @@ def _neighbours(m: Any, a: int, b: int) -> bool:
     a, b = int(m.body_weldid[a]), int(m.body_weldid[b])
     above_a, above_b = (int(m.body_weldid[m.body_parentid[body]]) for body in (a, b))
     return a == b or above_a == b or above_b == a
+
+
+def _mostly_overlap(model: "CellModel", arm: str, pair: IntArray) -> bool:
+    """Return whether two shapes overlap in most postures of the arm, drawn from all."""
+    data, axes, rng = copy(model.data), model.arms[arm], np.random.default_rng(0)
+    low, high = np.maximum(axes.q_min, -np.pi), np.minimum(axes.q_max, np.pi)
+    overlaps = 0
+    for q in rng.uniform(low, high, (_POSTURES, len(low))):
+        model.write_position(data, arm, q)
+        mujoco.mj_kinematics(model.model, data)
+        overlaps += mujoco.mj_geomDistance(model.model, data, *pair, 1.0, None) <= 0.0
+    return 2 * overlaps > _POSTURES
 
 
 def _distance(model: "CellModel", pair: IntArray, far: float) -> float:
