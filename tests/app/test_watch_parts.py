@@ -250,16 +250,19 @@ class TestViewState:
         view_state, reader = ViewState(), Reader()
         view_state.begin({"cell": "c"})
         told = []
+        lost = []
         for number in range(9000):
             view_state.tick([number], [])
+            view_state.event(number, "feature lost", "")
             if number % 100 == 99:
                 news = view_state.news(reader)
                 assert news is not None
                 told += [row[0] for row in news.rows]
-        assert told == list(range(9000))
+                lost += [event["time"] for event in news.events]
+        assert told == lost == list(range(9000))
         late = view_state.news(Reader())
         assert late is not None
-        assert 1800 <= len(late.rows) <= 3600
+        assert 1800 <= len(late.rows) == len(late.events) <= 3600
         assert late.rows[-1] == [8999]
 
     def test_a_new_run_starts_afresh_for_everyone(self) -> None:

@@ -10,7 +10,7 @@ from vergence.arrays import FloatArray
 
 Row = list[Any]  # time, s, then the values of each plot
 
-_KEPT_ROWS = 1800  # of a running cell: what a page shows is the last minute at most
+_KEPT = 1800  # rows and events of a running cell: a page shows the last minute at most
 
 
 @dataclass(slots=True)
@@ -34,6 +34,28 @@ class News(NamedTuple):
     views: Sequence[CameraView]
 
 
+class _Newest:
+    """The newest of items that are added without an end, counted from the first."""
+
+    def __init__(self, items: Sequence[Any] = ()) -> None:
+        self._items, self._dropped = list(items), 0
+
+    def append(self, item: Any) -> None:
+        self._items.append(item)
+        if len(self._items) > 2 * _KEPT:
+            del self._items[:_KEPT]
+            self._dropped += _KEPT
+
+    def after(self, count: int) -> list[Any]:
+        """Return the items after the first so many, of those that are kept."""
+        return self._items[max(count - self._dropped, 0) :]
+
+    @property
+    def count(self) -> int:
+        """How many there were."""
+        return self._dropped + len(self._items)
+
+
 class ViewState:
     """What pages show; one thread writes, others read.
 
@@ -46,9 +68,7 @@ class ViewState:
         self._run = self._version = 0
         self._about: Mapping[str, Any] = {}
         self._status: dict[str, Any] = {}
-        self._rows: list[Row] = []
-        self._dropped = 0  # rows
-        self._events: list[Mapping[str, Any]] = []
+        self._rows, self._events = _Newest(), _Newest()
         self._views: dict[str, CameraView] = {}
         self.state: FloatArray | None = None
 
@@ -61,8 +81,7 @@ class ViewState:
         """
         with self._lock:
             self._run += 1
-            self._about, self._rows, self._events = about, list(rows), []
-            self._dropped = 0
+            self._about, self._rows, self._events = about, _Newest(rows), _Newest()
             self._views = {}
             self._version += 1
 
@@ -70,9 +89,6 @@ class ViewState:
         """Add a row of the plots, and show new images."""
         with self._lock:
             self._rows.append(row)
-            if len(self._rows) > 2 * _KEPT_ROWS:
-                del self._rows[:_KEPT_ROWS]
-                self._dropped += _KEPT_ROWS
             self._views.update({view.camera: view for view in views})
             self._version += 1
 
@@ -116,12 +132,11 @@ class ViewState:
             news = News(
                 about,
                 dict(self._status),
-                self._rows[max(reader.rows - self._dropped, 0) :],
-                self._events[reader.events :],
+                self._rows.after(reader.rows),
+                self._events.after(reader.events),
                 fresh,
             )
             reader.version = self._version
-            reader.rows = self._dropped + len(self._rows)
-            reader.events = len(self._events)
+            reader.rows, reader.events = self._rows.count, self._events.count
             reader.views = dict(self._views)
             return news

@@ -2,6 +2,8 @@
 
 /** @import { Event } from "./protocol.js" */
 
+const MOST = 1000; // lines
+
 export class Log {
   /** @param {HTMLElement} list */
   constructor(list) { this.list = list; }
@@ -36,5 +38,6 @@ export class Log {
     what.append(kind, ` · ${text}`);
     line.append(when, what);
     this.list.append(line);
+    if (this.list.children.length > MOST) this.list.children[0].remove();
   }
 }

@@ -30,9 +30,13 @@ const connection = new Connection(
   connected,
 );
 
+const LOOK_MS = 1000;
+let looked_ms = 0;
 setInterval(() => {
-  if (connection.socket.readyState === WebSocket.OPEN) transport.waits(performance.now() - connection.heard_ms);
-}, 1000);
+  const now = performance.now(), busy = now - looked_ms > 2 * LOOK_MS; // the page itself: what came meanwhile is not heard yet
+  looked_ms = now;
+  if (!busy && connection.socket.readyState === WebSocket.OPEN) transport.waits(now - connection.heard_ms);
+}, LOOK_MS);
 
 /** @param {boolean} open */
 function connected(open) {
