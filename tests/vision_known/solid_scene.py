@@ -35,7 +35,10 @@ class Shown(NamedTuple):
 
 
 def solid(name: str) -> ObjectModel:
-    vertices = SIZE_M * np.array(POINTS[name], dtype=np.float64)
+    return convex(name, SIZE_M * np.array(POINTS[name], dtype=np.float64))
+
+
+def convex(name: str, vertices: FloatArray) -> ObjectModel:
     hull = ConvexHull(vertices)
     triangles = []
     for (a, b, c), plane in zip(hull.simplices, hull.equations, strict=True):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from known_scene import CAMERA, HALF, SIGNS, box_model, clutter, drawn_image, pose
 from numpy.typing import NDArray
+from solid_scene import convex, drawn_solid
 
 from vergence.arrays import FloatArray
 from vergence.estimation.known_object.hypothesis_follower import HypothesisFollower
@@ -93,6 +94,24 @@ def test_a_box_has_three_half_turns_and_they_are_no_alternatives() -> None:
         "180° about (0, 0, 1)", "180° about (0, 1, 0)", "180° about (1, 0, 0)",
     ]  # fmt: skip
     assert symmetries(wedge(0.02)) == []
+
+
+@pytest.mark.parametrize("sides", [3, 5, 7])
+def test_turns_of_a_prism_by_its_sides_are_no_alternatives(sides: int) -> None:
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    ends = np.array([(np.cos(a), np.sin(a), z) for z in (-0.6, 0.6) for a in angles])
+    model = convex(f"{sides} sides", 0.05 * ends @ so3_exp(np.array((0.3, -0.7, 0.4))).T)
+    steps = [360.0 / sides * k for k in range(1, sides // 2 + 1) for _ in range(2)]
+    turns = [turn.angle_deg for turn in symmetries(model)]
+    np.testing.assert_allclose(sorted(turns), sorted([*steps, *[180.0] * sides]), atol=1e-6)
+    random = np.random.default_rng(0)
+    ground = clutter(random)
+    follower = HypothesisFollower(EdgeTracker(model), CAMERA, [pose()], 0.0, 1.0 / RATE_HZ)
+    for k in range(4):
+        T = pose(k / RATE_HZ)
+        step = follower.follow(drawn_solid(model, T, ground, random), k / RATE_HZ)
+        assert step.sighting is Sighting.SEEN
+        assert angle_between(step.T_camera_target, T) < 0.03
 
 
 def test_a_lost_object_is_found_again_where_it_comes_back() -> None:

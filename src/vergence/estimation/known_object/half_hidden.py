@@ -8,7 +8,12 @@ from vergence.estimation.known_object.object_follower import pose_distance
 from vergence.estimation.known_object.object_rivals import DECIDED, Compare, is_near
 from vergence.estimation.known_object.object_search import Fit, Near
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
-from vergence.vision.known_object.partial_view import NOT_SEEN, partial_view
+from vergence.vision.known_object.partial_view import (
+    NOT_SEEN,
+    ONE_EDGE,
+    one_edge_decides,
+    partial_view,
+)
 
 # Log likelihood ratios. A search reaches about 10⁵ poses that differ, and chance may win one in a
 # thousand times. Of a hidden object four edges never suffice: many things are rectangles.
@@ -46,6 +51,8 @@ def enough_seen(
     whole = fits[best].share >= least_share
     if nats[best] < (_SURE if whole else _SURE_HALF) or views[best].share < least_share:
         return ""
+    if one_edge_decides(fits[best].seen):
+        return ONE_EDGE
     order = np.argsort(-nats, kind="stable")
     alike = [
         fits[k] for k in order if k == best or compare(fits[best].seen, fits[k].seen) < DECIDED

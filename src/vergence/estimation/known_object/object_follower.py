@@ -22,6 +22,7 @@ from vergence.estimation import (
 from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import pose_difference, se3_compose
 from vergence.signals import ImagePoints
+from vergence.vision.known_object.partial_view import ONE_EDGE, one_edge_decides
 
 CAMERA = "camera"
 LEAST_SHARE = 0.2  # below this fraction, an object cannot be distinguished from its background
@@ -269,6 +270,8 @@ class ObjectFollower:
         reason = self._shortfall(seen, surprise, self._rule)
         if not reason and self._missed and self._rule.uncovered_again:
             return _Doubt(missing_again(seen, self._tracker.sought, self._rule))
+        if not reason and self._missed and one_edge_decides(seen):
+            return _Doubt(ONE_EDGE)
         lowest = self._rule.with_least_share(LEAST_SHARE)
         return _Doubt(reason, reason != "" and not self._shortfall(seen, surprise, lowest))
 

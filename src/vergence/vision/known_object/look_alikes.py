@@ -17,6 +17,9 @@ _FOLDS = (2, 3, 4, 6)  # of common symmetries
 _SAME = 0.01  # relative to the object's size: edges closer than this coincide
 _PLACES = 9  # compared along an edge
 _APART_RAD = 0.05
+_OFF_CENTRE = 0.05  # relative to the object's size: ends farther from its centre show a rotation
+_OFF_LINE = 0.1  # sine of the angle between the two ends that do
+_MOST_PAIRS = 600  # of ends that may take their places: more is a round object
 _STEP_RAD, _NEAR_RAD = np.deg2rad(18.0), np.deg2rad(50.0)  # of nearby rotations that are tried
 _AXES_APART_RAD = 0.5 * _STEP_RAD  # of an object that rotates unseen about an axis
 
@@ -37,21 +40,23 @@ def turns_of(model: ObjectModel) -> list[Turn]:
     """Return the rotations about an object's centre under which it may look the same.
 
     Halves, thirds, quarters and sixths of a turn about the axes of its frame and about its
-    principal axes, and those that map a cube to itself.
+    principal axes, those that map a cube to itself, and those that map its own edges' ends to each
+    other.
     """
     middle = centre_of(model)
+    common = [
+        2.0 * np.pi * k / fold * axis
+        for axis, folds in _axes(model)
+        for fold in folds
+        for k in range(1, fold)
+    ]
     turns: list[Turn] = []
-    for axis, folds in _axes(model):
-        for fold in folds:
-            for k in range(1, fold):
-                angle = 2.0 * np.pi * k / fold
-                R = so3_exp(np.ascontiguousarray(angle * axis))
-                turn = Turn(se3(R, middle - R @ middle), axis, float(np.rad2deg(angle)))
-                if all(
-                    angle_between(turn.T_target_turned, o.T_target_turned) > _APART_RAD
-                    for o in turns
-                ):
-                    turns.append(turn)
+    for vector in (*_between_ends(model, middle), *common):
+        R = so3_exp(np.ascontiguousarray(vector))
+        T = se3(R, middle - R @ middle)
+        if all(angle_between(T, other.T_target_turned) > _APART_RAD for other in turns):
+            angle = float(np.linalg.norm(vector))
+            turns.append(Turn(T, vector / angle, float(np.rad2deg(angle))))
     return turns
 
 
@@ -99,8 +104,18 @@ def between(T: FloatArray, T_other: FloatArray) -> Turn:
 
 
 def centre_of(model: ObjectModel) -> FloatArray:
-    """Return the centre (3,) of an object's bounding box."""
-    centre: FloatArray = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
+    """Return the centroid (3,) of an object's edges, of its surface if it has none.
+
+    Every rotation that maps them to themselves keeps it.
+    """
+    parts = model.edges if len(model.edges) else model.surface
+    size = np.linalg.norm(
+        parts[:, 1] - parts[:, 0]
+        if len(model.edges)
+        else np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0]),
+        axis=1,
+    )
+    centre: FloatArray = size @ parts.mean(axis=1) / size.sum()
     return centre
 
 
@@ -133,6 +148,45 @@ def _axes(model: ObjectModel) -> list[tuple[FloatArray, tuple[int, ...]]]:
             axis = np.array(signs) / np.sqrt(count)
             axes.append((axis, (2,) if count == 2 else (3,)))
     return axes
+
+
+def _between_ends(model: ObjectModel, middle: FloatArray) -> list[FloatArray]:
+    """Return the rotation vectors (3,) that map the ends of an object's edges to such ends.
+
+    Where two ends go determines a rotation. They are those that fewest others can take the place
+    of; with many of these the object is round, and its rotation has no separate rivals.
+    """
+    from scipy.spatial import KDTree
+
+    if not len(model.edges):
+        return []
+    ends = np.unique(model.edges.reshape(-1, 3), axis=0) - middle
+    near = 2.0 * _SAME * model.size
+    away = np.linalg.norm(ends, axis=1)
+    alike = np.abs(away[:, None] - away) < near
+    rare = np.where(away > _OFF_CENTRE * model.size, alike.sum(axis=1), len(ends) + 1)
+    first = int(rare.argmin())
+    aside = np.linalg.norm(np.cross(ends[first], ends), axis=1) / (away[first] * away + 1e-300)
+    second = int(np.where(aside > _OFF_LINE, rare, len(ends) + 1).argmin())
+    if rare[first] * rare[second] > _MOST_PAIRS or not aside[second] > _OFF_LINE:
+        return []
+    here, tree = _frame(ends[first], ends[second]), KDTree(ends)
+    apart = np.linalg.norm(ends[first] - ends[second])
+    vectors = []
+    for one, other in product(ends[alike[first]], ends[alike[second]]):
+        if abs(np.linalg.norm(one - other) - apart) < near:
+            R = _frame(one, other) @ here.T
+            vector = so3_log(R)
+            if np.linalg.norm(vector) > _APART_RAD and tree.query(ends @ R.T)[0].max() < near:
+                vectors.append(vector)
+    return vectors
+
+
+def _frame(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return an orientation (3, 3) that two directions determine."""
+    x, z = one / np.linalg.norm(one), np.cross(one, other)
+    z /= np.linalg.norm(z)
+    return np.column_stack((x, np.cross(z, x), z))
 
 
 def _places_on_edges(model: ObjectModel) -> FloatArray:

@@ -15,6 +15,9 @@ from vergence.vision.known_object.pose_evidence import ALIKE, MOST_OF_EDGE, plac
 
 _FOUND = 0.95  # fraction of the places found on visible edges
 _PRECISE_PX = 0.5  # standard deviation of their residuals
+_COMPLETE = 0.9  # fraction found of an object that nothing hides
+_MOST_GROWTH = 100.0  # of a variance without one of the edges: ten times the deviation
+ONE_EDGE = "a part is hidden, and one edge alone, which may be another object's, decides the pose"
 _DIRECTIONS, _BOUNDS = 12, 24  # of the borders that are tried, and their places along each
 
 
@@ -49,6 +52,38 @@ def partial_view(seen: EdgeMeasurement, chance: float) -> PartialView:
     visible = _visible(np.asarray(seen.samples_px), nats)
     share = float(np.mean(found[visible])) if visible.any() else 0.0
     return PartialView(float(nats[visible].sum()), visible, share)
+
+
+def one_edge_decides(seen: object) -> bool:
+    """Return whether some of an object is hidden and one edge alone determines a rotation of it.
+
+    It could be an edge of what hides the object.
+    """
+    if not isinstance(seen, EdgeMeasurement) or seen.share >= _COMPLETE:
+        return False
+    return growth_without_an_edge(seen) > _MOST_GROWTH
+
+
+def growth_without_an_edge(seen: EdgeMeasurement) -> float:
+    """Return the largest factor by which a variance of the pose grows without one of its edges.
+
+    Infinite if the other edges do not determine the pose. Image coordinates count as undistorted.
+    """
+    found = seen.samples_found
+    places = seen.samples.points[found] @ seen.fit.T[:3, :3].T + seen.fit.T[:3, 3]
+    x, y, z = places.T
+    nu, nv = seen.samples.normals[found].T
+    shift = np.column_stack((nu, nv, -(nu * x + nv * y) / z)) / z[:, None]
+    slopes = np.hstack((shift, np.cross(places, shift)))
+    slopes /= np.linalg.norm(slopes, axis=0)
+    edges = seen.samples.edge[found]
+    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    shares = [
+        float(np.linalg.eigvals(inverse @ (one.T @ one)).real.max())
+        for one in (slopes[edges == edge] for edge in np.unique(edges))
+    ]
+    left = 1.0 - max(shares, default=1.0)
+    return 1.0 / left if left > 0.0 else float("inf")
 
 
 def _visible(points_px: FloatArray, nats: FloatArray) -> BoolArray:
