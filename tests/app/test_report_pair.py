@@ -34,8 +34,8 @@ def test_the_table_has_the_numbers_of_both(runs: dict[str, Recording]) -> None:
     page = make_pair(runs, dict.fromkeys(runs, ""))
     for run in runs.values():
         for row in camera_rows(run.cameras["wrist"]):
-            assert f'<td class="number">{row.value}<' in page
-            assert f'<span class="note">{escape(row.note)}</span>' in page
+            assert f'<td class="number">{row.value}</td>' in page
+            assert escape(row.note) in page
     assert page.count('class="film"') == 2
     assert page.count('class="marks"') == 2  # below each film what its marks mean
 

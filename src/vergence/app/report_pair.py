@@ -116,16 +116,11 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
     lines = []
     for name in names:
         cells = [own.get(name, Row(name, "–")) for own in by_name]
-        notes = {cell.note for cell in cells if cell.note}
-        shared = _note(notes.pop()) if len(notes) == 1 else ""
-        numbers = "".join(
-            f'<td class="number">{escape(cell.value)}{"" if shared else _note(cell.note)}</td>'
-            for cell in cells
-        )
+        numbers = "".join(f'<td class="number">{escape(cell.value)}</td>' for cell in cells)
         unit = next((cell.unit for cell in cells if cell.unit), "")
         lines.append(
-            f'<tr><th scope="row">{escape(name)}{shared}</th>{numbers}'
-            f'<td class="unit">{escape(unit)}</td></tr>'
+            f'<tr><th scope="row">{escape(name)}</th>{numbers}<td class="unit">{escape(unit)}</td>'
+            f"</tr>{_note({run: cell.note for run, cell in zip(runs, cells, strict=True)})}"
         )
     body = "\n".join(lines)
     return (
@@ -135,8 +130,15 @@ def _table(title: str, runs: Runs, rows: Sequence[Sequence[Row]]) -> str:
     )
 
 
-def _note(text: str) -> str:
-    return f'<span class="note">{escape(text)}</span>' if text else ""
+def _note(notes: Mapping[str, str]) -> str:
+    """Return a row with what a number is, once if that is the same of all runs."""
+    said = {run: note for run, note in notes.items() if note}
+    if not said:
+        return ""
+    own = [f"{escape(run)}: {escape(note)}" for run, note in said.items()]
+    same = len(set(said.values())) == 1
+    text = escape(next(iter(said.values()))) if same else "<br>".join(own)
+    return f'<tr class="remark"><td colspan="{len(notes) + 2}">{text}</td></tr>'
 
 
 def _robot(runs: Runs) -> str:
