@@ -5,6 +5,8 @@ comment beside the field.
 """
 
 import json
+import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -201,7 +203,12 @@ def _toml(value: Any) -> str:
         return f"{{ {inside} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
-    return f"{value:g}" if type(value) is float else json.dumps(value)
+    return _digits(value) if type(value) is float else json.dumps(value)
+
+
+def _digits(number: float) -> str:
+    """Write a number briefly: 1e-6, 1e12."""
+    return re.sub(r"e\+?(-?)0*", r"e\1", f"{number:g}")
 
 
 def _type(value: dict[str, Any]) -> str:
@@ -210,7 +217,7 @@ def _type(value: dict[str, Any]) -> str:
     options = value.get("anyOf") or value.get("oneOf")
     if options:
         named = list(dict.fromkeys(_type(o) for o in options if o.get("type") != "null"))
-        of_such = f"list of {named[0]}"
+        of_such = f"list of {_several(named[0])}"
         return " or ".join("a list of such" if name == of_such else name for name in named)
     if "$ref" in value:
         inline = value["$ref"].endswith(f"/{_INLINE}")
@@ -223,7 +230,7 @@ def _type(value: dict[str, Any]) -> str:
     if value["type"] in ("number", "integer"):
         return _bounded(value)
     if value["type"] == "object":
-        return "tables, one a name"
+        return "tables, one per name"
     if value.get("format") == "path":
         return "path"
     return {"boolean": "`true` or `false`", "string": "text"}[value["type"]]
@@ -233,16 +240,34 @@ def _array(value: dict[str, Any]) -> str:
     if "prefixItems" in value:
         items = value["prefixItems"]
         return f"{len(items)} × {_type(items[0])}"
-    return f"list of {_type(value['items'])}"
+    return f"list of {_several(_type(value['items']))}"
+
+
+def _several(type_: str) -> str:
+    """Return the plural of a type in words."""
+    return re.sub(r"^((?:whole )?number|text|path|table)\b", r"\1s", type_)
 
 
 def _bounded(value: dict[str, Any]) -> str:
     word = "number" if value["type"] == "number" else "whole number"
-    low = value.get("exclusiveMinimum", value.get("minimum"))
-    high = value.get("exclusiveMaximum", value.get("maximum"))
-    above = "" if low is None else f" {'>' if 'exclusiveMinimum' in value else '≥'} {low}"
-    below = "" if high is None else f" {'<' if 'exclusiveMaximum' in value else '≤'} {high}"
-    return word + above + ("," if above and below else "") + below
+    if "minimum" in value and "maximum" in value:
+        return f"{word} {_plain(value['minimum'])} to {_plain(value['maximum'])}"
+    ends = [f"{text} {_plain(value[key])}" for key, text in _ENDS.items() if key in value]
+    return " ".join([word, " and ".join(ends)]).rstrip()
+
+
+_ENDS = {
+    "exclusiveMinimum": "above",
+    "minimum": "at least",
+    "exclusiveMaximum": "below",
+    "maximum": "at most",
+}
+
+
+def _plain(number: float) -> str:
+    """Write the end of a range, with a minus of its own."""
+    text = _digits(number) if abs(number) < 2**53 else f"2^{math.log2(number):g}"
+    return f"−{text[1:]}" if text.startswith("-") else text
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

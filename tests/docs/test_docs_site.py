@@ -53,6 +53,13 @@ def test_every_key_of_a_cell_file_says_what_it_means():
     assert "`view_margin_px`" in "".join(reference())  # it raises where a comment is missing
 
 
+def test_ranges_of_a_cell_file_are_written_in_words():
+    text = "".join(reference())
+    for words in ("number above 0 and at most 100", "3 × number −1000 to 1000", "1e-6 to 1000"):
+        assert words in text
+    assert not re.search("[≥≤]|e[-+]0", text)
+
+
 def test_every_table_of_a_cell_file_has_a_section_with_its_keys():
     sections = "\n".join(reference()).split("\n## ")
     rows = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)

@@ -54,7 +54,7 @@ class CollisionTable(Table):
 class ArmTable(Placement):
     """An arm; its placement is that of its base in the world."""
 
-    model: Path  # MJCF or URDF; package:NAME/PATH in an installed package, see `locate_model`
+    model: Path  # MJCF or URDF; `package:NAME/PATH` in an installed package
     body: Text  # last body of the arm; cameras are mounted on it unless they name another
     start_deg: Joints  # initial joint positions; m for prismatic joints
     # Rate limits, m/s for prismatic joints; default: the model's, or else 180 or 0.5.

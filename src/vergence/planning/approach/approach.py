@@ -214,7 +214,8 @@ class Approach:
         self._failures = 0
         self._closing.scale_deviation = min(self._closing.scale_deviation, found.depth_deviation)
         if isinstance(answer.path, PlanFailure):
-            self._outcome = replace(answer.path.outcome(frame.time), kind=OutcomeKind.NOT_REACHED)
+            reason = f"no path leads on from here: {answer.path.reason}"
+            self._outcome = Outcome(OutcomeKind.NOT_REACHED, reason, frame.time)
             return False
         before = self._recognition
         self._recognition = found

@@ -47,7 +47,10 @@ class ArmTrace(Trace):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraTrace(Trace):
-    """The observations of a camera in K images of up to M points."""
+    """The observations of a camera in K images of up to M points.
+
+    What is true is known of simulated cameras only, and NaN or false of others.
+    """
 
     time: FloatArray = column()  # (K,) s, of exposure
     received: FloatArray = column()  # (K,) s, the tick in which the loop received the image
@@ -62,8 +65,8 @@ class CameraTrace(Trace):
     desired_px: FloatArray = column("M", 2)  # (K, M, 2)
     desired_by_pose: BoolArray = column(kind=bool)  # (K,) whether they follow from a desired pose
     T_camera_target_desired: FloatArray = column(4, 4)  # (K, 4, 4) if the task desires a pose
-    true_px: FloatArray = column("M", 2)  # (K, M, 2) truly projected; this and the rest only from
-    true_depth_m: FloatArray = column("M")  # (K, M) a simulated camera
+    true_px: FloatArray = column("M", 2)  # (K, M, 2) the true projections
+    true_depth_m: FloatArray = column("M")  # (K, M) along the optical axis, m
     visible: BoolArray = column("M", kind=bool)  # (K, M) whether truly in view
     T_world_camera: FloatArray = column(4, 4)  # (K, 4, 4) true
     T_world_target: FloatArray = column(4, 4)  # (K, 4, 4) true
