@@ -471,6 +471,7 @@ def test_points_that_change_on_the_way_are_drawn_as_the_farthest_and_the_mean() 
     assert np.isnan(drawn_errors(np.array([np.nan]), error)).all()
     keys = [plot.key for plot in live_plots(load_cell("pick"), 4, arm)]
     assert keys == ["error_px", "pose_mm", "pose_deg", "target_mm", "joints", "manipulability"]
+    assert live_plots(load_cell("leaf"), 48, arm)[0].series == error.series
     one = live_plots(load_cell("puma560"), 1, arm)[0]
     assert one.series == ("point 0",)
     np.testing.assert_allclose(drawn_errors(np.array([3.0]), one), [3.0])

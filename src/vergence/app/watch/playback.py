@@ -16,6 +16,7 @@ from vergence.app.watch.plots import (
     POSE_MM,
     TARGET_MM,
     Plot,
+    drawn_errors,
     error_key,
     error_plot,
     joints_plot,
@@ -131,8 +132,10 @@ class Playback:
     def _error_rows(self) -> Iterator[Row]:
         for name, trace in self._recording.cameras.items():
             key = error_key(self._further(name))
+            plots = [plot for plot in self.plots if plot.key == key]
             for time, error in zip(trace.received.tolist(), trace.error_px, strict=True):
-                yield row(time, self.plots, {key: error})
+                values = {plot.key: drawn_errors(error, plot) for plot in plots}
+                yield row(time, self.plots, values)
 
     def _pose_rows(self) -> Iterator[Row]:
         for trace in self._recording.cameras.values():

@@ -42,18 +42,21 @@ MANIPULABILITY = Plot(
 MEASURE = Plot("manipulability", "manipulability w′", "0 = singular or at a limit", ("of the arm",))
 
 
-ALL_POINTS = ("farthest", "mean")
+ALL_POINTS: tuple[str, ...] = ("farthest", "mean")
+_MANY = 8  # points that are still drawn one by one
 
 
 def error_plot(points: int | None, camera: str = "") -> Plot:
     """Return the panel of the errors of image points; of a further camera by its name.
 
     Args:
-        points: how many there are, with a curve each; None if others come on the way, so that the
-            farthest one and the mean are drawn.
+        points: how many there are, with a curve each; of more than eight, or None if others come
+            on the way, the farthest one and the mean are drawn.
         camera: name of a further one.
     """
-    names = ALL_POINTS if points is None else tuple(f"point {k}" for k in range(points))
+    names = ALL_POINTS
+    if points is not None and points <= _MANY:
+        names = tuple(f"point {k}" for k in range(points))
     title = "error of the image points"
     return Plot(error_key(camera), f"{title} in {camera}" if camera else title, "px", names)
 
