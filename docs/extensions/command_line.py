@@ -75,7 +75,7 @@ def _kind(parameter: Any) -> str:
 def _default(parameter: Any) -> str:
     if parameter.required:
         return "required"
-    if parameter.default in (None, False, ""):
+    if parameter.default is False or parameter.default in (None, ""):
         return ""
     if parameter.default is True and parameter.secondary_opts:
         return f"`{parameter.opts[0]}`"

@@ -78,6 +78,10 @@ def test_options_that_a_command_mentions_are_code():
     assert [line for line in text.splitlines() if re.search(r"--[a-z]", line)] == []
 
 
+def test_a_default_of_zero_is_shown():
+    assert "| `--seed INT` | Random seed. | `0` |" in "\n".join(commands())
+
+
 def test_a_command_lists_its_arguments_first_and_no_empty_default():
     for section in "\n".join(commands()).split("\n## "):
         rows = [line for line in section.splitlines() if line.startswith("| `")]
