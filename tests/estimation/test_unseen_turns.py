@@ -10,6 +10,8 @@ from vergence.estimation import (
     PoseFilter,
     shown_covariance,
     told_covariance,
+    with_turn,
+    with_undecided,
     with_unseen,
     without_unseen,
 )
@@ -66,3 +68,27 @@ def test_without_such_motions_a_belief_stays_what_it_is() -> None:
     none = np.zeros((6, 0))
     assert without_unseen(belief, none) is belief
     assert with_unseen(belief, belief, none) is belief
+
+
+def test_a_turn_that_is_not_decided_stays_as_uncertain_as_it_was_up_to_the_farthest_one() -> None:
+    rng = np.random.default_rng(2)
+    belief, motions = turning(rng)
+    axis = motions[3:, 0]
+    updated = replace(belief, covariance=1e-4 * belief.covariance)
+    predicted = axis @ belief.covariance[3:6, 3:6] @ axis
+    for angle in (0.5 * np.sqrt(predicted), 2.0 * np.sqrt(predicted)):
+        after = with_undecided(belief, updated, angle * motions)
+        assert axis @ after.covariance[3:6, 3:6] @ axis == pytest.approx(min(predicted, angle**2))
+    assert with_undecided(belief, updated, np.zeros((6, 0))) is updated
+
+
+def test_after_a_jump_to_another_turn_the_velocity_about_its_axis_is_not_known() -> None:
+    rng = np.random.default_rng(3)
+    belief, motions = turning(rng)
+    belief = replace(belief, velocity=rng.normal(size=6))
+    motion, axis = 0.4 * motions[:, 0], motions[3:, 0]
+    after = with_turn(belief, motion)
+    moved = pose_difference(after.T_world_target, belief.T_world_target)
+    assert moved == pytest.approx(motion)
+    assert axis @ after.velocity[3:] == pytest.approx(0.0, abs=1e-12)
+    assert axis @ after.covariance[9:, 9:] @ axis > 9.0

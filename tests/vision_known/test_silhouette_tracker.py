@@ -77,7 +77,7 @@ def test_lines_that_err_alike_do_not_draw_the_outline_along(seed: int) -> None:
 
     def fitted(offsets_px: np.ndarray) -> np.ndarray:
         lines = ContourLines(offsets_px, sure, sure > 0.0, sure)
-        fit = fit_contour(T, T, anywhere, lens, outline, lines, sure, 1.5, 3)
+        fit = fit_contour(T, T, anywhere, lens, outline, lines, sure, 1.5, 0.6, 3)
         moved: np.ndarray = CAMERA.project(fit[None, :3, 3])[0] - CAMERA.project(T[None, :3, 3])[0]
         return moved
 

@@ -11,6 +11,8 @@ from vergence.estimation.filters.target_filter import TargetBelief, TargetFilter
 from vergence.estimation.filters.unseen_turns import (
     shown_covariance,
     told_covariance,
+    with_turn,
+    with_undecided,
     with_unknown,
     with_unseen,
     without_unseen,
@@ -97,6 +99,8 @@ __all__ = [
     "told_covariance",
     "view_of",
     "with_unknown",
+    "with_turn",
+    "with_undecided",
     "with_unseen",
     "without_unseen",
     "SelfCalibration",

@@ -60,6 +60,43 @@ def with_unseen(predicted: Belief, updated: Belief, motions: FloatArray) -> Beli
     )
 
 
+def with_turn(belief: Belief, motion: FloatArray) -> Belief:
+    """Return a belief moved by (δp, δθ), (6,), with an unknown velocity along this motion.
+
+    What was taken for its velocity was that of another turn.
+    """
+    unit = motion / np.linalg.norm(motion[3:])
+    P = belief.covariance + _along(unit[:, None], np.array(((0.0,), _MOST[1:])))
+    return replace(
+        belief,
+        T_world_target=moved_pose(belief.T_world_target, motion),
+        velocity=belief.velocity - unit * (unit[3:] @ belief.velocity[3:]),
+        covariance=np.ascontiguousarray(P),
+    )
+
+
+def with_undecided(predicted: Belief, updated: Belief, motions: FloatArray) -> Belief:
+    """Return an updated belief that is as uncertain as before about rotations, to an extent.
+
+    Each image measures such a rotation near one of several angles that fit it equally well. Until
+    one is excluded, their agreement says nothing about which of them is right.
+
+    Args:
+        predicted: the belief before the update.
+        updated: the update.
+        motions: (6, K), with rotations by the largest angle, rad, that fits as well.
+    """
+    if not motions.shape[1]:
+        return updated
+    angles = np.linalg.norm(motions[3:], axis=0)
+    units = motions / angles
+    kept = np.minimum(unseen_variance(predicted, units), _MOST[:, None])
+    kept[0] = np.minimum(kept[0], angles**2)
+    added = np.maximum(kept - unseen_variance(updated, units), 0.0)
+    P = updated.covariance + _along(units, added)
+    return replace(updated, covariance=np.ascontiguousarray(P))
+
+
 def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
     """Return a covariance (12, 12) in which motions that no image shows are unknown."""
     P = _projected(covariance, motions) + _along(motions, MOST_RAD**2)

@@ -15,6 +15,8 @@ from vergence.estimation import (
     shown_covariance,
     told_covariance,
     view_of,
+    with_turn,
+    with_undecided,
     with_unknown,
     with_unseen,
     without_unseen,
@@ -23,6 +25,7 @@ from vergence.estimation.known_object.object_tracker import Measurement, ObjectT
 from vergence.geometry import pose_difference, se3_compose
 from vergence.signals import ImagePoints
 from vergence.vision.known_object.partial_view import ONE_EDGE, one_edge_decides
+from vergence.vision.known_object.turn_test import SURE
 
 CAMERA = "camera"
 LEAST_SHARE = 0.2  # below this fraction, an object cannot be distinguished from its background
@@ -203,14 +206,29 @@ class ObjectFollower:
             # It may have stopped: search at its last position as well.
             again = self._look(image, belief, self._belief.T_world_target)
             seen, doubt = again if not again[1].reason else (seen, doubt)
+        turns = SURE
+        if not doubt.reason:
+            turns = self._tracker.other_turns(
+                image,
+                self._camera,
+                seen,
+                self._search_covariance(belief, seen.T_camera_target),
+                self._memory,
+            )
+        if turns.moved.any():
+            belief = with_turn(belief, turns.moved)
+            seen, doubt = self._look(image, belief, belief.T_world_target)
+        undecided = turns.undecided if self._all_show(seen) else np.zeros((6, 0))
         reason = doubt.reason
         if not reason:
             view = view_of(_points(seen, time), self._camera, np.eye(4), seen.points)
             update = self._filter.update(without_unseen(belief, seen.unseen), view)
-            belief = with_unseen(belief, update.belief, seen.unseen)
+            updated = with_undecided(belief, update.belief, undecided)
+            belief = with_unseen(belief, updated, seen.unseen)
             if update.verdict not in _USED:
                 reason = f"the image {update.verdict.value}"
-        self._belief, self._unseen, self._shared = belief, seen.unseen, seen.shared
+        self._belief, self._shared = belief, seen.shared
+        self._unseen = np.hstack((seen.unseen, _units(undecided)))
         if not reason:
             self._missed = 0
             self._memory = self._tracker.remember(self._memory, seen)
@@ -256,11 +274,24 @@ class ObjectFollower:
         self, image: ImageArray, belief: Belief, T_camera_target: FloatArray
     ) -> tuple[Measurement, _Doubt]:
         """Search around a pose; return the measurement, and whether and why it is rejected."""
-        covariance = shown_covariance(belief, self._unseen)[:6, :6]
         seen: Measurement = self._tracker.measure(
-            image, self._camera, T_camera_target, covariance, self._memory
+            image,
+            self._camera,
+            T_camera_target,
+            self._search_covariance(belief, T_camera_target),
+            self._memory,
         )
         return seen, self._doubt(belief, seen)
+
+    def _search_covariance(self, belief: Belief, T_camera_target: FloatArray) -> FloatArray:
+        """Return the covariance (6, 6) of a prediction, without what no image shows."""
+        free = self._tracker.free_motions(T_camera_target)
+        return shown_covariance(belief, free)[:6, :6]
+
+    def _all_show(self, seen: Measurement) -> bool:
+        """Return whether an image shows every motion that any image shows."""
+        free = self._tracker.free_motions(seen.T_camera_target)
+        return bool(seen.unseen.shape[1] == free.shape[1])
 
     def _doubt(self, belief: Belief, seen: Measurement) -> _Doubt:
         """Return whether and why an image is rejected."""
@@ -345,6 +376,11 @@ def pose_distance(T: FloatArray, T_other: FloatArray, covariance: FloatArray) ->
     """
     error = pose_difference(T, T_other)
     return float(error @ np.linalg.solve(covariance[:6, :6], error))
+
+
+def _units(motions: FloatArray) -> FloatArray:
+    """Return motions (6, K) with unit rotations."""
+    return np.asarray(motions / np.linalg.norm(motions[3:], axis=0))
 
 
 def _points(seen: Measurement, time: float) -> ImagePoints:

@@ -10,6 +10,7 @@ from vergence.vision.known_object import ObjectModel
 from vergence.vision.known_object.contour_maps import Maps
 from vergence.vision.known_object.contour_vote import Contour
 from vergence.vision.known_object.look_alikes import Turn
+from vergence.vision.known_object.turn_test import TurnTest
 
 
 class Measurement(Protocol):
@@ -101,6 +102,25 @@ class ObjectTracker(Protocol):
         memory: Any,
     ) -> Any:
         """Return the `Measurement` of an image."""
+        ...
+
+    def other_turns(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        seen: Any,
+        pose_covariance: FloatArray,
+        memory: Any,
+    ) -> TurnTest:
+        """Compare a measurement of an image with turns that its prediction allows for.
+
+        Args:
+            image: the image that was measured.
+            camera: the camera's model.
+            seen: the measurement.
+            pose_covariance: of the predicted pose, (6, 6), as for `measure`.
+            memory: appearance of the object.
+        """
         ...
 
     def log_ratio(self, seen: Any, other: Any, camera: Camera, chance: float) -> float:

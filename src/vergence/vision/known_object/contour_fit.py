@@ -12,7 +12,6 @@ from vergence.vision.known_object.silhouette import Outline
 
 _INWARD = 0.6  # tolerance inward, as a share of that outward
 _BESIDE, _BESIDE_PX = 6, 40.0  # lines to either side that make a run, and how far they may be
-_RUN_PX = 0.6  # mean residual of a run at which it counts a quarter
 _CLIPPED_PX = 4.0  # residual that no line of a run exceeds
 SLIDING_PX = 100.0  # standard deviation along the contour
 DEEP_ODDS = 0.5  # mean log odds of the object's pixels on a line that counts
@@ -30,6 +29,7 @@ def fit_contour(
     lines: ContourLines,
     weights: FloatArray,
     tolerance_px: float,
+    run_px: float,
     iterations: int,
 ) -> FloatArray:
     """Return the pose (4, 4) that fits the lines, by Newton steps on their robust squares.
@@ -46,6 +46,7 @@ def fit_contour(
         lines: where they find the contour.
         weights: of the lines, (N,) 0 … 1.
         tolerance_px: residual outward at which a line counts a quarter.
+        run_px: mean residual of a run at which it counts a quarter, at least.
         iterations: how many steps.
     """
     T = T_start.copy()
@@ -54,7 +55,7 @@ def fit_contour(
         moved, slopes = outline_motion(T, lens, outline)
         residuals = lines.offsets_px - moved
         runs = means_of_runs(residuals, outline, lines, weights)
-        run_tolerance = max(_RUN_PX, 2.0 * np.median(np.abs(runs)))
+        run_tolerance = max(run_px, 2.0 * np.median(np.abs(runs)))
         for n in range(len(weights)):
             weight, residual = weights[n] * lines.information[n], residuals[n]
             if weight <= 0.0 or np.isnan(residual):

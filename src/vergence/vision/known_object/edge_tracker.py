@@ -29,6 +29,7 @@ from vergence.vision.known_object.edge_samples import (
 from vergence.vision.known_object.look_alikes import Turn, symmetries
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.pose_evidence import edge_nats
+from vergence.vision.known_object.turn_test import SURE, TurnTest
 
 _MOST_SAMPLES = 400  # over all edges
 _MOST_PLACES = 40  # of an edge
@@ -133,6 +134,17 @@ class EdgeTracker:
         """Return places on the edges that are visible at a pose (4, 4)."""
         samples = self._samples(T_camera_target, camera, LEAST_COSINE)
         return contour_of(samples.points_px, samples.normals)
+
+    def other_turns(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        seen: EdgeMeasurement,
+        pose_covariance: FloatArray,
+        memory: object,
+    ) -> TurnTest:
+        """Return that no other turn was possible: rotated poses are tracked in parallel."""
+        return SURE
 
     def log_ratio(
         self, seen: EdgeMeasurement, other: EdgeMeasurement, camera: Camera, chance: float

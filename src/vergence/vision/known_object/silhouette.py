@@ -51,6 +51,7 @@ def outline_of(
     triangles: IntArray,
     closed: bool,
     count: int,
+    most_cells: int = MOST_CELLS,
 ) -> Outline | None:
     """Return places evenly spaced on the outline; None if the object is not in front of the camera.
 
@@ -61,13 +62,14 @@ def outline_of(
         triangles: vertices of each, (F, 3), counter-clockwise from outside.
         closed: whether the mesh encloses a volume, so that back faces can be ignored.
         count: approximate number of places.
+        most_cells: along a side of the mask.
     """
     import cv2
 
     projected, box = np.empty((len(vertices), 3)), np.empty(4)
     if not project_vertices(T, vertices, projected, box):
         return None
-    grid = _grid_around(box, lens)
+    grid = _grid_around(box, lens, most_cells)
     if grid is None:
         return None
     nearness = draw_nearness(projected, triangles, grid, closed)
@@ -81,7 +83,7 @@ def outline_of(
     return outline
 
 
-def _grid_around(box: FloatArray, lens: FloatArray) -> Grid | None:
+def _grid_around(box: FloatArray, lens: FloatArray, most_cells: int) -> Grid | None:
     """Return cells for the part of a box (4,) in the image plane that the camera may see."""
     focal = float(max(lens[0], lens[1]))
     # A distorted lens sees more or less than its pinhole model, so a larger area is rendered.
@@ -92,7 +94,7 @@ def _grid_around(box: FloatArray, lens: FloatArray) -> Grid | None:
     width, height = min(float(box[2]), right) - x, min(float(box[3]), bottom) - y
     if not (width > 0.0 and height > 0.0):
         return None
-    cell = max(LEAST_CELL_PX / focal, max(width, height) / MOST_CELLS)
+    cell = max(LEAST_CELL_PX / focal, max(width, height) / most_cells)
     return Grid(x - 2 * cell, y - 2 * cell, cell, int(width / cell) + 6, int(height / cell) + 6)
 
 

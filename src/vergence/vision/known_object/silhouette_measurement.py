@@ -25,6 +25,7 @@ class SilhouetteMeasurement(NamedTuple):
     unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
     shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
     astray: FloatArray  # (6, 6) and of what more is wrong while a turn is unknown
+    weakest: FloatArray  # (6,) the motion of a turn that shows least; 0 if none does
 
     @property
     def share(self) -> float:
@@ -79,4 +80,5 @@ def nothing_found(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
     return SilhouetteMeasurement(
         np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, 0, none,
         np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
+        np.zeros(6),
     )  # fmt: skip

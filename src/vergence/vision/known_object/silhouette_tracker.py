@@ -44,12 +44,20 @@ from vergence.vision.known_object.silhouette_measurement import (
     share_log_ratio,
 )
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes, symmetric_turns
-from vergence.vision.known_object.weak_turns import USUAL, least_shown_of, weak_turns
+from vergence.vision.known_object.turn_test import SURE, TurnTest, View, compare_turns
+from vergence.vision.known_object.weak_turns import (
+    USUAL,
+    hidden_turn_of,
+    least_shown_of,
+    weak_turns,
+    weakest_turn,
+)
 
 _MOST_TRIANGLES = 20_000  # of the mesh that is drawn: half a millisecond
 _INDEPENDENT = 60  # lines that err apart: neighbours share pixels
 _FINE = (1, 1)  # scales one after the other, for a pose that is known to some pixels
 _TOLERANCE_PX = 1.5  # residual at which a line counts a quarter, at one pixel a segment
+_RUN_PX = 0.6  # mean residual of a run of lines at which it counts a quarter
 _STEPS = 3  # of Newton for one outline
 _LEARNING_GAPS_PX = (5.0, 2.0, 0.5)  # in the first image the contour is not known well
 _GAP_PX = 0.5  # on both sides of the contour, where pixels show both
@@ -91,6 +99,7 @@ class SilhouetteTracker:
     least_shown: float = field(init=False, repr=False, compare=False)  # see `least_shown_of`
     size: float = field(init=False, repr=False, compare=False)  # of the model, m
     axes: FreeAxes = field(init=False, repr=False, compare=False)  # turns that no outline shows
+    hidden_turn: FloatArray = field(init=False, repr=False, compare=False)  # see `hidden_turn_of`
     sought: ClassVar[str] = "the outline"
 
     def __post_init__(self) -> None:
@@ -102,6 +111,7 @@ class SilhouetteTracker:
         object.__setattr__(self, "size", self.model.size)
         object.__setattr__(self, "axes", free_axes(shape))
         object.__setattr__(self, "least_shown", least_shown_of(shape, self.axes))
+        object.__setattr__(self, "hidden_turn", hidden_turn_of(shape, self.axes))
 
     @property
     def free(self) -> str:
@@ -151,6 +161,45 @@ class SilhouetteTracker:
             seen = self._look(pixels, lens, T, prior, colors, None)
             T = seen.T_camera_target
         return seen
+
+    def other_turns(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        seen: SilhouetteMeasurement,
+        pose_covariance: FloatArray,
+        memory: SilhouetteMemory,
+    ) -> TurnTest:
+        """Compare a measurement with turns that its prediction allows for.
+
+        They are about the axis that this view shows least, or that other views do not show,
+        whichever was predicted worse.
+
+        Args:
+            image: the image that was measured.
+            camera: the camera's model.
+            seen: the measurement.
+            pose_covariance: of the predicted pose, as for `measure`.
+            memory: what the object looked like.
+        """
+        if self.least_shown > USUAL or not (memory.colors.known and seen.weakest.any()):
+            return SURE
+        lens, T = pack_lens(camera), seen.T_camera_target
+        apart_px = np.linalg.norm(np.diff(seen.samples_px, axis=0), axis=1)
+        view = View(
+            self._pixels(image, camera),
+            lens,
+            memory.colors.odds,
+            self.shape,
+            self.closed,
+            float(np.median(apart_px)) * self.lines / _INDEPENDENT,
+        )
+        half_px = 0.5 * self.size * lens[0] / T[2, 3]
+        hidden = (self.hidden_turn.reshape(2, 3) @ T[:3, :3].T).ravel()
+        motion = max(
+            (hidden, seen.weakest), key=lambda each: each[3:] @ pose_covariance[3:, 3:] @ each[3:]
+        )
+        return compare_turns(view, T, motion, pose_covariance, half_px)
 
     def elsewhere(self, memory: SilhouetteMemory) -> SilhouetteMemory:
         """Return the memory at another place: an object keeps its colours."""
@@ -249,6 +298,7 @@ class SilhouetteTracker:
                 lines,
                 line_weights(lines),
                 _TOLERANCE_PX * scale,
+                _RUN_PX,
                 _STEPS,
             )
             if not scales:
@@ -295,6 +345,7 @@ class SilhouetteTracker:
             unseen,
             shared,
             self._astray(T, unseen),
+            weakest_turn(slopes, self.axes.motions(T)),
         )
 
     def _unseen(self, T: FloatArray, lens: FloatArray, slopes: FloatArray) -> FloatArray:

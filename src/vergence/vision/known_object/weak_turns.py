@@ -43,25 +43,57 @@ def weak_turns(
     return motions[:, squares < least**2]
 
 
+def weakest_turn(slopes: FloatArray, free: FloatArray) -> FloatArray:
+    """Return the motion (δp, δθ), (6,), with a unit rotation, that moves an outline least.
+
+    Args:
+        slopes: motion of each place across the outline by (δp, δθ), (N, 6), px.
+        free: motions known to be unobservable, (6, F); the one returned rotates differently. It is
+            zero if there is no other.
+    """
+    squares, motions = _shown(slopes, free)
+    return motions[:, 0] if len(squares) else np.zeros(6)
+
+
 def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
     """Return the outline's motion, relative to half the size, at which a rotation is observable.
 
     An object similar to an ellipsoid has a rotation that is never observable, whatever a single
     image suggests.
     """
+    least = [share for share, _ in _views(model, axes, _VIEWS)]
+    return ELLIPSOID if least and float(np.median(least)) < _LIKE_ELLIPSOID else USUAL
+
+
+def hidden_turn_of(model: ObjectModel, axes: FreeAxes) -> FloatArray:
+    """Return a motion (δp, δθ) that some views do not show, (6,), along the axes of the object.
+
+    A mug with a hidden handle rotates about the axis of its body. It is zero if there is none.
+    """
+    views = _views(model, axes, 2 * _VIEWS)
+    share, motion = min(views, key=lambda view: view[0], default=(np.inf, np.zeros(6)))
+    return motion if share < USUAL else np.zeros(6)
+
+
+def _views(model: ObjectModel, axes: FreeAxes, count: int) -> list[tuple[float, FloatArray]]:
+    """Return how far the weakest turn moves the outline in random views, and its motion (6,).
+
+    The distance is relative to half the object's size, the motion along the object's axes.
+    """
     random = np.random.default_rng(0)
     middle = 0.5 * (model.vertices.min(axis=0) + model.vertices.max(axis=0))
-    lens, closed, least = pack_lens(_CAMERA), model.closed, []
-    for _ in range(_VIEWS):
+    lens, closed, views = pack_lens(_CAMERA), model.closed, []
+    for _ in range(count):
         R = so3_exp(random.normal(0.0, 1.2, 3))
         T = se3(R, np.array((0.0, 0.0, 3.0 * model.size)) - R @ middle)
         outline = outline_of(T, lens, model.vertices, model.triangles, closed, _PLACES)
         if outline is None:  # thinner than a cell
             continue
-        squares, _ = _shown(outline_motion(T, lens, outline)[1], axes.motions(T))
+        squares, motions = _shown(outline_motion(T, lens, outline)[1], axes.motions(T))
         if len(squares):
-            least.append(np.sqrt(max(squares[0], 0.0)) * T[2, 3] / (0.5 * model.size * lens[0]))
-    return ELLIPSOID if least and float(np.median(least)) < _LIKE_ELLIPSOID else USUAL
+            share = np.sqrt(max(squares[0], 0.0)) * T[2, 3] / (0.5 * model.size * lens[0])
+            views.append((float(share), np.concatenate(np.split(motions[:, 0], 2) @ R)))
+    return views
 
 
 def _shown(slopes: FloatArray, free: FloatArray) -> tuple[FloatArray, FloatArray]:
