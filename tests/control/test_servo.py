@@ -290,3 +290,21 @@ def test_without_any_features_the_arm_is_asked_to_stand():
     assert not servo.command(Observation(0.0, ()), Reference(0.0), joints).velocity.any()
     with pytest.raises(InputError, match="did you mean a"):
         Servo(ARM, {"a": AT_TIP}, [Term(ImageBased(), camera="aa")])
+
+
+@pytest.mark.parametrize("objective", [ImageBased(feature=Centre), PointPose()])
+def test_a_second_camera_that_finds_nothing_leaves_the_arm_to_the_first(objective):
+    points, depth = seen(ARM, START, WORLD)
+    desired = points + [20.0, -10.0]
+    one = Servo(ARM, CAMERA, ImageBased(), depth_m=depth)
+    both = Servo(
+        ARM, {"wrist": AT_TIP, "wall": GENERAL}, [ImageBased(), Term(objective, camera="wall")],
+        depth_m={"wrist": depth, "wall": depth},
+    )  # fmt: skip
+    (view,) = observed(points).views
+    blind = replace(view, camera="wall", found=np.zeros(len(points), dtype=np.bool_))
+    reference = Reference(0.0, desired, elsewhere_px={"wall": desired})
+    joints = JointState(0.0, START, np.zeros(6))
+    command = both.command(Observation(0.0, (view, blind)), reference, joints)
+    assert command.fault is None
+    np.testing.assert_allclose(command.velocity, commanded(one, points, desired).velocity)

@@ -177,7 +177,10 @@ class Servo:
             if view.camera in self._cameras:
                 self._cameras[view.camera].view = view
         fresh = [
-            name for name, each in self._cameras.items() if alone or each.is_fresh(joints.time)
+            name
+            for name, each in self._cameras.items()
+            if alone
+            or (each.is_fresh(joints.time) and (name == self._first or each.view.found.any()))
         ]
         if self._first in fresh and (fault := self._too_few(observation)):
             return JointCommand(self._rest, np.zeros(6), fault=fault)
