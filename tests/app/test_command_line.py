@@ -163,6 +163,7 @@ BOARD = ["calibrate", ".", "--board", "9x6", "--square-mm", "25"]
         (["map", "puma560", "--speeds", "fast"], "--speeds: given fast; allowed: numbers"),
         (["calibrate", "--synthetic", "puma560", "--lens", "k1k3"], "did you mean k1k2?"),
         (["run", "puma560", "--set", "law.Q=abc"], "law.Q: given abc; allowed: a number"),
+        (["run", "puma560", "--set", "law.Q=[-.03]"], "law.Q: given [-.03], which is not TOML: "),
         (["calibrate", "nowhere"], "nowhere: no such folder; needed: a folder of images"),
         ([*BOARD, "--marker-mm", "1e-300"], "--marker-mm"),
         ([*BOARD, "--square-mm", "inf"], "--square-mm"),

@@ -12,6 +12,7 @@ _LONGEST_TEXT = 1000  # characters of a value
 _MOST_VALUES = 50_000
 _DEEPEST = 12  # tables and lists within each other
 _LARGEST_INTEGER = 1 << 63
+_OPENING = "[{\"'"  # of a list, a table, or a string
 
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
@@ -65,7 +66,11 @@ def _value(key: str, text: str) -> Any:
         values = tomllib.loads(f"value = {text}")
     except RecursionError:
         raise InputError("--set", key, "values nested too deep", _depth()) from None
-    except tomllib.TOMLDecodeError:
+    except tomllib.TOMLDecodeError as error:
+        if text.lstrip()[0] in _OPENING:
+            reason = _first_line(error).partition(" (at ")[0]
+            given = f"{text}, which is not TOML: {reason}"
+            raise InputError("--set", key, given, "a TOML value, such as [0.1, -0.2]") from None
         return text  # a bare word is meant as a string
     except ValueError as error:
         raise InputError("--set", key, _first_line(error), "a TOML value") from None
