@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from vergence.arrays import FloatArray, ImageArray, frozen
 from vergence.geometry import angle_between, pose_difference, se3, se3_compose, se3_exp
@@ -182,7 +181,6 @@ def _fit(view: View, start: FloatArray, information: FloatArray, scale: int) -> 
     return _Fit(start, before / per), _Fit(T, after / per)
 
 
-@njit(cache=True)
 def found_nats(outline: Outline, lines: ContourLines, moved: FloatArray, scale: int) -> float:
     """Return the log likelihood ratio to chance of an outline, times the distance of its places.
 
@@ -197,14 +195,10 @@ def found_nats(outline: Outline, lines: ContourLines, moved: FloatArray, scale: 
         moved: where the outline is on each of them, (N,), px.
         scale: pixels in a segment.
     """
-    nats = 0.0
-    most = np.log((2 * REACH + 1) / (_PRECISE_PX * np.sqrt(2.0 * np.pi)))
-    apart = np.empty(len(moved))
-    for n in range(len(moved)):
-        du, dv = outline.points_px[n] - outline.points_px[n - 1]
-        apart[n] = np.sqrt(du * du + dv * dv)
-        if lines.usable[n] and lines.deep_odds[n] > DEEP_ODDS:
-            residual = (lines.offsets_px[n] - moved[n]) / (scale * _PRECISE_PX)
-            clear = lines.information[n] * scale * scale > _CLEAR
-            nats += max(most - 0.5 * residual * residual, _ABSENT) if clear else _ABSENT
-    return nats * float(np.median(apart))
+    most = float(np.log((2 * REACH + 1) / (_PRECISE_PX * np.sqrt(2.0 * np.pi))))
+    residual = (lines.offsets_px - moved) / (scale * _PRECISE_PX)
+    clear = lines.information * scale**2 > _CLEAR
+    nats = np.where(clear, np.fmax(most - 0.5 * residual**2, _ABSENT), _ABSENT)
+    told = lines.usable & (lines.deep_odds > DEEP_ODDS)
+    apart = outline.points_px - np.roll(outline.points_px, 1, axis=0)
+    return float(nats[told].sum() * np.median(np.linalg.norm(apart, axis=1)))
