@@ -17,6 +17,7 @@ _FOLDS = (2, 3, 4, 6)  # of common symmetries
 _SAME = 0.01  # relative to the object's size: edges closer than this coincide
 _PLACES = 9  # compared along an edge
 _APART_RAD = 0.05
+_HALF_TURN_RAD = np.pi - 1e-6
 _OFF_CENTRE = 0.05  # relative to the object's size: ends farther from its centre show a rotation
 _OFF_LINE = 0.1  # sine of the angle between the two ends that do
 _MOST_PAIRS = 600  # of ends that may take their places: more is a round object
@@ -177,6 +178,8 @@ def _between_ends(model: ObjectModel, middle: FloatArray) -> list[FloatArray]:
         if abs(np.linalg.norm(one - other) - apart) < near:
             R = _frame(one, other) @ here.T
             vector = so3_log(R)
+            if np.linalg.norm(vector) > _HALF_TURN_RAD:  # about either end of its axis
+                vector *= np.sign(vector[np.argmax(np.abs(vector))])
             if np.linalg.norm(vector) > _APART_RAD and tree.query(ends @ R.T)[0].max() < near:
                 vectors.append(vector)
     return vectors
