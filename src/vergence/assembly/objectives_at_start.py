@@ -70,7 +70,9 @@ def start_state(
     points_px = seen_px if points_px is None else points_px
     depth_m = np.full(len(seen_px), max(context.distance_m, _LEAST_M))
     with suppress(InputError):  # where nothing is known of it
-        depth_m = context.depth_m(camera, context.cell.law.depth_m)
+        known_m = context.depth_m(camera, context.cell.law.depth_m)
+        if len(known_m) == len(seen_px):  # a task may leave out some of the features
+            depth_m = known_m
     found = np.isfinite(points_px).all(axis=1)
     features = Points(context.cameras[camera].normalize(points_px[found]), depth_m[found])
     arm, q = context.arm, context.joints[context.cell.task.arm]
