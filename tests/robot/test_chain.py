@@ -1,5 +1,8 @@
 """A chain read off a model moves as the model does, whatever the arm."""
 
+import pickle
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -53,6 +56,17 @@ def test_pose_and_jacobian_are_those_of_mujoco(joint_count: int, kind: str) -> N
         columns = [model.joint(name).dofadr[0] for name in arm.names]
         turned = np.kron(np.eye(2), R.T) @ theirs[:, columns]
         np.testing.assert_allclose(arm.jacobian(q), turned, atol=1e-12)
+
+
+def test_an_arm_is_of_one_kind_for_kernels_wherever_it_comes_from() -> None:
+    rng = np.random.default_rng(0)
+    read = Arm.from_mujoco(mujoco.MjModel.from_xml_string(random_arm(rng, 6)), "eye")
+    written = read.chain._replace(rotation=read.chain.rotation.copy())
+    for arm in (read, replace(read, chain=written), pickle.loads(pickle.dumps(read))):
+        arrays = (*arm.chain, arm.q_min, arm.q_max, arm.rate_max, arm.acceleration_max)
+        assert not any(array.flags.writeable for array in arrays)
+        assert all(array.flags.c_contiguous for array in arrays)
+        np.testing.assert_array_equal(arm.jacobian(np.ones(6)), read.jacobian(np.ones(6)))
 
 
 @pytest.mark.parametrize("joint_count", [1, 6, 7])

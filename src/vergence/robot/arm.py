@@ -1,6 +1,6 @@
 """An arm as controllers see it: kinematics and limits."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -45,6 +45,10 @@ class Arm:
         for name in ("rate_max", "acceleration_max"):
             if not (getattr(self, name) > 0).all():
                 raise InputError("arm", name, getattr(self, name), "positive numbers")
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """Make it anew: the arrays of a pickle may be written to, and kernels are for others."""
+        return type(self), tuple(getattr(self, each.name) for each in fields(self))
 
     @property
     def limits(self) -> FloatArray:
