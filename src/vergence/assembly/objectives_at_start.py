@@ -16,7 +16,7 @@ from vergence.features import Points
 from vergence.loading import asking
 from vergence.parts import kind_of
 
-_LEAST_M = 0.05  # distance of a target
+LEAST_M = 0.05  # distance of a target
 
 
 def require_cameras(context: LawContext) -> None:
@@ -68,7 +68,7 @@ def start_state(
     """
     seen_px, mounting = context.points_px[camera], mounting_of(context, camera)
     points_px = seen_px if points_px is None else points_px
-    depth_m = np.full(len(seen_px), max(context.distance_m, _LEAST_M))
+    depth_m = np.full(len(seen_px), max(context.distance_m, LEAST_M))
     with suppress(InputError):  # where nothing is known of it
         known_m = context.depth_m(camera, context.cell.law.depth_m)
         if len(known_m) == len(seen_px):  # a task may leave out some of the features

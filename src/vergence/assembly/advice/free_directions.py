@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.assembly.law_context import LawContext
-from vergence.assembly.objectives_at_start import start_state
+from vergence.assembly.objectives_at_start import LEAST_M, start_state
 from vergence.control import CameraVelocity, ImageBased, PointPose
 from vergence.control.servo_settings import ServoSettings
 from vergence.errors import InputError
 from vergence.robot import unmeasured_directions
 from vergence.robot.unserved_directions import listed
-
-_LEAST_M = 0.05  # distance of a target
 
 
 def free_directions(context: LawContext) -> str:
@@ -40,7 +38,7 @@ def free_directions(context: LawContext) -> str:
             H += term.weight * A.T @ objective.quadratic(state).H @ A
         except InputError:  # such points make no such feature; the run says so
             return ""
-    free = unmeasured_directions(H, max(context.distance_m, _LEAST_M))
+    free = unmeasured_directions(H, max(context.distance_m, LEAST_M))
     if not free:
         return ""
     words = [listed(free.impossible, "and")] if free.impossible else []
