@@ -74,7 +74,8 @@ def test_a_final_error_behind_a_moving_target_is_explained(recording: Recording)
         {row.name: row.note for row in camera_rows(replace(trace, T_world_target=poses))}
         for poses in (stationary, moving)
     ]
-    assert told[0]["final error"] == "farthest point, last image that shows one"
+    expected = "farthest point from where the law wants it, last image that shows one"
+    assert told[0]["final error"] == expected
     assert "moves at 0.1 m/s" in told[1]["final error"]
 
 

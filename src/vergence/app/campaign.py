@@ -202,7 +202,7 @@ def _why(result: "TrialResult") -> str:
     from vergence.experiments import Ending
 
     if result.ending is Ending.OFF_GOAL and result.final_error_px is not None:
-        return f"the farthest feature is {result.final_error_px:.1f} px off at the end"
+        return f"the farthest point is {result.final_error_px:.1f} px off at the end"
     return result.reason
 
 

@@ -65,7 +65,7 @@ def compare(options: "CompareOptions") -> int:
         )
         return SUCCESS
     _tell(found)
-    say(f"  converged: every feature within {how.tolerance_px:g} px at the end")
+    say(f"  converged: every point within {how.tolerance_px:g} px of its goal at the end")
     say(f"  speed   {campaign.in_words}")
     say(f"  report  {report}")
     say(f"  data    {data}")
@@ -108,9 +108,10 @@ def _write_page(
         markup.section(
             "Result",
             tables,
-            f"<p>Converged: every feature within {how.tolerance_px:g} px at the end; off goal: "
-            f"farther away. Time until then and the camera's path are medians over the runs that "
-            f"converged.{lag}</p>",
+            f"<p>Converged: every point within {how.tolerance_px:g} px of its goal at the end; off "
+            f"goal: farther away. The goal of a law that leaves points free, such as one by their "
+            f"size, is nearest to where they are. Time until then and the camera's path are "
+            f"medians over the runs that converged.{lag}</p>",
             markup.figure(scores_figure(found.scores), "How the runs of each law ended."),
         ),
         markup.section(

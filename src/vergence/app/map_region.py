@@ -123,7 +123,7 @@ def _write_page(
     title = f"{cell.name}: where {verb} {' and '.join(laws)} work?"
     remark = (
         f"{len(results)} runs; features are {how.features}; {campaign.motion}. Converged: every "
-        f"feature within {how.tolerance_px:g} px at the end; off goal: farther away."
+        f"point within {how.tolerance_px:g} px of its goal at the end; off goal: farther away."
     )
     if OWN in region.laws:
         remark += f" “{OWN}” is the law in the cell file."

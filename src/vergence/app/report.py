@@ -14,6 +14,7 @@ from vergence.app.figures import (
     error_chart,
     estimate_chart,
     event_lines,
+    feature_errors_chart,
     joints_chart,
     measures_chart,
     paths_chart,
@@ -209,6 +210,12 @@ def _arm(run: Run, name: str) -> str:
     return markup.section(
         markup.titled("Arm", name),
         _chart(run, joints_chart(arm, trace), "Joint positions and rates against their limits."),
+        _chart(
+            run,
+            feature_errors_chart(trace),
+            "Errors of the law's features. Lengths are in normalized image coordinates, 1 = the "
+            "focal length; angles in rad.",
+        ),
         _chart(
             run,
             twist_chart(trace),

@@ -7,6 +7,7 @@ import numpy as np
 
 from vergence.app.figures.arm import CLEAR_OF, clearance, normalized
 from vergence.app.figures.constraints import constraint_names
+from vergence.app.figures.features import feature_errors
 from vergence.arrays import FloatArray
 from vergence.runtime import ArmInfo
 from vergence.runtime.results import ADVICE, ArmTrace, CameraTrace, Run
@@ -64,7 +65,7 @@ def camera_rows(trace: CameraTrace) -> list[Row]:
         )
     error, drift = _worst(trace.error_px), _worst(trace.drift_px)
     if len(error):
-        note = f"farthest point, last image that shows one{_lag(trace)}"
+        note = f"farthest point from where the law wants it, last image that shows one{_lag(trace)}"
         rows.append(Row("final error", f"{error[-1]:.2f}", "px", note))
         rows.append(Row("largest error", f"{error.max():.2f}", "px", "farthest point, any image"))
     if len(drift):
@@ -94,7 +95,21 @@ def _lag(trace: CameraTrace) -> str:
 
 def arm_rows(info: ArmInfo, trace: ArmTrace) -> list[Row]:
     """Return how close an arm came to its limits."""
-    return [*_measure_rows(trace), *_clearance_rows(trace), *_limit_rows(info, trace)]
+    return [
+        *_feature_rows(trace),
+        *_measure_rows(trace),
+        *_clearance_rows(trace),
+        *_limit_rows(info, trace),
+    ]
+
+
+def _feature_rows(trace: ArmTrace) -> Iterator[Row]:
+    for feature, errors in feature_errors(trace).items():
+        last = np.abs(errors[np.isfinite(errors).any(axis=1)][-1])
+        note = "s − s*, in the feature's own unit, when the law last gave a command"
+        if len(last) > 1:
+            note = f"largest of its {len(last)} values of {note}"
+        yield Row(f"final error of {feature}", f"{np.nanmax(last):.2g}", "", note)
 
 
 def _measure_rows(trace: ArmTrace) -> Iterator[Row]:

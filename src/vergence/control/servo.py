@@ -23,6 +23,7 @@ from vergence.control.servo_camera import (
     depth_for,
     mountings_by_name,
 )
+from vergence.control.servo_goals import ServoGoals
 from vergence.control.situation import Situation
 from vergence.control.solvers import (
     Problem,
@@ -114,6 +115,7 @@ class Servo:
         )
         self._rest = np.zeros(arm.joint_count)
         self._kernel = self._tracking_kernel(solver)
+        self._goals = ServoGoals(self._terms, self._cameras)
 
     @property
     def tracking(self) -> TrackingSetup | None:
@@ -193,7 +195,8 @@ class Servo:
         }
         if self._kernel is not None:
             return self._kernel.command(states[self._first], joints.position.copy())
-        return self._solve(states, joints, reference.joint_rates)
+        command = self._solve(states, joints, reference.joint_rates)
+        return self._goals.added(command, states, reference)
 
     def rates(
         self, features: Points, desired: Points, q: ArrayLike, velocity: ArrayLike | None = None

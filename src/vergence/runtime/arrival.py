@@ -38,10 +38,16 @@ class _Row(NamedTuple):
     """The values of one image."""
 
     time: float  # s
-    error_px: FloatArray  # (M, 2) measured less desired; NaN where not found
-    desired_px: FloatArray  # (M, 2)
+    points_px: FloatArray  # (M, 2) measured; NaN where not found
+    goal_px: FloatArray  # (M, 2) where the law would have them
+    desired_px: FloatArray  # (M, 2) of the reference
     q: FloatArray  # (n,)
     active: tuple[str, ...]
+
+    @property
+    def error_px(self) -> FloatArray:
+        """Measured less desired, (M, 2); NaN where not found."""
+        return self.points_px - self.goal_px
 
 
 class Arrival:
@@ -72,8 +78,13 @@ class Arrival:
             return
         if self._rows and self._rows[-1].desired_px.shape != reference.points_px.shape:
             self._rows.clear()  # the features have changed
-        error = np.where(view.found[:, None], view.points_px - reference.points_px, np.nan)
-        self._rows.append(_Row(view.time, error, reference.points_px, q.copy(), command.active))
+        goal = command.reference or reference
+        assert goal.points_px is not None
+        points_px = np.where(view.found[:, None], view.points_px, np.nan)
+        row = _Row(
+            view.time, points_px, goal.points_px, reference.points_px, q.copy(), command.active
+        )
+        self._rows.append(row)
         while self._rows[0].time < view.time - _WINDOW_S:
             self._rows.popleft()
 
@@ -91,7 +102,7 @@ class Arrival:
     @property
     def points_px(self) -> FloatArray:
         """Mean position of each feature over the last second, (M, 2); NaN where not found."""
-        places = np.array([row.desired_px + row.error_px for row in self._rows])
+        places = np.array([row.points_px for row in self._rows])
         counts = np.isfinite(places).all(axis=2).sum(axis=0)
         total = np.where(np.isfinite(places), places, 0.0).sum(axis=0)
         mean: FloatArray = np.where(counts, total.T / np.maximum(counts, 1), np.nan).T
@@ -167,11 +178,10 @@ def _mean_error(rows: list[_Row]) -> float:
 
 def _mirrored(row: _Row) -> bool:
     """Return whether the best affine map from measured to desired features is a reflection."""
-    seen = np.isfinite(row.error_px).all(axis=1)
+    seen = np.isfinite(row.points_px).all(axis=1)
     if seen.sum() < 3:
         return False
-    desired = row.desired_px[seen]
-    now = desired + row.error_px[seen]
+    desired, now = row.goal_px[seen], row.points_px[seen]
     now, desired = now - now.mean(axis=0), desired - desired.mean(axis=0)
     scatter = now.T @ now
     if np.linalg.det(scatter) < 1e-6 * np.trace(scatter) ** 2:

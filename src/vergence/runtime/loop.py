@@ -234,7 +234,7 @@ class Loop:
             return outcome
         self._part = "end of the task"
         q = sample.joints[self._arm].position
-        return self._task.asked_end(self._now, q, observation, reference)
+        return self._task.asked_end(self._now, q, observation, self._aimed(reference))
 
     def _wait(self, sample: Sample) -> Outcome | None:
         """Continue without an image, for a limited time."""
@@ -352,8 +352,13 @@ class Loop:
             faded = replace(asked, velocity=share * asked.velocity, v_camera=share * asked.v_camera)
             commands = {self._arm: asked if share == 1.0 else faded}
         setpoints = {name: follower.guard.setpoint for name, follower in self._followers.items()}
-        record = TickRecord(self._now, sample, observation, reference, commands, setpoints)
+        aimed = self._aimed(reference)
+        record = TickRecord(self._now, sample, observation, aimed, commands, setpoints)
         self._listeners.tick(record)
+
+    def _aimed(self, reference: Reference) -> Reference:
+        """Return the reference as far as the law's features determine it."""
+        return (self._command and self._command.reference) or reference
 
     def _completed(self, end: float, sample: Sample) -> Outcome:
         measured = sample.joints[self._arm].position

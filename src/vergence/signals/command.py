@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from vergence.arrays import FloatArray
 from vergence.signals.outcome import OutcomeKind
+from vergence.signals.reference import Reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,3 +23,9 @@ class JointCommand:
     slack: Mapping[str, float] = field(default_factory=dict)  # relaxed limits, and by how much
     # m, the arm's least distance to what is near: "self", "arms", "fixtures", "target".
     clearance: Mapping[str, float] = field(default_factory=dict)
+    # s - s_star of each value of the features, by a name such as "size" or "centre.0"; empty of
+    # image points.
+    errors: Mapping[str, float] = field(default_factory=dict)
+    # The reference with the nearest points at which these errors are 0, where the features leave
+    # points free; None where the reference itself is the goal.
+    reference: Reference | None = None

@@ -5,6 +5,7 @@ from vergence.app.figures.chart import Chart, Curve, Marks, Panel, Stretches
 from vergence.app.figures.chart_svg import chart_svg
 from vergence.app.figures.constraints import constraints_chart
 from vergence.app.figures.events import event_lines
+from vergence.app.figures.features import feature_errors, feature_errors_chart
 from vergence.app.figures.image import error_chart, paths_chart
 from vergence.app.figures.motion import (
     camera_chart,
@@ -26,6 +27,8 @@ __all__ = [
     "error_chart",
     "estimate_chart",
     "event_lines",
+    "feature_errors",
+    "feature_errors_chart",
     "joints_chart",
     "measures_chart",
     "paths_chart",

@@ -51,8 +51,8 @@ class CampaignOptions:
         typer.Option(
             min=0.0,
             max=10_000.0,
-            help="Largest final feature error of a converged run, in pixels. Default: 2, and 5 "
-            "for `compare` if the target moves.",
+            help="Largest distance of a point from its goal at the end of a converged run, in "
+            "pixels. Default: 2, and 5 for `compare` if the target moves.",
         ),
     ] = None
     workers: Annotated[

@@ -30,7 +30,7 @@ def arm_row(record: TickRecord, arm: str) -> Row:
         row |= {"command": command.velocity, "v_camera": command.v_camera}
         row |= {"manipulability": command.manipulability, "penalty": command.penalty}
         row |= {"active": tuple(command.active), "slack": dict(command.slack)}
-        row["clearance"] = dict(command.clearance)
+        row |= {"clearance": dict(command.clearance), "errors": dict(command.errors)}
     return row
 
 

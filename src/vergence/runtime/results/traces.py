@@ -43,6 +43,7 @@ class ArmTrace(Trace):
     active: tuple[tuple[str, ...], ...] = column(kind=tuple)  # (K,) limits that were active
     slack: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) relaxed limits, by how much
     clearance: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) m, smallest, by kind
+    errors: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) s - s_star of features
 
 
 @dataclass(frozen=True, slots=True, eq=False)
