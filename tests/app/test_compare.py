@@ -203,7 +203,7 @@ def test_a_run_that_ends_off_the_goal_says_how_far_off() -> None:
         12.345, 20.0, 0.1, 0.0, False, (0, 0, 0), (0, 0, 0), (0, 0), (0, 0),
     )  # fmt: skip
     table = reasons_table([result], "{law}")
-    assert "the farthest feature is 12.3 px off at the end" in table
+    assert "the farthest point is 12.3 px off at the end" in table
     assert "in view" not in table
 
 
