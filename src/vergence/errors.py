@@ -77,17 +77,17 @@ class DriverSilent(VergenceError):
     """Raised by a driver whose hardware does not answer; the loop ends the run and says why."""
 
 
-def echo(given: object) -> str:
-    """Return what was given on one line of at most 200 printable characters."""
+def echo(given: object, most: int = _MOST_ECHOED) -> str:
+    """Return what was given on one line of printable characters, 200 at most by default."""
     try:
         text = str(given)
     except ValueError:  # Python writes no whole number of more than 4300 digits
         text = "a number of thousands of digits"
     except RecursionError:
         text = "values nested too deep"
-    shown = "".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_ECHOED])
+    shown = "".join(c if c.isprintable() else " " for c in text[: 4 * most])
     line = " ".join(shown.split())
-    return line if len(line) <= _MOST_ECHOED else line[: _MOST_ECHOED - 1] + "…"
+    return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

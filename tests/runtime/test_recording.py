@@ -34,6 +34,7 @@ INFO = RunInfo(
     arms={"left": ArmInfo(("slide", "turn"), [-1.0, -np.inf], [1.0, np.inf], [0.5, 2.0])},
     cameras={"wrist": Camera(64, 48, 80.0, 81.0, 31.5, 23.5), "wall": Camera(64, 48, 60, 60, 1, 2)},
 )
+LOST = "point 1 of wrist left the image; " * 10 + "it is looked for"
 
 
 def record_at(time: float, rng: np.random.Generator) -> TickRecord:
@@ -54,7 +55,13 @@ def record_at(time: float, rng: np.random.Generator) -> TickRecord:
     )
     target = TargetState(time, pose, rng.normal(size=6), rng.normal(size=(12, 12)), True)
     command = JointCommand(
-        rng.normal(size=2), rng.normal(size=6), 0.4, 0.9, ("rate of turn",), slack={"view": 0.5}
+        rng.normal(size=2),
+        rng.normal(size=6),
+        0.4,
+        0.9,
+        ("rate of turn",),
+        slack={"view": 0.5},
+        errors={"size": 0.25, "centre.0": -1.0},
     )
     return TickRecord(
         time,
@@ -85,7 +92,7 @@ def recorder_with(folder: Path, records: list[TickRecord]) -> Recorder:
 
 def whole(folder: Path, records: list[TickRecord]) -> Recording:
     recorder = recorder_with(folder, records)
-    recorder.event(2.5, "feature lost", "point 1 of wrist left the image")
+    recorder.event(2.5, "feature lost", LOST)
     recorder.close(DONE, {"max error": 3.5, "note": "fine", "drift": float("nan")})
     return Recording.open(folder)
 
@@ -99,6 +106,7 @@ def test_numbers_of_an_arm_read_back_exactly(tmp_path: Path, records: list[TickR
     np.testing.assert_array_equal(arm.velocity, [state.velocity for state in states])
     np.testing.assert_array_equal(arm.command, [command.velocity for command in commands])
     np.testing.assert_array_equal(arm.v_camera, [command.v_camera for command in commands])
+    assert arm.errors == tuple(command.errors for command in commands)
     assert set(arm.manipulability) == {0.4}
     assert set(arm.penalty) == {0.9}
     assert set(arm.active) == {("rate of turn",)}
@@ -174,7 +182,8 @@ def test_what_is_known_of_the_run_reads_back(tmp_path: Path, records: list[TickR
     assert recording.complete
     assert recording.outcome == DONE
     assert recording.summary == {"max error": 3.5, "note": "fine", "drift": None}
-    assert [(event.time, event.name) for event in recording.events] == [(2.5, "feature lost")]
+    (event,) = recording.events
+    assert (event.time, event.name, event.text) == (2.5, "feature lost", LOST)
     assert (recording.info.cell, recording.info.seed) == (INFO.cell, INFO.seed)
     assert recording.info.text == INFO.text == (tmp_path / "cell.toml").read_text(encoding="utf-8")
     np.testing.assert_array_equal(arm.q_max, [1.0, np.inf])

@@ -32,7 +32,8 @@ from vergence.signals import Outcome, OutcomeKind
 
 _IMAGES = "/image"  # suffix of the topics that are read one by one
 _MOST_EVENTS = 100_000
-_Text = Annotated[str, StringConstraints(max_length=1000)]
+_LONGEST_TEXT = 1000  # characters
+_Text = Annotated[str, StringConstraints(max_length=_LONGEST_TEXT)]
 _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
     Annotated[dict[_Text, float | _Text | None], Field(max_length=1000)],
     config=ConfigDict(allow_inf_nan=False),
@@ -181,7 +182,7 @@ class _Messages:
             try:
                 parts = wire.fields(message)
                 name, text = wire.text_of(parts, 4), wire.text_of(parts, 3)
-                kept.append(Event(wire.time_of(parts, 1), echo(name), echo(text)))
+                kept.append(Event(wire.time_of(parts, 1), echo(name), echo(text, _LONGEST_TEXT)))
             except ValueError:
                 self.skipped += 1
         return tuple(kept)
