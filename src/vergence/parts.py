@@ -91,7 +91,8 @@ def part(role: str | tuple[str, ...], kind: str = "") -> Callable[[C], C]:
             try:
                 construct(self, *args[len(names) :], **values)
             except ValidationError as error:
-                raise explain(error, cls.__name__, values, lambda _: names) from None
+                known = {"kind": kind_of(made), **values}
+                raise explain(error, cls.__name__, known, lambda _: names) from None
 
         made.__init__ = __init__
         return as_part(role, kind)(made)  # type: ignore[no-any-return]

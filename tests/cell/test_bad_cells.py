@@ -155,6 +155,14 @@ def test_a_value_that_makes_no_sense(folder: Path, key: str, value: str) -> None
     assert error.key.startswith(key)
 
 
+def test_a_key_of_another_kind_names_the_kind_it_stands_in(folder: Path) -> None:
+    error = complaint(folder, target__motion='{ kind = "stationary", amplitude_m = 0.1 }')
+    assert (error.key, error.given) == (
+        "target.motion.amplitude_m",
+        "a key that kind stationary does not have",
+    )
+
+
 def test_a_camera_with_two_lenses_or_none(folder: Path) -> None:
     error = complaint(folder, cameras__wrist__focal_px="[1000.0, 1000.0]")
     assert error.key == "cameras.wrist"
@@ -166,6 +174,9 @@ def test_a_camera_that_does_not_see_the_target_at_the_start(folder: Path) -> Non
     error = complaint(folder, target__position_m="[3.0, 3.0, 0.18]", target__features=features)
     assert error.key == "target"
     assert "camera wrist does not see feature 0, which is out of its image" in str(error.given)
+    features = "[[0.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.1, 0.0, 0.0]]"
+    error = complaint(folder, target__position_m="[3.0, 3.0, 0.18]", target__features=features)
+    assert "see features 0, 1 and 2, which are out of its image" in str(error.given)
 
 
 def test_a_start_with_something_in_the_way_names_it(folder: Path) -> None:

@@ -177,7 +177,9 @@ def _corners_near(image: ImageArray, points_px: FloatArray, radius_px: float) ->
 
 def _out_of_sight(context: LawContext, key: str, camera: str, missing: IntArray) -> InputError:
     """Return which features a camera does not see, and why."""
-    which = "feature " + ", ".join(str(j) for j in missing)
+    which = f"feature {missing[0]}"
+    if len(missing) > 1:
+        which = f"features {', '.join(map(str, missing[:-1]))} and {missing[-1]}"
     why = _reason(context, camera, missing)
     given = f"at the start camera {camera} does not see {which}{why}"
     allowed = "a start from which the camera sees every feature"
@@ -188,7 +190,7 @@ def _reason(context: LawContext, camera: str, missing: IntArray) -> str:
     points = context.features_in_camera(camera)[missing]
     points = points[(points[:, 2] > 1e-3) & context.cameras[camera].in_view(points)]
     if not len(points):
-        return ", which is out of its image"
+        return f", which {'is' if len(missing) == 1 else 'are'} out of its image"
     in_world = transform_points(context.model.camera_pose(camera), points)
     return f"; in the way: {', '.join(context.model.in_the_way(camera, in_world))}"
 
