@@ -181,7 +181,8 @@ import sys, time
 from vergence.experiments.workers import Workers
 if __name__ == "__main__":
     with Workers(2) as workers:
-        list(workers.share_out(time.sleep, [0.0, 600.0, 600.0]))
+        for _ in workers.share_out(time.sleep, [0.0, 600.0, 600.0]):
+            print("one is done", flush=True)
 """
 
 
@@ -189,11 +190,13 @@ def test_ctrl_c_ends_all_processes_without_a_word_from_them(tmp_path):
     script = tmp_path / "endless.py"
     script.write_text(ENDLESS)
     running = subprocess.Popen(
-        [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    while len(descendants(running.pid)) < 4:  # two, what forks them, and a tracker of resources
-        time.sleep(0.05)
+        [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    assert running.stdout is not None
+    assert running.stdout.readline() == "one is done\n"  # and the others have been begun
     workers = descendants(running.pid)
+    assert len(workers) == 4  # two, what forks them, and a tracker of resources
     os.killpg(running.pid, signal.SIGINT)
     _, said = running.communicate(timeout=60)
     assert said.count("Traceback") == 1  # of the script itself
