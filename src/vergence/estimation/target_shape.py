@@ -7,11 +7,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vergence.arrays import FloatArray, IntArray, frozen
+from vergence.arrays import BoolArray, FloatArray, IntArray, frozen
 from vergence.errors import Absent, InputError
 from vergence.estimation.triangle_tree import TriangleTree, triangle_tree
 
 TOUCHING = 1e-3  # relative to the target's size: a feature this close to a face lies on it
+BEHIND = 1e-9  # the same: a vertex no farther than this in front of a plane lies behind it
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class TargetShape:
     points: FloatArray  # (M, 3) features, m
     normals: FloatArray  # (M, K, 3) unit normals of the faces around each, padded with zeros
     face_counts: IntArray  # (M,) number of faces; 0: visible from all sides
+    may_be_hidden: BoolArray  # (M,) whether the surface may hide it where one of its faces is seen
     surface: TriangleTree
     size: float  # m, diagonal of the bounding box
 
@@ -64,7 +66,8 @@ class TargetShape:
         for m, found in enumerate(around):
             for k, normal in enumerate(found):
                 normals[m, k] = normal
-        return cls(features, frozen(normals), counts, triangle_tree(triangles), size)
+        hidden = _may_be_hidden(features, around, triangles.reshape(-1, 3), BEHIND * size)
+        return cls(features, frozen(normals), counts, hidden, triangle_tree(triangles), size)
 
     @classmethod
     def box(cls, edges: ArrayLike) -> Self:
@@ -98,6 +101,26 @@ def _normals_around(
         )
         for point in points
     ]
+
+
+def _may_be_hidden(
+    points: FloatArray, around: list[list[FloatArray]], vertices: FloatArray, slack: float
+) -> BoolArray:
+    """Return which points the surface may hide from a camera in front of one of their faces.
+
+    If all of it lies behind every face of a point, as at the corners of a box, nothing of it can be
+    between the point and that camera.
+    """
+    return np.array(
+        [
+            bool(len(vertices)) and (not normals or bool(_highest(vertices - p, normals) > slack))
+            for p, normals in zip(points, around, strict=True)
+        ]
+    )
+
+
+def _highest(offsets: FloatArray, normals: list[FloatArray]) -> float:
+    return float(max((offsets @ normal).max() for normal in normals))
 
 
 def _distinct(normals: Iterable[FloatArray]) -> list[FloatArray]:

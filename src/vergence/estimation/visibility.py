@@ -76,6 +76,7 @@ def see(
     points: FloatArray,
     normals: FloatArray,
     face_counts: IntArray,
+    may_be_hidden: BoolArray,
     surface: TriangleTree,
     touching: float,
     margin_px: float,
@@ -89,6 +90,7 @@ def see(
         points: features in the target's frame, (M, 3), m.
         normals: of the faces around each feature, (M, K, 3).
         face_counts: how many faces there are around each, (M,).
+        may_be_hidden: by the surface, where one of its faces faces the camera, (M,).
         surface: of the target.
         touching: a surface this near a feature does not hide it, m.
         margin_px: how far from the border of the image a feature must be.
@@ -100,7 +102,7 @@ def see(
     depth = np.empty((cameras, features))
     for c in range(cameras):
         eye = se3_inverse(T_camera_target[c])[:3, 3].copy()
-        seen = transform_points(T_camera_target[c], points)
+        seen, lens = transform_points(T_camera_target[c], points), lenses[c]
         for m in range(features):
             z = seen[m, 2]
             depth[c, m] = z
@@ -109,13 +111,13 @@ def see(
                 status[c, m] = BEHIND
                 continue
             x, y = seen[m, 0] / z, seen[m, 1] / z
-            u, v = pixel_of(lenses[c], x, y)
+            u, v = pixel_of(lens, x, y)
             places[c, m, 0], places[c, m, 1] = u, v
-            if not (is_one_to_one(lenses[c], x, y) and in_image(lenses[c], u, v, margin_px)):
+            if not (is_one_to_one(lens, x, y) and in_image(lens, u, v, margin_px)):
                 status[c, m] = OUTSIDE
             elif not faces_camera(eye, points[m], normals[m], face_counts[m], least_cosine):
                 status[c, m] = TURNED_AWAY
-            elif is_cut(surface, eye, points[m], touching):
+            elif may_be_hidden[m] and is_cut(surface, eye, points[m], touching):
                 status[c, m] = HIDDEN
             else:
                 status[c, m] = VISIBLE
@@ -147,6 +149,7 @@ def predict_visibility(
             shape.points,
             shape.normals,
             shape.face_counts,
+            shape.may_be_hidden,
             shape.surface,
             TOUCHING * shape.size,
             margin_px,
