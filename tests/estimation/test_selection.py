@@ -19,7 +19,7 @@ from vergence.estimation.index_selection import (
     spatial_index,
     spread_quality,
 )
-from vergence.estimation.selection import candidate_rows, greedy_information, information_factor
+from vergence.estimation.selection import absorb, candidate_rows, greedy_information, innovation
 from vergence.estimation.windows import WindowRule, innovation_spread
 from vergence.geometry import se3_inverse, transform_points
 
@@ -65,7 +65,7 @@ def candidates(T_cameras, T=None, held=None, covariance=None, visible=None):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_lazy_greedy_chooses_as_the_plain_one(seed):
+def test_greedy_choice_is_that_of_full_matrices(seed):
     rng = np.random.default_rng(seed)
     rows, P = random_problem(rng, 30)
     weights = np.where(rng.random(30) < 0.3, 1.5, 1.0)
@@ -87,10 +87,20 @@ def test_greedy_choice_is_near_the_best_of_all_subsets():
         assert (1 - 1 / np.e) * best <= greedy <= best + 1e-12
 
 
-def test_information_factor_matches_its_determinant():
+def test_innovation_is_the_covariance_of_two_whitened_rows():
     rows, P = random_problem(np.random.default_rng(1), 1)
-    expected = np.linalg.det(np.eye(2) + rows[0] @ P @ rows[0].T)
-    assert information_factor(rows[0], P) == pytest.approx(expected)
+    expected = np.eye(2) + rows[0] @ P @ rows[0].T
+    np.testing.assert_allclose(innovation(rows[0], P), expected[[0, 0, 1], [0, 1, 1]])
+
+
+def test_absorbed_rows_leave_what_information_adds_to_the_inverse_covariance():
+    rows, P = random_problem(np.random.default_rng(2), 5)
+    S = np.array([innovation(H, P) for H in rows])
+    after = np.linalg.inv(np.linalg.inv(P) + rows[3].T @ rows[3])
+    for row in rows[3]:
+        absorb(row, P, rows, S)
+    np.testing.assert_allclose(P, after, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(S, [innovation(H, after) for H in rows], rtol=1e-9)
 
 
 def test_candidate_rows_are_those_of_the_visible_features():

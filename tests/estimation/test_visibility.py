@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from estimation_scene import CAMERA, look_at
@@ -106,6 +108,17 @@ def test_concave_target_hides_its_own_corners():
     assert hidden[far_upper].all()
     free_side = seen(shape, look_at((-1.0, 0.0, 0.15)))
     assert free_side.visible[0][far_upper].all()
+
+
+def test_features_that_cannot_be_hidden_are_seen_as_if_they_were_tried():
+    rng = np.random.default_rng(2)
+    for shape, safe in ((BOX, 8), (el_shape(), 6)):
+        assert (~shape.may_be_hidden).sum() == safe
+        tried = replace(shape, may_be_hidden=np.ones(len(shape.points), dtype=np.bool_))
+        for _ in range(50):
+            eye = rng.standard_normal(3)
+            T = look_at(eye * rng.uniform(0.5, 1.5) / np.linalg.norm(eye))
+            np.testing.assert_array_equal(seen(shape, T).status, seen(tried, T).status)
 
 
 def test_visibility_does_not_depend_on_where_the_world_is():
