@@ -52,21 +52,30 @@ def distort_points(points: FloatArray, k: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
+def undistort(
+    x_d: float, y_d: float, k1: float, k2: float, p1: float, p2: float, k3: float
+) -> tuple[float, float]:
+    """Return (x, y), normalized, of distorted (x_d, y_d), by Newton's method."""
+    x, y = x_d, y_d
+    for _ in range(_STEPS):
+        u, v = distort(x, y, k1, k2, p1, p2, k3)
+        xx, xy, yy = distortion_slope(x, y, k1, k2, p1, p2, k3)
+        du, dv = x_d - u, y_d - v
+        determinant = xx * yy - xy * xy
+        dx, dy = (yy * du - xy * dv) / determinant, (xx * dv - xy * du) / determinant
+        x, y = x + dx, y + dy
+        if abs(dx) + abs(dy) < _SETTLED:
+            break
+    return x, y
+
+
+@njit(cache=True)
 def undistort_points(distorted: FloatArray, k: FloatArray) -> FloatArray:
-    """Return normalized coordinates (N, 2) of distorted ones (N, 2), by Newton's method."""
+    """Return normalized coordinates (N, 2) of distorted ones (N, 2)."""
     out = np.empty((len(distorted), 2))
     for n in range(len(distorted)):
         x, y = distorted[n, 0], distorted[n, 1]
-        for _ in range(_STEPS):
-            u, v = distort(x, y, k[0], k[1], k[2], k[3], k[4])
-            xx, xy, yy = distortion_slope(x, y, k[0], k[1], k[2], k[3], k[4])
-            du, dv = distorted[n, 0] - u, distorted[n, 1] - v
-            determinant = xx * yy - xy * xy
-            dx, dy = (yy * du - xy * dv) / determinant, (xx * dv - xy * du) / determinant
-            x, y = x + dx, y + dy
-            if abs(dx) + abs(dy) < _SETTLED:
-                break
-        out[n, 0], out[n, 1] = x, y
+        out[n, 0], out[n, 1] = undistort(x, y, k[0], k[1], k[2], k[3], k[4])
     return out
 
 

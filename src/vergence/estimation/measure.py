@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
-from vergence.estimation.tracking_step import Measured
+from vergence.estimation.tracking_step import Predicted
+from vergence.estimation.view import MeasuredImages, View, together_measured, views_of
 from vergence.estimation.visibility import Visibility
 from vergence.estimation.windows import Windows
 from vergence.signals import Frame, ImagePoints, SearchWindows
@@ -19,14 +20,16 @@ CameraPose: TypeAlias = Callable[[str, Joints], FloatArray]
 # find(frame, last T_camera_target) -> all features of the target, wherever they are, or None
 Find: TypeAlias = Callable[[Frame, FloatArray], ImagePoints | None]
 
-_NO_POINTS, _NO_COVARIANCE = np.empty((0, 2)), np.empty((0, 2, 2))
-UNSEEN = (  # the reason for each `ViewStatus`
-    "not chosen",
-    "behind the camera",
-    "outside the image",
-    "turned away",
-    "hidden by the target itself",
-    "something in the way",
+UNSEEN = np.array(  # the reason for each `ViewStatus`
+    [
+        "not chosen",
+        "behind the camera",
+        "outside the image",
+        "turned away",
+        "hidden by the target itself",
+        "something in the way",
+    ],
+    dtype=object,
 )
 
 
@@ -54,11 +57,41 @@ class Measure(Protocol):
         ...
 
 
+def measured_in(windows: Windows, predicted: Predicted, measure: Measure) -> MeasuredImages:
+    """Measure features inside their windows; images without any are not accessed."""
+    images, start = [], 0
+    for n, end in zip(windows.images.tolist(), windows.ends.tolist(), strict=True):
+        found = measure(
+            predicted.frames[n],
+            windows.features[start:end],
+            windows.center_px[start:end],
+            windows.half_px[start:end],
+            predicted.T_camera_target[n],
+        )
+        images.append(found)
+        start = end
+    return together_measured(images, windows.ends)
+
+
+def usable_views(
+    windows: Windows, predicted: Predicted, measured: MeasuredImages, lenses: FloatArray
+) -> list[View]:
+    """Return the usable points of the measured images; the lenses are those of all cameras."""
+    return views_of(
+        measured,
+        predicted.T_camera_world[windows.images],
+        predicted.numbers[windows.images],
+        lenses,
+        windows.features,
+        windows.points,
+    )
+
+
 def every_point(
     frames: Sequence[Frame],
     visibility: Visibility,
     windows: Windows,
-    measured: Sequence[Measured],
+    measured: MeasuredImages,
     agreeing: Sequence[IntArray],
     widest_px: float,
 ) -> tuple[ImagePoints, ...]:
@@ -73,47 +106,47 @@ def every_point(
         visibility: their predicted visibility.
         windows: opened in some of them.
         measured: the measurements inside those.
-        agreeing: for each measurement, the indices of the features that agree with the pose.
+        agreeing: for each measured image, the indices of the features that agree with the pose.
         widest_px: half size of the largest window.
     """
     found = np.zeros(visibility.status.shape, dtype=np.bool_)
-    for image, kept in zip(measured, agreeing, strict=True):
-        found[image.number][kept] = True
+    reasons, start = UNSEEN[visibility.status].tolist(), 0
+    features = windows.features.tolist()
+    for n, image, kept in zip(windows.images.tolist(), measured.images, agreeing, strict=True):
+        found[n, kept] = True
+        agrees, row = found[n].tolist(), reasons[n]
+        for m, reason in zip(features[start:], image.reasons, strict=False):
+            row[m] = reason or ("" if agrees[m] else "disagrees with the pose")
+        start += len(image.reasons)
     places, covariance = visibility.points_px.copy(), np.empty((*found.shape, 2, 2))
-    center_px, half_px = np.empty_like(places), np.empty_like(places)
-    fill_points(
+    center_px, half_px = fill_points(
         windows.images,
         windows.ends,
         windows.features,
         windows.center_px,
         windows.half_px,
-        np.concatenate([image.found.points_px for image in measured] or [_NO_POINTS]),
-        np.concatenate([image.found.covariance_px for image in measured] or [_NO_COVARIANCE]),
+        measured.points_px,
+        measured.covariance_px,
         found,
         widest_px,
         places,
         covariance,
-        center_px,
-        half_px,
     )
-    reasons = [[UNSEEN[value] for value in row] for row in visibility.status.tolist()]
-    features, start = windows.features.tolist(), 0
-    for image in measured:
-        agrees, row = found[image.number].tolist(), reasons[image.number]
-        for m, reason in zip(features[start:], image.found.reasons, strict=False):
-            row[m] = reason or ("" if agrees[m] else "disagrees with the pose")
-        start += len(image.found.reasons)
+    nowhere = np.full(places.shape[1:], np.nan)
+    searched = [SearchWindows(nowhere, nowhere)] * len(frames)
+    for n, center, half in zip(windows.images.tolist(), center_px, half_px, strict=True):
+        searched[n] = SearchWindows(center, half)
     return tuple(
-        ImagePoints(
-            frame.camera,
-            frame.time,
-            places[n],
-            covariance[n],
-            found[n],
-            tuple(reasons[n]),
-            SearchWindows(center_px[n], half_px[n]),
+        map(
+            ImagePoints,
+            [frame.camera for frame in frames],
+            [frame.time for frame in frames],
+            places,
+            covariance,
+            found,
+            map(tuple, reasons),
+            searched,
         )
-        for n, frame in enumerate(frames)
     )
 
 
@@ -130,9 +163,7 @@ def fill_points(
     widest_px: float,
     places: FloatArray,
     covariance: FloatArray,
-    center_px: FloatArray,
-    half_px: FloatArray,
-) -> None:
+) -> tuple[FloatArray, FloatArray]:
     """Fill in what is known of every feature, whether looked for or not; see `every_point`.
 
     Args:
@@ -145,29 +176,32 @@ def fill_points(
         covariance_px: of those, (K, 2, 2).
         found: whether a feature was found and agrees with the pose, (C, M).
         widest_px: half the widest window.
-        places: predicted, (C, M, 2); changed, as all that follow.
-        covariance: (C, M, 2, 2).
-        center_px: (C, M, 2).
-        half_px: (C, M, 2).
+        places: predicted, (C, M, 2); changed.
+        covariance: (C, M, 2, 2); changed.
+
+    Returns:
+        Center and half size of the windows in the L images, (L, M, 2) each, NaN without one.
     """
-    center_px[:] = np.nan
-    half_px[:] = np.nan
     covariance[:] = 0.0
     for n in range(covariance.shape[0]):
         for m in range(covariance.shape[1]):
             covariance[n, m, 0, 0] = covariance[n, m, 1, 1] = widest_px * widest_px
+    center_px = np.full((len(images), places.shape[1], 2), np.nan)
+    half_px = np.full_like(center_px, np.nan)
     k = 0
     for number in range(len(images)):
         n = images[number]
         while k < ends[number]:
             m = features[k]
             for i in range(2):
-                center_px[n, m, i], half_px[n, m, i] = window_center_px[k, i], window_half_px[k, i]
+                center_px[number, m, i] = window_center_px[k, i]
+                half_px[number, m, i] = window_half_px[k, i]
                 if found[n, m]:
                     places[n, m, i] = points_px[k, i]
                     for j in range(2):
                         covariance[n, m, i, j] = covariance_px[k, i, j]
             k += 1
+    return center_px, half_px
 
 
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:

@@ -16,7 +16,9 @@ from vergence.estimation.measure import (
     Find,
     Measure,
     every_point,
+    measured_in,
     nothing_found,
+    usable_views,
 )
 from vergence.estimation.perception_settings import PerceptionSettings
 from vergence.estimation.recovery import NoPose, pose_from_points
@@ -24,8 +26,8 @@ from vergence.estimation.rig import CameraRig, normalized_noise
 from vergence.estimation.selection import Candidates, InformationSelection, Selection
 from vergence.estimation.spacing import keep_apart
 from vergence.estimation.target_shape import TargetShape
-from vergence.estimation.tracking_step import Expected, Measured, Predicted
-from vergence.estimation.view import View, usable_view, view_of
+from vergence.estimation.tracking_step import Expected, Predicted
+from vergence.estimation.view import View, view_of
 from vergence.estimation.visibility import (
     Blocked,
     Visibility,
@@ -131,10 +133,11 @@ class PosePerception(Generic[B]):
         visibility = self._see(predicted)
         chosen = self._choose(predicted, visibility)
         windows = self._open(predicted, chosen, visibility)
-        measured = self._measured(predicted, windows)
-        agreeing = self._correct(measured)
+        measured = measured_in(windows, predicted, self._measure)
+        views = usable_views(windows, predicted, measured, self._rig.lenses)
+        agreeing = self._correct(views)
         time = predicted.frames[-1].time
-        self._judge(time, [image.view for image in measured], predicted.frames)
+        self._judge(time, views, predicted.frames)
         points = every_point(
             predicted.frames, visibility, windows, measured, agreeing, self._windows.most_px
         )
@@ -229,33 +232,14 @@ class PosePerception(Generic[B]):
             )
         )
 
-    def _measured(self, predicted: Predicted, windows: Windows) -> list[Measured]:
-        """Measure features inside their windows; images without any are not accessed."""
-        measured, start = [], 0
-        for n, end in zip(windows.images.tolist(), windows.ends.tolist(), strict=True):
-            features = windows.features[start:end]
-            found = self._measure(
-                predicted.frames[n],
-                features,
-                windows.center_px[start:end],
-                windows.half_px[start:end],
-                predicted.T_camera_target[n],
-            )
-            camera = self._rig.cameras[predicted.numbers[n]]
-            points, T_camera_world = windows.points[start:end], predicted.T_camera_world[n]
-            view = usable_view(found, camera, T_camera_world, points, features)
-            measured.append(Measured(n, found, view))
-            start = end
-        return measured
-
-    def _correct(self, measured: list[Measured]) -> list[IntArray]:
+    def _correct(self, views: list[View]) -> list[IntArray]:
         """Update the pose by all images; return which features of each agree with it."""
-        if self._lost or not measured:
-            return [image.view.features for image in measured]
-        self._history, updates = self._history.add_all([image.view for image in measured])
+        if self._lost or not views:
+            return [view.features for view in views]
+        self._history, updates = self._history.add_all(views)
         return [
-            image.view.features[update.kept] if update.verdict in JUDGED else image.view.features
-            for image, update in zip(measured, updates, strict=True)
+            view.features[update.kept] if update.verdict in JUDGED else view.features
+            for view, update in zip(views, updates, strict=True)
         ]
 
     def _judge(self, time: float, views: list[View], frames: Sequence[Frame]) -> None:

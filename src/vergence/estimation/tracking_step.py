@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 from vergence.arrays import FloatArray, IntArray
-from vergence.estimation.view import View
-from vergence.signals import Frame, ImagePoints
+from vergence.signals import Frame
 
 
 class Expected(NamedTuple):
@@ -32,11 +31,3 @@ class Predicted(NamedTuple):
     def newest(self) -> Expected:
         """The prediction for the last image."""
         return self.expected[-1]
-
-
-class Measured(NamedTuple):
-    """The measurement of an image."""
-
-    number: int  # of the image
-    found: ImagePoints  # the points in its windows, one at least
-    view: View  # of those that are usable

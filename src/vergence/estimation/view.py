@@ -8,6 +8,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.camera import Camera
+from vergence.camera.lens import normalized_covariance, normalized_of, pack_lens
 from vergence.geometry import se3_inverse
 from vergence.signals import ImagePoints
 
@@ -112,74 +113,133 @@ def view_of(
     """
     if features is None:
         features = np.arange(len(image_points.points_px))
-    T_camera_world = se3_inverse(T_world_camera)
-    return usable_view(image_points, camera, T_camera_world, target_points[features], features)
-
-
-def usable_view(
-    image_points: ImagePoints,
-    camera: Camera,
-    T_camera_world: FloatArray,
-    points: FloatArray,
-    features: IntArray,
-) -> View:
-    """Return the same; of each measured point, `points` (M, 3) and `features` (M,) tell which."""
-    places, spread = image_points.points_px, image_points.covariance_px
-    lens = (camera.fx, camera.fy, camera.cx, camera.cy)
-    count, usable, measured, covariance = usable_coordinates(
-        places, spread, image_points.found, lens
+    (view,) = views_of(
+        together_measured([image_points], np.array([len(features)])),
+        [se3_inverse(T_world_camera)],
+        np.zeros(1, dtype=np.int64),
+        pack_lens(camera)[None],
+        features,
+        target_points[features],
     )
-    if count < len(usable):
-        places, spread = places[usable], spread[usable]
-        points, features = points[usable], features[usable]
-    if camera.distorted:
-        measured = camera.normalize(places)
-        covariance = camera.normalize_covariance(spread, measured)
-    return View(
-        image_points.camera,
-        image_points.time,
-        T_camera_world,
+    return view
+
+
+class MeasuredImages(NamedTuple):
+    """The points measured in some images, those of an image one after the other."""
+
+    images: Sequence[ImagePoints]  # L
+    ends: IntArray  # (L,) how many points there are in all images up to each
+    points_px: FloatArray  # (K, 2)
+    covariance_px: FloatArray  # (K, 2, 2) px²
+    found: BoolArray  # (K,)
+
+
+def together_measured(images: Sequence[ImagePoints], ends: IntArray) -> MeasuredImages:
+    """Return images with their points together; `ends` as in `MeasuredImages`."""
+    if not images:
+        none = np.zeros(0, dtype=np.bool_)
+        return MeasuredImages((), ends, np.empty((0, 2)), np.empty((0, 2, 2)), none)
+    found = np.concatenate([image.found for image in images])
+    assert len(found) == ends[-1]
+    return MeasuredImages(
+        images,
+        ends,
+        np.concatenate([image.points_px for image in images]),
+        np.concatenate([image.covariance_px for image in images]),
+        found,
+    )
+
+
+def views_of(
+    measured: MeasuredImages,
+    T_camera_world: Sequence[FloatArray] | FloatArray,
+    cameras: IntArray,
+    lenses: FloatArray,
+    features: IntArray,
+    points: FloatArray,
+) -> list[View]:
+    """Prepare the points of several images for a filter; see `view_of`.
+
+    Args:
+        measured: the images, L, and their points, K.
+        T_camera_world: inverse pose of each image's camera, (L, 4, 4).
+        cameras: number of each image's, (L,).
+        lenses: of all cameras, (N, 11).
+        features: feature index of each point, (K,).
+        points: their positions in the target's frame, (K, 3), m.
+    """
+    ends, features, points, places, covariance = usable_points(
+        measured.ends,
+        measured.points_px,
+        measured.covariance_px,
+        measured.found,
+        cameras,
+        lenses,
         features,
         points,
-        measured,
-        covariance,
     )
+    views, start = [], 0
+    for image, T, end in zip(measured.images, T_camera_world, ends.tolist(), strict=True):
+        views.append(
+            View(
+                image.camera,
+                image.time,
+                T,
+                features[start:end],
+                points[start:end],
+                places[start:end],
+                covariance[start:end],
+            )
+        )
+        start = end
+    return views
 
 
 @njit(cache=True)
-def usable_coordinates(
+def usable_points(
+    ends: IntArray,
     points_px: FloatArray,
     covariance_px: FloatArray,
     found: BoolArray,
-    lens: tuple[float, float, float, float],
-) -> tuple[int, BoolArray, FloatArray, FloatArray]:
-    """Return how many points are usable, which, and their normalized coordinates.
+    cameras: IntArray,
+    lenses: FloatArray,
+    features: IntArray,
+    points: FloatArray,
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """Return the usable points of several images, with their normalized coordinates.
 
-    A point is usable if it was found, is finite, and has a positive definite covariance. The lens
-    is taken as without distortion.
+    A point is usable if it was found, is finite, and has a positive definite covariance.
 
     Args:
-        points_px: (M, 2).
-        covariance_px: (M, 2, 2), px².
-        found: (M,).
-        lens: fx, fy, cx, cy, px.
+        ends: with the next three, as in `MeasuredImages`.
+        points_px: (K, 2).
+        covariance_px: (K, 2, 2), px².
+        found: (K,).
+        cameras: number of each image's, (L,).
+        lenses: of all cameras, (N, 11).
+        features: (K,).
+        points: (K, 3).
 
     Returns:
-        The number N; the mask (M,); coordinates (N, 2); their covariance (N, 2, 2).
+        How many are usable in all images up to each, (L,); of those N their features (N,), points
+        (N, 3), coordinates (N, 2) and covariances (N, 2, 2).
     """
-    fx, fy, cx, cy = lens
-    usable = np.empty(len(points_px), dtype=np.bool_)
-    points, covariance = np.empty_like(points_px), np.empty_like(covariance_px)
-    count = 0
-    for n in range(len(points_px)):
-        u, v, C = points_px[n, 0], points_px[n, 1], covariance_px[n]
-        finite = np.isfinite(u + v + C[0, 0] + C[1, 0] + C[1, 1])
-        positive = C[0, 0] > 0.0 and C[0, 0] * C[1, 1] > C[1, 0] * C[1, 0]
-        usable[n] = found[n] and finite and positive
-        if usable[n]:
-            points[count, 0], points[count, 1] = (u - cx) / fx, (v - cy) / fy
-            covariance[count, 0, 0] = C[0, 0] / (fx * fx)
-            covariance[count, 1, 1] = C[1, 1] / (fy * fy)
-            covariance[count, 0, 1] = covariance[count, 1, 0] = C[1, 0] / (fx * fy)
-            count += 1
-    return count, usable, points[:count], covariance[:count]
+    last, numbers = np.empty_like(ends), np.empty_like(features)
+    places, covariance = np.empty_like(points_px), np.empty_like(covariance_px)
+    count, k = 0, 0
+    for image in range(len(ends)):
+        lens = lenses[cameras[image]]
+        while k < ends[image]:
+            u, v, C = points_px[k, 0], points_px[k, 1], covariance_px[k]
+            finite = np.isfinite(u + v + C[0, 0] + C[1, 0] + C[1, 1])
+            positive = C[0, 0] > 0.0 and C[0, 0] * C[1, 1] > C[1, 0] * C[1, 0]
+            if found[k] and finite and positive:
+                x, y = normalized_of(lens, u, v)
+                places[count, 0], places[count, 1] = x, y
+                normalized_covariance(lens, x, y, C, covariance[count])
+                numbers[count] = k
+                count += 1
+            k += 1
+        last[image] = count
+    kept = numbers[:count]
+    return last, features[kept], points[kept], places[:count], covariance[:count]
