@@ -22,7 +22,7 @@ RUN_S, RUNS = 25.0, 500
 SHARED = 1400  # runs of 5 s that two workers share: about a minute for one
 RATE_HZ = 30.0  # of images
 POSE_CELLS = ("lippiello2005", "four_cameras")  # tasks that follow a pose, in physics
-LAWS = ("image_based", "constrained")
+LAWS = ("image_based", "constrained", "point_pose")
 
 
 def first_papers_run() -> KinematicRun:

@@ -35,7 +35,7 @@ PAPERS = (
 )
 SPREAD = ("nelson1995", "lippiello2005", "mezouar2001")  # repeated with several seeds
 SEEDS = 10
-LAWS = "image_based,image_based_desired,image_based_mean,optimal_tracking,constrained"
+LAWS = "image_based,image_based_desired,image_based_mean,point_pose,optimal_tracking,constrained"
 STARTS = 100
 COMPARED = (("ur5", 0.2), ("panda", 0.2), ("ur5", 0.5), ("panda", 0.5))  # share of joints' ranges
 

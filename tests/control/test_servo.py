@@ -7,6 +7,7 @@ import pytest
 from servo_scene import CAMERA, SQUARE, START, in_view, observed, puma, seen
 
 from vergence.control import (
+    AXES,
     CameraMounting,
     CameraVelocity,
     DampedPseudoInverse,
@@ -22,6 +23,7 @@ from vergence.control import (
     Servo,
     Situation,
     Term,
+    axis_mask,
 )
 from vergence.control.objectives import state_of
 from vergence.errors import InputError
@@ -137,6 +139,19 @@ def test_the_points_depths_bring_the_camera_straight_to_its_goal():
     v = T_goal_now[:3, :3] @ command.v_camera[:3]
     straight = -T_goal_now[:3, 3]
     assert v @ straight == pytest.approx(np.linalg.norm(v) * np.linalg.norm(straight), rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", [PseudoInverse(), DampedPseudoInverse(singular_below=1e-9)])
+def test_axes_that_no_objective_controls_do_not_move(solver):
+    q = START + 0.05
+    (now, depth), (desired, desired_depth) = seen(ARM, q, WORLD), seen(ARM, START, WORLD)
+    features = Points(CAMERA.normalize(now), depth)
+    goal = Points(CAMERA.normalize(desired), desired_depth)
+    twists = []
+    for axes in (AXES, ("y", "rz")):
+        servo = Servo(ARM, CAMERA, PointPose(gain=0.1, axes=axes), solver=solver)
+        twists.append(ARM.jacobian(q) @ servo.rates(features, goal, q))
+    np.testing.assert_allclose(twists[1], twists[0] * axis_mask(("y", "rz")), atol=1e-9)
 
 
 def test_an_image_point_its_depth_and_the_rotation_are_the_law_2_half_d():

@@ -1,4 +1,4 @@
-"""Image-based and constrained laws come in the batch kernel to what they come to in the loop."""
+"""Laws on image points and poses come in the batch kernel to what they come to in the loop."""
 
 from dataclasses import replace
 
@@ -19,6 +19,7 @@ from vergence.control import (
     MotionSettings,
     Objective,
     OptimalTracking,
+    PointPose,
     Posture,
     PseudoInverse,
     QuadraticProgram,
@@ -68,17 +69,20 @@ def drawn_law_run(seed: int) -> KinematicRun:
     turn = so3_exp(np.array([0.0, 0.0, rng.choice([0.0, 0.3, 2.0])]))[:2, :2]
     middle = truth.points_px.mean(axis=0)
     desired = middle + (truth.points_px - middle) @ turn.T + rng.normal(0, 40, 2)
-    return replace(drawn, cell=cell, law=law, desired_px=desired)
+    depth_m = truth.depth_m * rng.uniform(0.8, 1.2) if rng.integers(0, 2) else None
+    return replace(drawn, cell=cell, law=law, desired_px=desired, desired_depth_m=depth_m)
 
 
 def drawn_objective(rng: np.random.Generator) -> Objective:
-    if rng.random() < 0.25:
+    kind, value = rng.random(), float(rng.uniform(0.5, 8.0))
+    gain = value if rng.integers(0, 2) else AdaptiveGain(2.0 * value, 0.5 * value, 20.0)
+    if kind < 0.2:
         return OptimalTracking(axes=AXES, Q=2e-5, R=1.0)
-    gain = float(rng.uniform(0.5, 8.0))
-    return ImageBased(
-        gain=gain if rng.integers(0, 2) else AdaptiveGain(2.0 * gain, 0.5 * gain, 20.0),
-        interaction=str(rng.choice(["current", "desired", "mean"])),
-    )
+    if kind < 0.5:
+        axes = rng.choice(AXES, rng.integers(2, 7), replace=False)
+        return PointPose(gain=gain, axes=AXES if rng.integers(0, 2) else tuple(map(str, axes)))
+    interaction = str(rng.choice(["current", "desired", "mean"]))
+    return ImageBased(gain=gain, interaction=interaction)
 
 
 def drawn_solver(rng: np.random.Generator, constrained: bool) -> Solver:
@@ -119,7 +123,7 @@ def drawn_obstacles(rng: np.random.Generator, target: FloatArray) -> Obstacles |
     return (lambda: solid) if rng.integers(0, 2) else None
 
 
-RUNS = [drawn_law_run(seed) for seed in range(120)]
+RUNS = [drawn_law_run(seed) for seed in range(180)]
 
 
 @pytest.fixture(scope="module")

@@ -117,6 +117,7 @@ def check_same(results, looped):
     ("name", "laws"),
     [
         ("ur5", ("image_based", "constrained", "optimal_tracking")),
+        ("ur5", ("point_pose", "constrained_point_pose")),
         ("puma560", ("image_based", "constrained")),
     ],
 )
@@ -132,6 +133,16 @@ def test_laws_of_shipped_cells_come_in_the_kernel_to_what_they_come_to_in_the_lo
     assert {(law, "kernel") for law in laws} <= set(made_in)
     monkeypatch.setattr(sys.modules[RUN_TRIAL], "covers", lambda _: False)
     check_same(results, run_trials(source, trials, 2.0))
+
+
+def test_a_run_of_a_campaign_aims_at_the_depth_that_its_goal_implies():
+    still = {"duration_s": "3.0", "target.motion": "{ kind = 'stationary' }"}
+    source, laws = CellSource.of("ur5", still, None), ("point_pose", "image_based_desired")
+    trials = start_trials(source.load(), laws, 1, seed=3, sampling=Sampling(spread=0.2))
+    for ideal, trial in zip(run_trials(source, trials, 2.0), trials, strict=True):
+        real = run_trial(source, trial, 2.0, physics=True)
+        assert ideal.ending is real.ending is Ending.CONVERGED
+        assert ideal.path_m == pytest.approx(real.path_m, rel=0.03)
 
 
 def test_a_law_that_the_kernel_is_not_compiled_for_is_run_in_the_loop(monkeypatch):

@@ -12,8 +12,10 @@ LAWS = (  # the cell's own, and those that `vergence.experiments` knows
     "image_based_desired",
     "image_based_mean",
     "optimal_tracking",
+    "point_pose",
     "constrained",
     "constrained_tracking",
+    "constrained_point_pose",
     "constrained_pose",
 )
 PLANNERS = ("optimised", "potential_field")

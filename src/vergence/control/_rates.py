@@ -1,4 +1,4 @@
-"""Converts a camera twist to joint rates, scaled uniformly to satisfy their limits."""
+"""Converts a quadratic to a camera twist, and that to joint rates within their limits."""
 
 import numpy as np
 from numba import njit
@@ -40,3 +40,18 @@ def slow_down(rates: FloatArray, rate_max: FloatArray) -> float:
         for i in range(len(rates)):
             rates[i] *= scale
     return scale
+
+
+@njit(cache=True, error_model="numpy")
+def twist_of(H: FloatArray, g: FloatArray) -> FloatArray:
+    """Return the twist H⁻¹ g, (6,); it is 0 along axes that no objective controls.
+
+    Args:
+        H: positive semi-definite, (6, 6); the row of an axis that no objective controls is 0.
+        g: (6,).
+    """
+    A = H.copy()
+    for i in range(6):
+        if A[i, i] == 0.0:
+            A[i, i] = 1.0
+    return np.linalg.solve(A, g).astype(np.float64)

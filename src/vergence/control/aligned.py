@@ -6,6 +6,9 @@ from numba import njit
 from vergence.arrays import FloatArray
 from vergence.geometry import nearest_rotation, se3
 
+FEWEST_TURNED = 3  # points that determine an orientation
+_ON_LINE = 1e-3  # of the extent along a line: points within this distance are as good as on it
+
 
 @njit(cache=True, error_model="numpy")
 def lifted(image: FloatArray, depth_m: FloatArray) -> FloatArray:
@@ -39,3 +42,21 @@ def aligned(points: FloatArray, seen: FloatArray) -> FloatArray:
         for b in range(3):
             t[a] -= R[a, b] * middle[b]
     return se3(R, t)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def fixes_orientation(points: FloatArray) -> bool:
+    """Return whether points (M, 3) determine an orientation: three or more, not on one line."""
+    if len(points) < FEWEST_TURNED:
+        return False
+    middle, S = np.zeros(3), np.zeros((3, 3))
+    for j in range(len(points)):
+        middle += points[j] / len(points)
+    for j in range(len(points)):
+        for a in range(3):
+            for b in range(3):
+                S[a, b] += (points[j, a] - middle[a]) * (points[j, b] - middle[b])
+    if not np.isfinite(S).all():
+        return False
+    squares = np.linalg.eigvalsh(S)  # of the extents, ascending
+    return bool(squares[1] > _ON_LINE * _ON_LINE * squares[2])

@@ -6,11 +6,18 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.control._tracking_tick import TrackingTickLaw
+from vergence.control.aligned import lifted
 from vergence.control.depth import CarriedDepth, Depth, DepthFromFeatures, HeldDepth
 from vergence.control.depth.carried import nothing_carried
 from vergence.control.depth.from_features import NO_POSE
 from vergence.control.image_motion import ExposedFeatures
-from vergence.control.objectives import ImageBased, Objective, OptimalTracking, pack_setup
+from vergence.control.objectives import (
+    ImageBased,
+    Objective,
+    OptimalTracking,
+    PointPose,
+    pack_setup,
+)
 from vergence.control.past_joints import no_joints
 from vergence.control.point_law import (
     CARRIED,
@@ -23,6 +30,7 @@ from vergence.control.point_law import (
     NoMemory,
     PointGoal,
     PointLaw,
+    PoseGoal,
     PredictedMotion,
     ProgramSolver,
     TrackingGoal,
@@ -39,6 +47,7 @@ from vergence.estimation.feature_faces import FeatureFaces
 from vergence.estimation.pose_minima import spread_rotations
 from vergence.features import Points
 from vergence.robot import Arm
+from vergence.signals import Reference
 
 _DEPTHS: dict[type[Depth], int] = {
     HeldDepth: HELD,
@@ -61,7 +70,7 @@ def compile_law(
     objective: Objective,
     solver: BoundSolver,
     tracking: TrackingTickLaw | None,
-    desired_px: FloatArray,
+    reference: Reference,
     covariance_px: FloatArray,
 ) -> CompiledLaw | None:
     """Return a servo for a constant reference as numbers; None if the kernel does not know a part.
@@ -72,9 +81,11 @@ def compile_law(
         objective: the only one, of weight 1.
         solver: for the same arm.
         tracking: the servo, if it is optimal tracking by the inverse of the Jacobian.
-        desired_px: s_star, (M, 2).
+        reference: s_star (M, 2), and the depth there if known.
         covariance_px: of every point, (2, 2); a multiple of the unit matrix.
     """
+    desired_px = reference.points_px
+    assert desired_px is not None
     intrinsics, count, n = camera.mounting.camera, len(desired_px), arm.joint_count
     covariances_px = np.repeat(covariance_px[None], count, axis=0)
     motion = _motion(camera, covariances_px / np.outer(*2 * [intrinsics.focal_px]))
@@ -94,8 +105,10 @@ def compile_law(
             tracking.singular_below,
         )
     else:
-        goal = _goal(objective, camera, desired, variance)
-        solved_by = _solver(solver, arm, camera)
+        depth_m = reference.desired_depth_m
+        goal = _goal(objective, camera, desired, depth_m, variance)
+        there = None if depth_m is None else lifted(desired, depth_m)
+        solved_by = _solver(solver, arm, camera, there)
         if goal is None or solved_by is None:
             return None
         if isinstance(goal, TrackingGoal) and isinstance(solved_by, InverseSolver):
@@ -136,10 +149,17 @@ def _motion(camera: ServoCamera, covariance: FloatArray) -> PredictedMotion | No
 
 
 def _goal(
-    objective: Objective, camera: ServoCamera, desired: FloatArray, variance: float
-) -> PointGoal | TrackingGoal | None:
+    objective: Objective,
+    camera: ServoCamera,
+    desired: FloatArray,
+    depth_m: FloatArray | None,
+    variance: float,
+) -> PointGoal | PoseGoal | TrackingGoal | None:
+    at_goal = np.full(len(desired), np.nan) if depth_m is None else np.array(depth_m)
     if isinstance(objective, ImageBased) and objective.feature is Points:
-        return PointGoal(objective.numbers, desired, variance)
+        return PointGoal(objective.numbers, desired, at_goal, variance)
+    if isinstance(objective, PointPose):
+        return PoseGoal(objective.numbers, desired, at_goal)
     if isinstance(objective, OptimalTracking) and objective.S == 0.0:
         gains = objective.gains(len(desired), camera.period_s)
         return TrackingGoal(gains, desired, camera.mounting.camera.focal_px)
@@ -147,7 +167,7 @@ def _goal(
 
 
 def _solver(
-    solver: BoundSolver, arm: Arm, camera: ServoCamera
+    solver: BoundSolver, arm: Arm, camera: ServoCamera, goal: FloatArray | None
 ) -> InverseSolver | ProgramSolver | None:
     if isinstance(solver, BoundPseudoInverse):
         return InverseSolver(arm.rate_max, solver.singular_below)
@@ -161,6 +181,7 @@ def _solver(
         np.array(solver.solids),
         faces is not _NO_FACES,
         np.array(features),
+        np.empty((0, 3)) if goal is None else goal,
         np.array(faces.planes),
         np.array(faces.holds),
     )

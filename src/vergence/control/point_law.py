@@ -8,12 +8,13 @@ from vergence.control.image_motion import ExposedFeatures, FeatureState
 from vergence.control.objectives import Quadratic
 from vergence.control.objectives._tracking import PackedSetup, TrackingGains
 from vergence.control.objectives.image_based import PointDecay
+from vergence.control.objectives.point_pose import PoseDecay
 from vergence.control.past_joints import PastJoints
 from vergence.control.solvers._program import ProgramSettings, ProgramState
 from vergence.control.target_flow import FlowState
 from vergence.robot.chain import Chain
 
-FINE, SINGULAR, NONSENSE = range(3)  # how a tick ends
+FINE, SINGULAR, NONSENSE, UNDETERMINED = range(4)  # how a tick ends
 HELD, CARRIED, FROM_FEATURES = range(3)  # kinds of depth
 
 
@@ -58,7 +59,16 @@ class PointGoal(NamedTuple):
 
     decay: PointDecay
     desired: FloatArray  # (M, 2) normalized coordinates
+    depth_m: FloatArray  # (M,) at the goal; NaN if unknown
     variance: float  # of a point's row
+
+
+class PoseGoal(NamedTuple):
+    """The objective of `PointPose`."""
+
+    decay: PoseDecay
+    desired: FloatArray  # (M, 2) normalized coordinates
+    depth_m: FloatArray  # (M,) at the goal; NaN if unknown
 
 
 class TrackingGoal(NamedTuple):
@@ -83,6 +93,7 @@ class ProgramSolver(NamedTuple):
     solids: FloatArray  # (K, 16) that may occlude features
     surface_known: bool  # whether the faces around the features are
     features: FloatArray  # (M, 3) in the target's frame, m
+    goal: FloatArray  # (M, 3) in the camera frame at the goal, m; (0, 3) if unknown
     planes: FloatArray  # (F, 6) of `FeatureFaces`
     holds: BoolArray  # (M, F) of `FeatureFaces`
 
@@ -92,7 +103,7 @@ class PointLaw(NamedTuple):
 
     chain: Chain  # up to the camera
     motion: PredictedMotion
-    goal: PointGoal | TrackingGoal
+    goal: PointGoal | PoseGoal | TrackingGoal
     solver: InverseSolver | ProgramSolver
 
 
@@ -140,4 +151,4 @@ class LawTick(NamedTuple):
 
     rates: FloatArray  # (n,) rad/s or m/s
     end: int  # FINE, or why the law cannot continue
-    sigma: float  # smallest singular value of J, if the solver gives up below one
+    value: float  # if SINGULAR, the smallest singular value of J; if UNDETERMINED, how many points

@@ -15,7 +15,7 @@ from numba import njit
 from numba.extending import overload
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.control.aligned import aligned, lifted
+from vergence.control.aligned import fixes_orientation, lifted
 from vergence.control.depth.carried import carried_depths
 from vergence.control.depth.from_features import fitted_depths
 from vergence.control.image_motion import (
@@ -28,6 +28,7 @@ from vergence.control.limits import pack_features
 from vergence.control.objectives import Quadratic, optimal_tracking_tick
 from vergence.control.objectives.image_based import point_quadratic
 from vergence.control.objectives.optimal_tracking import tracking_quadratic
+from vergence.control.objectives.point_pose import pose_quadratic
 from vergence.control.past_joints import past_position, remember
 from vergence.control.point_law import (
     CARRIED,
@@ -36,6 +37,7 @@ from vergence.control.point_law import (
     HELD,
     NONSENSE,
     SINGULAR,
+    UNDETERMINED,
     AsMeasured,
     InverseSolver,
     LawMemory,
@@ -45,21 +47,20 @@ from vergence.control.point_law import (
     NoMemory,
     PointGoal,
     PointLaw,
+    PoseGoal,
     PredictedMotion,
     ProgramSolver,
     TrackingGoal,
     TrackingLaw,
     Wish,
 )
+from vergence.control.shown_faces import shown_faces
 from vergence.control.solvers._program import FurtherRows, ProgramState, program_tick
 from vergence.control.solvers.pseudo_inverse import pseudo_inverse_rates
 from vergence.control.solvers.solver import Problem
 from vergence.control.target_flow import flow_at, measured_flow
-from vergence.estimation.feature_faces import faces_in_view
 from vergence.geometry import se3_inverse
 from vergence.robot.chain import forward_kinematics
-
-_FEWEST_TURNED = 3  # features that determine the orientation of the target
 
 
 def by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[[Callable[..., Any]], Any]:
@@ -139,23 +140,41 @@ def features_now(motion: Any, memory: Any, now: Moment) -> tuple[Any, FeatureSta
     raise NotImplementedError
 
 
-def _point_goal(goal: PointGoal, now: FeatureState, found: BoolArray) -> Quadratic:
-    desired, no_weights = goal.desired[found], np.empty((0, 2, 2))
-    return point_quadratic(
-        goal.decay, now.points, now.depth, desired, now.depth, now.flow, no_weights, goal.variance
-    )
+@njit(cache=True, error_model="numpy")
+def _depth_at_goal(depth_m: FloatArray, now: FeatureState, found: BoolArray) -> FloatArray:
+    """Return the depth of the features found (M,) at the goal: the present one if unknown."""
+    return now.depth if np.isnan(depth_m).any() else depth_m[found]
 
 
-def _tracking_goal(goal: TrackingGoal, now: FeatureState, found: BoolArray) -> Quadratic:
+def _point_goal(goal: PointGoal, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
+    depth_m, no_weights = _depth_at_goal(goal.depth_m, now, found), np.empty((0, 2, 2))
+    quadratic = point_quadratic(
+        goal.decay, now.points, now.depth, goal.desired[found], depth_m, now.flow, no_weights,
+        goal.variance,
+    )  # fmt: skip
+    return FINE, quadratic
+
+
+def _pose_goal(goal: PoseGoal, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
+    seen = lifted(now.points, now.depth)
+    desired = lifted(goal.desired[found], _depth_at_goal(goal.depth_m, now, found))
+    if not (fixes_orientation(seen) and fixes_orientation(desired)):
+        return UNDETERMINED, Quadratic(np.zeros((6, 6)), np.zeros(6), 0.0)
+    return FINE, pose_quadratic(goal.decay, seen, desired)
+
+
+def _tracking_goal(
+    goal: TrackingGoal, now: FeatureState, found: BoolArray
+) -> tuple[int, Quadratic]:
     columns = np.empty((len(now.points), 7))
     columns[:, :2], columns[:, 2:4], columns[:, 5:] = now.points, goal.desired[found], now.flow
     columns[:, 4] = now.depth
-    return tracking_quadratic(columns, goal.focal_px, goal.gains, 1.0, np.zeros(6))
+    return FINE, tracking_quadratic(columns, goal.focal_px, goal.gains, 1.0, np.zeros(6))
 
 
-@by_type({PointGoal: _point_goal, TrackingGoal: _tracking_goal})
-def quadratic_of(goal: Any, now: FeatureState, found: BoolArray) -> Quadratic:
-    """Return the quadratic of an objective for the features found."""
+@by_type({PointGoal: _point_goal, PoseGoal: _pose_goal, TrackingGoal: _tracking_goal})
+def quadratic_of(goal: Any, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
+    """Return the quadratic of an objective for the features found; or why there is none."""
     raise NotImplementedError
 
 
@@ -192,9 +211,11 @@ def _by_program(
 ) -> tuple[ProgramState, LawTick]:
     now, features, found = wish.now, wish.features, wish.now.image.found
     n, faces, none = len(now.q), np.empty((0, 6)), np.empty(0)
-    if solver.surface_known and len(features.points) >= _FEWEST_TURNED:
-        pose = aligned(solver.features[found], lifted(features.points, features.depth))
-        faces = faces_in_view(pose, solver.planes, solver.holds[found], np.empty((0, 3)))
+    if solver.surface_known:
+        here, goal = lifted(features.points, features.depth), solver.goal
+        if len(goal):
+            goal = goal[found]
+        faces = shown_faces(solver.features[found], here, goal, solver.planes, solver.holds[found])
     problem = Problem(
         now.q,
         now.velocity,
@@ -225,10 +246,12 @@ def solved_by(solver: Any, state: ProgramState, wish: Wish) -> tuple[ProgramStat
 def _point_law_tick(law: PointLaw, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTick]:
     motion, features = features_now(law.motion, memory.motion, now)
     features = _found(features, now.image.found)
-    quadratic = quadratic_of(law.goal, features, now.image.found)
+    end, quadratic = quadratic_of(law.goal, features, now.image.found)
     if not (np.isfinite(quadratic.H).all() and np.isfinite(quadratic.g).all()):
+        end = NONSENSE
+    if end != FINE:
         after = LawMemory(motion, memory.program)
-        return after, LawTick(np.zeros(len(now.q)), NONSENSE, np.nan)
+        return after, LawTick(np.zeros(len(now.q)), end, float(len(features.points)))
     program, tick = solved_by(law.solver, memory.program, Wish(now, features, quadratic))
     return LawMemory(motion, program), tick
 

@@ -124,18 +124,18 @@ class Servo:
             return None
         return self._kernel.setup(len(self._main.depth_m))
 
-    def compiled(self, desired_px: FloatArray, covariance_px: FloatArray) -> CompiledLaw | None:
+    def compiled(self, reference: Reference, covariance_px: FloatArray) -> CompiledLaw | None:
         """Return the servo as one kernel computes it; None if it has parts that need Python.
 
         Args:
-            desired_px: constant, (M, 2).
+            reference: constant, of points.
             covariance_px: of every point in every image, (2, 2); a multiple of the unit matrix.
         """
         if not len(self._terms) == len(self._cameras) == 1 or self._terms[0].weight != 1.0:
             return None
         objective = self._terms[0].objective
         return compile_law(
-            self._arm, self._main, objective, self._solver, self._kernel, desired_px, covariance_px
+            self._arm, self._main, objective, self._solver, self._kernel, reference, covariance_px
         )
 
     @property

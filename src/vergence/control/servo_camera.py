@@ -9,15 +9,15 @@ from numpy.typing import ArrayLike
 
 from vergence.arrays import BoolArray, FloatArray, frozen
 from vergence.camera import Camera
-from vergence.control.aligned import aligned, lifted
+from vergence.control.aligned import lifted
 from vergence.control.image_motion import ImageMotion, MotionSettings
 from vergence.control.mounting import CameraMounting
 from vergence.control.objectives import CameraState, state_of
 from vergence.control.point_weights import point_weights, row_variance
+from vergence.control.shown_faces import shown_faces
 from vergence.errors import NOTHING, Absent, InputError
-from vergence.estimation.feature_faces import FeatureFaces, faces_in_view
+from vergence.estimation.feature_faces import FeatureFaces
 from vergence.features import Points
-from vergence.geometry import se3_inverse
 from vergence.robot import Arm
 from vergence.signals import ImagePoints, JointState, Observation, Reference
 
@@ -25,7 +25,6 @@ Cameras: TypeAlias = Camera | CameraMounting | Mapping[str, CameraMounting]
 NOTHING_SEEN = ImagePoints(
     "", 0.0, np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0, dtype=np.bool_), ()
 )
-_FEWEST_TURNED = 3  # features that determine the orientation of the target
 _STALE_S = 0.3  # with several cameras, older measurements of one are ignored
 
 
@@ -165,15 +164,12 @@ class ServoCamera:
         """
         if self.faces is None or self.features is None:
             return None
-        features = self.features[found]
-        if len(features) < _FEWEST_TURNED:
-            return np.empty((0, 6))
         there = reference.desired_depth_m if reference.depth_m is None else reference.depth_m
-        eyes = np.empty((0, 3))
+        goal = np.empty((0, 3))
         if desired is not None and there is not None:
-            eyes = se3_inverse(aligned(features, lifted(desired, there[found])))[None, :3, 3].copy()
-        shown: FloatArray = faces_in_view(
-            aligned(features, now), self.faces.planes, self.faces.holds[found], eyes
+            goal = lifted(desired, there[found])
+        shown: FloatArray = shown_faces(
+            self.features[found], now, goal, self.faces.planes, self.faces.holds[found]
         )
         return shown
 

@@ -39,7 +39,7 @@ def total_of(
         try:
             quadratic = objective.quadratic(state)
         except InputError as error:  # such as a line seen end-on
-            return OutcomeKind.TARGET_LOST, f"{error.source}: {error.given}; needs {error.allowed}"
+            return undefined(error)
         if isinstance(quadratic, JointQuadratic):
             if not len(g_joints):
                 H_joints, g_joints = np.zeros((joint_count, joint_count)), np.zeros(joint_count)
@@ -55,3 +55,8 @@ def total_of(
     if not all(np.isfinite(values).all() for values in (H, g, H_joints, g_joints)):
         return NOT_FINITE
     return Total(H, g, H_joints, g_joints, variance)
+
+
+def undefined(error: InputError) -> tuple[OutcomeKind, str]:
+    """Return the fault of an objective that is not defined for the features of an image."""
+    return OutcomeKind.TARGET_LOST, f"{error.source}: {error.given}; needs {error.allowed}"

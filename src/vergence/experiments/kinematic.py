@@ -84,8 +84,8 @@ class KinematicRuns:
         driver.restart_cameras()
         parts = assemble_parts(cell, driver, images=False, model=model)
         assert not isinstance(parts, Outcome)
-        desired = parts.planner.reference(0.0).points_px
-        assert desired is not None
+        desired = parts.planner.reference(0.0)
+        assert desired.points_px is not None
         table = cell.cameras[camera]
         ideal = KinematicCell(
             driver.world.arm_to_camera(camera),
@@ -106,10 +106,11 @@ class KinematicRuns:
         return KinematicRun(
             ideal,
             parts.law,
-            desired,
+            desired.points_px,
             cell.duration_s,
             timeouts=timeouts,
             noise_px=cell.task.noise_px,
+            desired_depth_m=desired.desired_depth_m,
             clearance=self._clearance,
         )
 

@@ -19,8 +19,10 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
     "image_based_mean": {"kind": "image_based", "solver": "pseudo_inverse", "interaction": "mean"},
     "optimal_tracking": {"kind": "optimal_tracking", "solver": "pseudo_inverse"},
+    "point_pose": {"kind": "point_pose", "solver": "pseudo_inverse"},
     "constrained": {"kind": "image_based", "solver": "quadratic_program"},
     "constrained_tracking": {"kind": "optimal_tracking", "solver": "quadratic_program"},
+    "constrained_point_pose": {"kind": "point_pose", "solver": "quadratic_program"},
     "constrained_pose": {"kind": "position_based", "solver": "quadratic_program"},
 }  # fmt: skip
 # What a preset takes from the cell's own law, so that the laws differ in nothing else.

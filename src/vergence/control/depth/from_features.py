@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray
-from vergence.control.aligned import aligned, lifted
+from vergence.control.aligned import aligned, fixes_orientation, lifted
 from vergence.control.depth.depth import Depths, MeasuredPoints
 from vergence.control.depth.from_pose import pose_depths
 from vergence.errors import InputError
@@ -141,7 +141,4 @@ def fitted_depths(
 
 def fixes_pose(features: FloatArray) -> bool:
     """Return whether the image of features (M, 3) determines the pose: four or more, not a line."""
-    if len(features) < _FEWEST:
-        return False
-    extent = np.linalg.svd(features - features.mean(axis=0), compute_uv=False)
-    return bool(extent[1] > 1e-3 * extent[0])
+    return len(features) >= _FEWEST and bool(fixes_orientation(np.array(features)))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from numbers import Real
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numba import njit
@@ -36,16 +36,25 @@ class AdaptiveGain:
 
     def at(self, error: FloatArray) -> float:
         """Return λ, 1/s, for an error of any shape."""
-        return float(falling_gain(self.near, self.far, self.slope, np.abs(error).max(initial=0.0)))
+        return float(falling_gain(gain_numbers(self), np.abs(error).max(initial=0.0)))
+
+
+class GainNumbers(NamedTuple):
+    """The numbers of an `AdaptiveGain`, for kernels."""
+
+    near: float  # 1/s
+    far: float
+    slope: float
 
 
 @njit(cache=True, error_model="numpy")
-def falling_gain(near: float, far: float, slope: float, x: float) -> float:
+def falling_gain(gain: GainNumbers, x: float) -> float:
     """Return λ of `AdaptiveGain` for the largest component x of the error."""
+    near, far = gain.near, gain.far
     if near == far:
         return near
-    gain: float = (near - far) * np.exp(-slope * x / (near - far)) + far
-    return gain
+    value: float = (near - far) * np.exp(-gain.slope * x / (near - far)) + far
+    return value
 
 
 def _number_or_table(given: Any) -> Any:
@@ -61,6 +70,13 @@ def _number_or_table(given: Any) -> Any:
 Gain: TypeAlias = Annotated[
     Annotated[float, Field(gt=0, le=_MOST)] | AdaptiveGain, BeforeValidator(_number_or_table)
 ]
+
+
+def gain_numbers(gain: Gain) -> GainNumbers:
+    """Return a constant or adaptive gain as numbers."""
+    if isinstance(gain, AdaptiveGain):
+        return GainNumbers(gain.near, gain.far, gain.slope)
+    return GainNumbers(gain, gain, 1.0)
 
 
 def gain_at(gain: Gain, error: FloatArray) -> float:

@@ -6,7 +6,13 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.control.objectives.gain import AdaptiveGain, Gain, falling_gain, gain_at
+from vergence.control.objectives.gain import (
+    Gain,
+    GainNumbers,
+    falling_gain,
+    gain_at,
+    gain_numbers,
+)
 from vergence.control.objectives.objective import (
     CameraState,
     Quadratic,
@@ -25,9 +31,7 @@ _ALL_ONE = np.empty((0, 2, 2))
 class PointDecay(NamedTuple):
     """The numbers of the objective for image points."""
 
-    near: float  # 1/s, see `AdaptiveGain`
-    far: float
-    slope: float
+    gain: GainNumbers
     interaction: int  # where L is evaluated: at the present points, the desired ones, or both
     damping: float
 
@@ -78,11 +82,8 @@ class ImageBased:
     @property
     def numbers(self) -> PointDecay:
         """The objective's numbers, for kernels."""
-        gain = self.gain
-        if not isinstance(gain, AdaptiveGain):
-            gain = AdaptiveGain(gain, gain, 1.0)
         where = get_args(InteractionModel).index(self.interaction)
-        return PointDecay(gain.near, gain.far, gain.slope, where, self.damping)
+        return PointDecay(gain_numbers(self.gain), where, self.damping)
 
     def twist(self, features: Points, desired: Points) -> FloatArray:
         """Return v_camera (6,) of this objective alone, for a stationary target.
@@ -128,7 +129,7 @@ def point_quadratic(
     """
     error = points - desired
     largest = np.max(np.abs(error)) if len(error) else 0.0
-    gain = falling_gain(decay.near, decay.far, decay.slope, largest)
+    gain = falling_gain(decay.gain, largest)
     change = -gain * error - drift
     if decay.interaction == _CURRENT:
         L = interaction_matrix_points(points, depth_m)

@@ -1,21 +1,28 @@
 """Position-based servoing on points of known depth, without a pose filter."""
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numba import njit
 from pydantic import Field
 
 from vergence.arrays import FloatArray
-from vergence.control.objectives.gain import Gain, gain_at
+from vergence.control.aligned import FEWEST_TURNED, aligned, fixes_orientation, lifted
+from vergence.control.objectives.gain import Gain, GainNumbers, falling_gain, gain_numbers
 from vergence.control.objectives.objective import CameraState, Quadratic
 from vergence.control.objectives.optimal_tracking import AXES, Axis, axis_mask
 from vergence.errors import InputError
-from vergence.geometry import so3_log
+from vergence.geometry import se3_inverse, so3_log
 from vergence.parts import knob, part
 
-_FEWEST = 3
-_ON_LINE = 1e-3  # of the extent along the line
 _ALLOWED = "three points or more that are not on one line"
+
+
+class PoseDecay(NamedTuple):
+    """The numbers of the objective."""
+
+    gain: GainNumbers
+    controlled: FloatArray  # (6,) 1 for a camera axis that it controls, else 0
 
 
 @part("objective", "point_pose")
@@ -38,31 +45,41 @@ class PointPose:
         Raises:
             InputError: if the points do not determine a pose.
         """
-        seen = _lifted(state.points, state.depth_m)
-        goal = _lifted(state.desired.points, state.desired.depth_m)
-        for points in (seen, goal):
-            _require_orientation(points)
-        U, _, Vt = np.linalg.svd((seen - seen.mean(0)).T @ (goal - goal.mean(0)))
-        mirrored = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-        R = np.ascontiguousarray(Vt.T @ mirrored @ U.T)
-        t = goal.mean(0) - R @ seen.mean(0)
-        controlled = axis_mask(self.axes)
-        error = np.concatenate((R.T @ t, so3_log(R)))
-        v = -gain_at(self.gain, error[controlled]) * error
-        return Quadratic(np.diag(controlled.astype(np.float64)), np.where(controlled, v, 0.0))
+        desired, there = state.desired_points, state.desired_depth_m
+        assert desired is not None
+        seen = lifted(state.points, state.depth_m)
+        goal = lifted(desired, state.depth_m if there is None else there)
+        if not (fixes_orientation(seen) and fixes_orientation(goal)):
+            raise no_pose(len(seen))
+        result: Quadratic = pose_quadratic(self.numbers, seen, goal)
+        return result
+
+    @property
+    def numbers(self) -> PoseDecay:
+        """The objective's numbers, for kernels."""
+        return PoseDecay(gain_numbers(self.gain), axis_mask(self.axes).astype(np.float64))
 
 
-def _require_orientation(points: FloatArray) -> None:
-    """Refuse points (M, 3) that are as good as on one line: a rotation about it is unknown."""
-    if len(points) < _FEWEST:
-        word = "point" if len(points) == 1 else "points"
-        raise InputError("point_pose", "points", f"{len(points)} {word}", _ALLOWED)
-    extents = np.linalg.svd(points - points.mean(0), compute_uv=False)
-    if not extents[1] > _ON_LINE * extents[0]:
-        raise InputError("point_pose", "points", "points on one line", _ALLOWED)
+@njit(cache=True, error_model="numpy")
+def pose_quadratic(decay: PoseDecay, seen: FloatArray, goal: FloatArray) -> Quadratic:
+    """Return the quadratic of `PointPose` for points that determine an orientation.
+
+    Args:
+        decay: the objective's numbers.
+        seen: the points in the camera frame, (M, 3), m.
+        goal: the same at the goal.
+    """
+    T_goal_now, H, g = aligned(seen, goal), np.zeros((6, 6)), np.empty(6)
+    g[:3], g[3:] = -se3_inverse(T_goal_now)[:3, 3], so3_log(T_goal_now[:3, :3].copy())
+    g *= decay.controlled
+    g *= -falling_gain(decay.gain, np.max(np.abs(g)))
+    for i in range(6):
+        H[i, i] = decay.controlled[i]
+    return Quadratic(H, g, 0.0)
 
 
-def _lifted(points: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """Return points (M, 3) in the camera, m."""
-    lifted: FloatArray = np.column_stack((points, np.ones(len(points)))) * depth_m[:, None]
-    return lifted
+def no_pose(count: int) -> InputError:
+    """Return the error of a number of points that do not determine a pose."""
+    few = f"{count} point" if count == 1 else f"{count} points"
+    given = few if count < FEWEST_TURNED else "points on one line"
+    return InputError("point_pose", "points", given, _ALLOWED)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vergence.arrays import FloatArray
-from vergence.control._rates import resolve_twist
+from vergence.control._rates import resolve_twist, twist_of
 from vergence.control.limits import KIND_NAMES
 from vergence.control.solvers._redundancy import resolve_redundant
 from vergence.control.solvers.solver import (
@@ -109,7 +109,7 @@ def pseudo_inverse_rates(
         g: (6,).
         secondary: the other joint rates, which the limits do not scale.
     """
-    J, twist = jacobian(chain, q), np.linalg.solve(H, g).astype(np.float64)
+    J, twist = jacobian(chain, q), twist_of(H, g)
     U, sigma, Vt = np.linalg.svd(J, False)
     J_inverse = np.zeros((len(q), 6))
     for k in range(len(sigma)):
@@ -179,7 +179,7 @@ def damped_rates(
         secondary: desired in the null space, (n,).
         singular_below: σ₀, relative to the largest singular value.
     """
-    J, twist = jacobian(chain, q), np.linalg.solve(H, g).astype(np.float64)
+    J, twist = jacobian(chain, q), twist_of(H, g)
     rates = resolve_redundant(J, twist, secondary, rate_max, singular_below)
     v_tip = np.zeros(6)
     for r in range(6):

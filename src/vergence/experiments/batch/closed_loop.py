@@ -10,7 +10,7 @@ from vergence.camera import image_tick
 from vergence.control import guarded_step, guarded_steps
 from vergence.control.point_law import (
     FINE,
-    SINGULAR,
+    UNDETERMINED,
     LawMemory,
     Moment,
     PointLaw,
@@ -22,7 +22,8 @@ from vergence.robot.chain import forward_kinematics
 from vergence.runtime.schedule import command_share
 from vergence.simulation.kinematic_driver import IN_FRONT_M, in_camera
 
-COMPLETED, IMAGE_LATE, TARGET_LOST, NEAR_SINGULAR, STUCK, NOT_FINITE = range(6)  # how a run ends
+# How a run ends, if its law does not end it.
+COMPLETED, IMAGE_LATE, TARGET_LOST, STUCK = range(UNDETERMINED + 1, UNDETERMINED + 5)
 
 
 class LoopInputs(NamedTuple):
@@ -101,8 +102,9 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
     It is `vergence.runtime.Loop` on a `KinematicDriver`, decision by decision, by the same kernels.
 
     Returns:
-        One of the codes above, the inner tick, how many images had been looked at had all
-        arrived, and what ended it: the singular value, or for how many seconds nothing was seen.
+        A code, of the above or of the law's last tick, the inner tick, how many images had been
+        looked at had all arrived, and the value behind the code: that of the last tick, or for how
+        many seconds nothing was seen.
     """
     q, velocity, rates = run.start.copy(), np.zeros(len(run.start)), np.zeros(len(run.start))
     law, memory, chain = run.law, run.memory, run.law.chain
@@ -132,8 +134,7 @@ def closed_loop(run: LoopInputs, record: LoopRecord) -> tuple[int, int, int, flo
                 memory, answer = law_tick(law, memory, Moment(chain, image, q, velocity, time))
                 rates[:] = answer.rates
                 if answer.end != FINE:
-                    code = NEAR_SINGULAR if answer.end == SINGULAR else NOT_FINITE
-                    return code, tick, seen + 1, answer.sigma
+                    return answer.end, tick, seen + 1, answer.value
             else:
                 rates[:] = 0.0
                 if time - last_seen > target_s:

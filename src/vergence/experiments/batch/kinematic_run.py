@@ -24,7 +24,13 @@ class KinematicRun:
     duration_s: float
     noise_px: float = 0.0  # standard deviation on each coordinate
     timeouts: Timeouts = field(default_factory=Timeouts)
+    desired_depth_m: FloatArray | None = None  # (M,) of the features there, if known
     clearance: Clearance | None = None  # what the arm must keep clear of; nothing if None
+
+    @property
+    def reference(self) -> Reference:
+        """What the law is to reach."""
+        return Reference(0.0, self.desired_px, desired_depth_m=self.desired_depth_m)
 
     def noise(self) -> np.random.Generator:
         """Return what draws the noise."""
@@ -38,7 +44,7 @@ class KinematicRun:
             driver,
             ARM,
             ExactPoints(CAMERA, self.noise_px, self.noise()),
-            FixedReference(Reference(0.0, self.desired_px)),
+            FixedReference(self.reference),
             self.law,
             outer_rate_hz=self.cell.rate_hz,
             listeners=[recorder],

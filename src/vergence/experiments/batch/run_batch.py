@@ -9,10 +9,11 @@ import numpy as np
 
 from vergence.arrays import FloatArray
 from vergence.camera import image_times
-from vergence.control import Servo, singular_fault
+from vergence.control import Servo, point_law, singular_fault
 from vergence.control.compile_law import CompiledLaw
+from vergence.control.objectives.point_pose import no_pose
 from vergence.control.point_law import ProgramSolver, TrackingLaw
-from vergence.control.sum_of_terms import NOT_FINITE
+from vergence.control.sum_of_terms import NOT_FINITE, undefined
 from vergence.experiments.batch import closed_loop as kernel
 from vergence.experiments.batch.closed_loop import LoopInputs, LoopRecord, closed_loop
 from vergence.experiments.batch.kinematic_run import KinematicRun
@@ -69,7 +70,7 @@ def _made(run: KinematicRun) -> BatchTrace:
 
 def _compiled(run: KinematicRun) -> CompiledLaw | None:
     law, covariance = run.law, covariance_px(run.noise_px)
-    return law.compiled(run.desired_px, covariance) if isinstance(law, Servo) else None
+    return law.compiled(run.reference, covariance) if isinstance(law, Servo) else None
 
 
 def pack(run: KinematicRun) -> LoopInputs:
@@ -154,15 +155,17 @@ def _outcome(
             return endings.completed(run.duration_s, time)
         case kernel.IMAGE_LATE:
             return endings.image_late(value, time)
-        case kernel.NEAR_SINGULAR:
+        case point_law.SINGULAR:
             fault = singular_fault(value, _singular_below(inputs))
             assert fault is not None
             return Outcome(*fault, time)
         case kernel.STUCK:
             stuck = np.flatnonzero(record.stuck)
             return endings.joint_limit([run.cell.arm.names[i] for i in stuck], time)
-        case kernel.NOT_FINITE:
+        case point_law.NONSENSE:
             return Outcome(*NOT_FINITE, time)
+        case point_law.UNDETERMINED:
+            return Outcome(*undefined(no_pose(int(value))), time)
         case _:
             return endings.target_lost([OUT_OF_SIGHT], time)
 
