@@ -54,7 +54,7 @@ def try_scene(random: np.random.Generator, number: int) -> list[Answer]:
     motions = (answer, *answer.alternatives)
     if kind == "unrelated":
         return [Answer(name, UNFOUNDED, len(motions))]
-    off = min(_deviations(motion, scene) for motion in motions)
+    off = min(deviations(motion, scene) for motion in motions)
     return [Answer(name, off, len(motions))]
 
 
@@ -95,7 +95,7 @@ def _motion(random: np.random.Generator, kind: str) -> FloatArray:
     return se3(R, place + 0.02 * random.normal(size=3))
 
 
-def _deviations(view: TwoView, scene: Scene) -> float:
+def deviations(view: TwoView, scene: Scene) -> float:
     """Return how far Υ = (t_d, uθ) lies from the truth."""
     R, t = scene.T_star_camera[:3, :3], scene.T_star_camera[:3, 3]
     truth = t / _plane_distance(scene.points_star[np.abs(view.delta) < 1e-9])

@@ -127,7 +127,23 @@ def _settled(views: Views, kept: BoolArray) -> Comparison:
             break
         kept = again
         comparison = compare_models(views.take(kept))
-    return comparison
+    return _without_isolated(comparison, views)
+
+
+def _without_isolated(comparison: Comparison, views: Views) -> Comparison:
+    """Drop the matches that only chance brought to a motion, if there are wrong ones.
+
+    The motion says nothing about where along its epipolar line a match is. A wrong match that is
+    on the line is anywhere on it, so that its depth is unlike that of the others, and it may turn
+    the motion by several deviations.
+    """
+    best = comparison.fits[0]
+    if best.model != GENERAL or not FEW <= len(best.views) < len(views):
+        return comparison
+    kept = np.isin(views.index, best.views.index[~best.isolated])
+    if np.count_nonzero(kept) in (len(best.views), 0):
+        return comparison
+    return compare_models(views.take(kept))
 
 
 def _without_chance(comparison: Comparison, views: Views, kept: BoolArray) -> BoolArray:

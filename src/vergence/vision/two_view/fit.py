@@ -22,6 +22,9 @@ NO_PLANE = 4.5  # standard deviations beyond which a plane is excluded
 NOISE_FROM = 16  # matches from which the noise can be estimated
 _CAP = 13.8  # on the χ² of a single match, which may be wrong
 _FAR = 21.1  # χ² of a rotation: one in ten thousand
+_TENTH = 0.1  # share of points that may be nearer, or farther, than the depths of the others
+_ISOLATED = 1.5  # extents of these depths from their middle, beyond which a point is isolated
+_SURE = 3.0  # standard deviations, by which it has to be
 _MOTIONS = 4  # largest number that is adjusted
 _BEHIND = 0.1  # fraction of points that may lie behind a camera: distant ones, because of noise
 
@@ -71,6 +74,17 @@ class Fit:
         """Which points are in front of both cameras, (N,)."""
         before: BoolArray = (self.state.w > 0.0) & (self.depths > 0.0)
         return before
+
+    @property
+    def isolated(self) -> BoolArray:
+        """Which points have an inverse depth far from those of the others, (N,)."""
+        w, views = self.state.w, self.views
+        blocks = bundle.normal_blocks(self.model, self.state, self.residuals, views.weight)
+        deviation = np.sqrt(np.linalg.inv(blocks.V)[:, 2, 2])
+        low, high = np.quantile(w, (_TENTH, 1.0 - _TENTH))
+        beyond = np.abs(w - 0.5 * (low + high)) - _ISOLATED * (high - low)
+        far: BoolArray = beyond > _SURE * deviation
+        return far
 
     @property
     def depths(self) -> FloatArray:
@@ -163,7 +177,9 @@ def hinging_on_one(views: Views, best: Fit, scale: float) -> list[Fit]:
         blocks = bundle.normal_blocks(fit.model, fit.state, fit.residuals, views.weight)
         C = scale * bundle_covariance(blocks, np.zeros(0, dtype=np.int64))[:3, :3]
         turn = so3_log(np.ascontiguousarray(fit.state.R @ best.state.R.T))
-        if turn @ np.linalg.solve(C, turn) > _FAR and all(fit.differs_from(o) for o in others):
+        # Without a match the motion may be undetermined: then it is no rival.
+        far = turn @ np.linalg.pinv(C, hermitian=True) @ turn > _FAR
+        if far and all(fit.differs_from(o) for o in others):
             others.append(fit)
     return others[:_MOTIONS]
 

@@ -28,7 +28,7 @@ from vergence.vision.two_view.likelihood_optima import (
 from vergence.vision.two_view.linear import homogeneous
 from vergence.vision.two_view.motions import essential
 from vergence.vision.two_view.sampson import sampson_jacobian, sampson_residuals
-from vergence.vision.two_view.small import apply, dot, symmetric_eigen, transposed_apply
+from vergence.vision.two_view.small import apply, dot, symmetric_eigen, times, transposed_apply
 from vergence.vision.two_view.widening import SLACK, upsilon_between, widen
 
 _STEPS = 12  # along a valley, each way
@@ -41,8 +41,12 @@ _HEADINGS = np.array(  # along the two weakest directions of a valley, deviation
 )
 _BENT = 0.05  # rad: deviation beyond which a direction bends
 _DRAWS = 1.3 * np.random.default_rng(0).normal(size=(40, 5))  # about each point of a valley
-# Of the distance of the reference plane, in deviations, at the bottom of a valley.
-_NOISES = np.array([0.0, -2.0, -1.0, 1.0, 2.0])
+# Of the points of the reference plane, in deviations along three axes, at the bottom of a valley.
+_NOISES = np.concatenate(
+    (np.zeros((1, 3)), *(size * axis * np.eye(3) for size in (1.5,) for axis in (-1, 1)))
+)
+_NOISES_DRAWN = np.random.default_rng(1).normal(size=(len(_DRAWS), 4, 3))  # at each draw
+_NOISES_DRAWN[:, 0] = 0.0
 _RARE = 14.0  # χ² of noise and place in the valley together that one in a thousand exceeds
 _FARTHEST = 1e-4  # smallest inverse depth, relative to that of the translation
 _LEAST_INFORMATION = 1.0 / 0.15**2  # rad⁻²: valleys bend, so no step is longer than 0.15 rad
@@ -174,7 +178,7 @@ def widen_for_likely(
     upsilon = np.concatenate((t_d, so3_log(R.T.copy())))
     least = least_unlikelihood(likelihood, essential(R, t), log_noise)
     covariances, differences = covariance.reshape(1, 6, 6), np.empty((1, 6))
-    steepest = likelihood.noise * np.exp(log_noise) * steepest_noise(R, t, m_star, m)
+    axes = likelihood.noise * np.exp(log_noise) * plane_noises(R, t, m_star, m)
     for k in range(len(optima.t)):
         R_way, t_way, spreads, weak = along_valley(
             likelihood, optima.R[k], optima.t[k], optima.right[k], log_noise, least + UNLIKELY
@@ -185,30 +189,32 @@ def widen_for_likely(
                 R_j, t_j, noises = R_way[i], t_way[i], _NOISES
                 if j < len(draws):
                     R_j, t_j = motion_at(R_j, t_j, apply(spreads[i], draws[j]))
-                    noises = _NOISES[:1]
+                    noises = _NOISES_DRAWN[j]
                 above = least_unlikelihood(likelihood, essential(R_j, t_j), log_noise) - least
                 for noise in noises:
-                    if above + noise**2 > (_FAR if noise == 0.0 else _RARE):
+                    square = dot(noise, noise)
+                    if above + square > (_FAR if square == 0.0 else _RARE):
                         continue
+                    moved = noise[0] * axes[0] + noise[1] * axes[1] + noise[2] * axes[2]
                     t_d, behind = translation_over_distance(
-                        R_j, t_j, m_star + noise * steepest[:, :2], m + noise * steepest[:, 2:]
+                        R_j, t_j, m_star + moved[:, :2], m + moved[:, 2:]
                     )
                     if not behind:
                         differences[0] = upsilon_between(upsilon, R_j.T.copy(), t_d)
-                        aside = max(_ASIDE * above + noise**2, _LEAST)
+                        aside = max(_ASIDE * above + square, _LEAST)
                         widen(covariances, differences, SLACK * aside)
     return True
 
 
 @njit(cache=True)
-def steepest_noise(R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
-    """Return the unit change of the reference plane's points, (P, 4), that changes ‖t_d‖ most.
+def plane_noises(R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray) -> FloatArray:
+    """Return the three unit changes of the reference plane's points that turn it, (3, P, 4).
 
-    The first two columns are of the desired view, the others of the current one.
+    They are at right angles, the one that changes N = n*/d* most last. The first two columns are of
+    the desired view, the others of the current one.
     """
-    changes = np.zeros((len(m), 4))
-    t_d, _ = translation_over_distance(R, t, m_star, m)
-    least = np.sqrt(dot(t_d, t_d))
+    N, _ = plane_through(R, t, m_star, m)
+    slopes = np.zeros((3, 4 * len(m)))
     for p in range(len(m)):
         for axis in range(4):
             moved_star, moved = m_star.copy(), m.copy()
@@ -216,11 +222,15 @@ def steepest_noise(R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArr
                 moved_star[p, axis] += _STEP
             else:
                 moved[p, axis - 2] += _STEP
-            t_d, behind = translation_over_distance(R, t, moved_star, moved)
+            there, behind = plane_through(R, t, moved_star, moved)
             if not behind:
-                changes[p, axis] = np.sqrt(dot(t_d, t_d)) - least
-    changes /= max(np.sqrt(np.sum(changes**2)), 1e-300)
-    return changes
+                slopes[:, 4 * p + axis] = there - N
+    values, vectors = symmetric_eigen(times(slopes, slopes.T.copy()))
+    axes = np.empty((3, len(m), 4))
+    for k in range(3):
+        change = transposed_apply(slopes, vectors[:, k].copy()) / np.sqrt(max(values[k], 1e-300))
+        axes[k] = change.reshape(len(m), 4)
+    return axes
 
 
 def covariance_of_likely(
@@ -267,11 +277,19 @@ def translation_over_distance(
         m_star: points of the plane in the desired view, normalized, (K, 2).
         m: the same points in the current view, (K, 2).
     """
+    N, behind = plane_through(R, t, m_star, m)
+    return -np.sqrt(dot(N, N)) * transposed_apply(R, t), behind
+
+
+@njit(cache=True)
+def plane_through(
+    R: FloatArray, t: FloatArray, m_star: FloatArray, m: FloatArray
+) -> tuple[FloatArray, bool]:
+    """Return N = n*/d* of the plane of points, (3,), and whether one of them is behind a camera."""
     inverse, _ = inverse_depths(R, t, m_star, m)
     if inverse.min() <= _FARTHEST:
         return np.zeros(3), True
     points = homogeneous(m_star)
     for k in range(len(points)):
         points[k] /= inverse[k]
-    N = reference_plane(points)
-    return -np.sqrt(dot(N, N)) * transposed_apply(R, t), False
+    return reference_plane(points), False

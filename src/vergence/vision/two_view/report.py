@@ -17,13 +17,14 @@ from vergence.vision.two_view.covariance import (
 from vergence.vision.two_view.decomposition import decompose_homography
 from vergence.vision.two_view.explain import Explanation
 from vergence.vision.two_view.failure import TwoViewFailure, TwoViewProblem
-from vergence.vision.two_view.fit import Fit
+from vergence.vision.two_view.fit import NOISE_FROM, Fit
 from vergence.vision.two_view.likelihood_optima import likelihood_of
 from vergence.vision.two_view.linear import homogeneous
 from vergence.vision.two_view.motion_samples import covariance_of_likely
 from vergence.vision.two_view.result import TwoView
 from vergence.vision.two_view.widening import DRAWS, widen_for_plane
 
+_DEVIATIONS = 2.0  # z, which covariances are to get right
 _EDGE_ON = 6.0  # deviations from a line of the points of a plane that is seen edge-on
 
 
@@ -58,6 +59,7 @@ class Report(NamedTuple):
         H = H / np.linalg.svd(H)[1][1]
         motions = zip(*decompose_homography(H), strict=True)
         scale = max(found.scale, fit.chi_square / max(fit.freedom, 1))
+        scale = max(scale, _variance(fit, found))
         results = [self._planar_motion(fit, scale, *motion) for motion in motions]
         possible = sorted(
             (result for result in results if result is not None),
@@ -130,7 +132,7 @@ class Report(NamedTuple):
         views = found.views
         blocks = bundle.normal_blocks(GENERAL, state, fit.residuals, fit.views.weight)
         covariance = covariance_of_likely(
-            found.scale * upsilon_covariance(GENERAL, state, blocks, chosen),
+            _variance(fit, found) * upsilon_covariance(GENERAL, state, blocks, chosen),
             likelihood_of(views.m_star, views.m, views.noise, len(views) - len(fit.views)),
             np.ascontiguousarray(state.R),
             state.t,
@@ -169,6 +171,19 @@ class Report(NamedTuple):
         result = np.full((self.total, *values.shape[1:]), np.nan)
         result[fit.views.index] = values
         return result
+
+
+def _variance(fit: Fit, found: Explanation) -> float:
+    """Return the variance of the noise over the stated one, for covariances.
+
+    An estimate by ν degrees of freedom is as often too small as too large. With the factor
+    (1 + (z² + 1) / (4ν))², the first term of Student's quantile over that of the normal
+    distribution, z deviations are exceeded as rarely as with the true variance.
+    """
+    if len(found.views) < NOISE_FROM or fit.freedom < 1:
+        return found.scale
+    student = (1.0 + (_DEVIATIONS**2 + 1.0) / (4.0 * fit.freedom)) ** 2
+    return max(found.scale, student * fit.chi_square / fit.freedom)
 
 
 def _widened(motions: list[TwoView], fit: Fit, scale: float) -> list[TwoView]:
