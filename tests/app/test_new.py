@@ -98,7 +98,8 @@ def test_a_cell_that_is_there_is_not_written_over(command, tmp_path: Path, capsy
     (tmp_path / "puma560" / "cell.toml").write_text("mine")
     assert command("new", ARMS[6][0], "--body", ARMS[6][1]) == 2
     assert (tmp_path / "puma560" / "cell.toml").read_text() == "mine"
-    assert "--out" in capsys.readouterr().err
+    assert "puma560 holds a cell already" in (said := capsys.readouterr().err)
+    assert "needed: --out with another folder" in said
 
 
 def test_a_body_that_no_joint_carries_is_answered_with_the_option(command, capsys) -> None:
@@ -112,8 +113,21 @@ def test_a_body_that_no_joint_carries_is_answered_with_the_option(command, capsy
 def test_a_body_that_is_not_there_is_answered_with_those_that_are(command, capsys, body) -> None:
     assert command("new", ARMS[6][0], "--body", body) == 2
     said = capsys.readouterr().err
-    assert "the last of each branch: flange; all bodies: " in said
-    assert ("no body is named; needed: the last body of the arm; " in said) == (body == "")
+    assert "the last body of the arm, probably flange (6 joints); all bodies: base, " in said
+    assert ("no body is named; needed: the last body of the arm" in said) == (body == "")
+
+
+def test_of_many_bodies_the_ends_of_the_arms_are_named_and_the_others_counted(
+    command, capsys
+) -> None:
+    model = f"{ROBOTS}/baxter_description/urdf/baxter.urdf"
+    assert command("new", model) == 2
+    said = capsys.readouterr().err
+    assert "probably right_gripper (7 joints) or left_gripper (7 joints); 55 other" in said
+    assert "sonar_ring" not in said
+    assert command("new", model, "--body", "list") == 2
+    said = capsys.readouterr().err
+    assert said.index("right_gripper (7 joints)") < said.index("all bodies: base, ")
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,20 @@ def test_a_joint_between_equal_limits_is_fixed_there(tmp_path: Path, kind: str) 
     check_kinematics(path, "link6", arm, np.random.default_rng(93))
 
 
+FOLLOWER = LIMIT + '<mimic joint="joint2" multiplier="-1" offset="0.1"/>'
+
+
+@pytest.mark.parametrize("body", ["", None])  # not named yet, or a target
+def test_a_joint_between_equal_limits_is_fixed_also_in_what_is_no_arm(
+    tmp_path: Path, body: str | None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    fixed = joint(2, '<limit lower="0.3" upper="0.3" effort="1" velocity="1"/>')
+    stray = joint(4, LIMIT + '<mimic joint="nobody"/>')
+    spec = read_urdf(robot(tmp_path, fixed, joint(3, FOLLOWER), stray), body)
+    assert [one.name for one in spec.joints] == ["joint1", "joint4", "joint5", "joint6", "gripper"]
+    assert not capfd.readouterr().err  # where MuJoCo says that it ignores such limits
+
+
 def test_a_joint_beyond_the_arm_is_locked_where_it_may_be(tmp_path: Path) -> None:
     model = read_urdf(robot(tmp_path), "link6").compile()
     np.testing.assert_allclose(model.body("link7").pos, [0, 0, 0.02], atol=1e-12)

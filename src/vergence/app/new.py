@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from vergence.app.output import SUCCESS, emit, say
-from vergence.errors import InputError
+from vergence.errors import Absent, InputError
 from vergence.places import CELL, other_file
 from vergence.registry import kinds
 
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from vergence.simulation.draft import Draft
 
 _SHARE = 0.85  # of the image's height that the board fills
-_GRIPPER = re.compile("grip|finger|jaw|thumb|knuckle", re.IGNORECASE)  # in names of joints
-_FINGER_M = 0.1  # the longest travel of a finger that slides
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
   <asset>
@@ -132,7 +129,8 @@ def new(options: "NewOptions") -> int:
     path = locate_model(Path(options.model), Path.cwd(), "vergence new", "MODEL")
     folder = options.out or Path(path.stem)
     if (folder / CELL).exists():
-        raise InputError("--out", "", f"{folder}, which holds a cell", "another folder")
+        given = Absent(f"{folder} holds a cell already")
+        raise InputError("vergence new", "", given, "--out with another folder")
     lens = None if options.camera is None else read_camera(options.camera)
     span = SPAN if lens is None else min(SPAN, _span(lens))
     target = None if options.target is None else _Target.of(options.target, options.target_scale)
@@ -169,12 +167,14 @@ def _advice(folder: Path, draft: "Draft") -> list[str]:
 
 def _gripper_joint(draft: "Draft") -> str:
     """Say that the last joint of an arm seems to open and close a gripper, if it does."""
+    from vergence.robot.arm_ends import moves_finger
+
     arm = draft.arm
-    short = arm.sliding[-1] and arm.q_max[-1] - arm.q_min[-1] <= _FINGER_M
-    if not (short or _GRIPPER.search(arm.names[-1])):
+    name, slides = arm.names[-1], bool(arm.sliding[-1])
+    if not moves_finger(name, slides, arm.q_min[-1], arm.q_max[-1]):
         return ""
     return (
-        f"joint {arm.names[-1]}, the last one, seems to move a gripper: to leave it out of the "
+        f"joint {name}, the last one, seems to move a gripper: to leave it out of the "
         "arm's motion, give a body before it as --body"
     )
 

@@ -11,7 +11,7 @@ from vergence.errors import InputError
 from vergence.robot.bounded_xml import read_xml
 from vergence.robot.mesh_files import SHELL, use_triangles
 from vergence.robot.mujoco_chain import velocity_limit_name
-from vergence.robot.urdf_joints import settle_joints
+from vergence.robot.urdf_joints import lock_motionless, settle_joints
 from vergence.robot.urdf_rods import add_rods
 from vergence.robot.urdf_shapes import Shapes, choose_shapes, mend_inertia, report_faults
 from vergence.robot.urdf_tree import read_tree
@@ -37,8 +37,8 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
 
     Args:
         path: the file.
-        last_body: name of the arm's last link. If None, no joint is locked and all shapes are
-            required, as for a target.
+        last_body: name of the arm's last link. If None, only joints whose limits are equal are
+            locked, and all shapes are required, as for a target.
 
     Raises:
         InputError: if the file is not a URDF, or asks for something that is not supported.
@@ -53,7 +53,11 @@ def read_urdf(path: Path, last_body: str | None = None) -> Any:
     for child in [child for child in robot if child.tag not in _PARTS]:
         robot.remove(child)
     tree = read_tree(robot, source)
-    rates = settle_joints(tree, last_body) if last_body and last_body in tree.links else {}
+    rates: dict[str, float] = {}
+    if last_body and last_body in tree.links:
+        rates = settle_joints(tree, last_body)
+    else:
+        lock_motionless(tree)
     for link in tree.links.values():
         choose_shapes(link, shapes)
         mend_inertia(link, source)

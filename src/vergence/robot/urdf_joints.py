@@ -58,6 +58,33 @@ def settle_joints(tree: Tree, last_body: str) -> dict[str, float]:
     return rates
 
 
+def lock_motionless(tree: Tree) -> None:
+    """Lock joints between equal limits, and those that follow one, of a model that is no arm.
+
+    A `<mimic>` of a joint that does not exist is dropped: MuJoCo would ignore it.
+    """
+    locked: dict[str, float] = {}
+    for name, joint in tree.joints.items():
+        mimic = joint.find("mimic")
+        if joint.get("type") not in MOVING:
+            continue
+        if mimic is None:
+            low, high = _limits(joint, tree.source, required=False)
+            if low == high:
+                locked[name] = low
+        elif mimic.get("joint") not in tree.joints:
+            joint.remove(mimic)
+    for name, joint in tree.joints.items():
+        mimic = joint.find("mimic")
+        leader = "" if mimic is None else mimic.get("joint", "")
+        if leader in locked and joint.get("type") in MOVING:
+            ratio = _number(joint, "mimic", "multiplier", 1.0, tree.source)
+            offset = _number(joint, "mimic", "offset", 0.0, tree.source)
+            locked[name] = offset + ratio * locked[leader]
+    for name, place in locked.items():
+        _lock(tree.joints[name], place, tree.source)
+
+
 def _locked(tree: Tree, path: Sequence[Element]) -> dict[str, float]:
     """Return the positions of the joints that do not move, rad or m, by name."""
     places: dict[str, float | None] = {}

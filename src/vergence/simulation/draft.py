@@ -1,7 +1,7 @@
 """A first cell for a new arm: its posture, its camera and its target."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,15 @@ from vergence.arrays import FloatArray
 from vergence.errors import Absent, InputError, nearest
 from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
+from vergence.robot.arm_ends import arm_ends
 from vergence.robot.model_files import read_model
 from vergence.robot.mujoco_chain import read_chain
 from vergence.robot.mujoco_coupling import joints_above
 from vergence.simulation.build import named_joints
 from vergence.simulation.cell_model import hidden
 
+_MOST_ENDS = 4  # of arms, which a message names
+_FEW_BODIES = 8  # that a message names unasked
 _POSTURES = 4000  # number of random postures
 _TRIED = 200  # of the best ones, until one sees the board
 _STANDOFFS_M = (0.05, 0.15)  # from the body's origin to the camera
@@ -99,11 +102,8 @@ def _compile(path: Path, body: str) -> Any:
     try:
         bodies = {one.name: one for one in spec.bodies if one.name and one.name != "world"}
         if body not in bodies:
-            ends = ", ".join(name for name, one in bodies.items() if not one.bodies)
-            allowed = f"the last of each branch: {ends}; all bodies: {nearest(body, bodies)}"
-            if not body:
-                allowed = f"the last body of the arm; {allowed}"
-            raise InputError(str(path), "--body", body or Absent("no body is named"), allowed)
+            given = body or Absent("no body is named")
+            raise InputError(str(path), "--body", given, _bodies(spec, body, bodies))
         named_joints(bodies[body])
         model = spec.compile()
         if not joints_above(model, model.body(body).id):
@@ -113,6 +113,18 @@ def _compile(path: Path, body: str) -> Any:
         raise
     except ValueError as error:
         raise InputError(str(path), "", str(error), "a model that MuJoCo compiles") from None
+
+
+def _bodies(spec: Any, given: str, known: Collection[str]) -> str:
+    """Return which bodies there are: the ends of arms first, and all if a wrong one was given."""
+    ends = [f"{name} ({count} joints)" for name, count in arm_ends(spec)[:_MOST_ENDS]]
+    allowed = "the last body of the arm"
+    if ends:
+        allowed += f", probably {' or '.join(ends)}"
+    others = len(known) - len(ends)
+    if given or others <= _FEW_BODIES:
+        return f"{allowed}; all bodies: {nearest(given, known)}"
+    return f"{allowed}; {others} other bodies, which `--body list` names"
 
 
 def _arm(model: Any, body: str) -> tuple[Arm, str]:
