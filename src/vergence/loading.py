@@ -5,8 +5,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vergence.errors import NOTHING, InputError, VergenceError
+from vergence.errors import NOTHING, Absent, InputError, VergenceError
 from vergence.parts import Slot, field_names, is_part, kind_of, slots_of
+from vergence.raised import PartError, raised
 from vergence.registry import find, kinds
 
 
@@ -59,10 +60,12 @@ def asking(part: Any, source: str, key: str) -> Iterator[None]:
     """
     try:
         yield
+    except PartError as error:
+        raise InputError(source, key, Absent(error.said), error.needed) from None
     except VergenceError:
         raise
     except Exception as error:
-        given = f"{kind_of(part)}, which raised {type(error).__name__}: {error}"
+        given = f"{kind_of(part)}, which raised {raised(error)}"
         raise InputError(source, key, given, "a part that works in this cell") from error
 
 
@@ -102,7 +105,7 @@ def make_part(cls: Any, values: Mapping[str, Any], place: Place) -> Any:
         key = f"{place.key}.{error.key}" if place.key and error.key else place.key or error.key
         raise InputError(place.source, key, error.given, error.allowed) from None
     except Exception as error:
-        given_text = f"{cls.__name__}, whose constructor raised {type(error).__name__}: {error}"
+        given_text = f"{cls.__name__}, whose constructor raised {raised(error)}"
         known = ", ".join(field_names(cls))
         raise InputError(
             place.source, place.key, given_text, f"values it takes: {known}"

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from vergence.errors import InputError, nearest
+from vergence.raised import raised
 
 ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.centre"
 
@@ -169,7 +170,7 @@ def find(
     except ImportError as error:
         raise refuse(f"which cannot be imported ({error})") from None
     except Exception as error:
-        why = f"whose module raised {type(error).__name__}: {error}"
+        why = f"whose module raised {raised(error)}"
         raise refuse(why) from error
     found = getattr(module, attribute, None)
     if found is None:

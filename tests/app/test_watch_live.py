@@ -93,7 +93,7 @@ def test_a_run_that_has_ended_refuses_a_drag_and_a_wrong_value_by_its_key(
     page.run(steps, end)
     assert page.refused == [
         "law.Q: given 0.0; allowed: greater than 0",
-        "The run has ended; Reset begins another.",
+        "The run has ended; Restart begins another.",
     ]
 
 
@@ -180,6 +180,10 @@ def test_the_law_of_the_task_that_runs_is_changed_and_tasks_that_share_it_share_
     assert editor.law_after(editor.cell, contexts[0]) is None
     editor.choose("second", contexts[0])  # what another task goes by
     assert editor.as_json()["settings"][0] == "laws.second.gain=2.0"
+    editor.reset(contexts[0])  # the changes of all tasks
+    assert editor.as_json()["settings"] == []
+    assert editor.as_json()["choice"] == "image_based (as in the cell)"
+    assert [stage.law.objective.gain for stage in editor.cell.stages] == [0.5, 0.5, 1.0, 0.5]
     editor.begin_task(1)
     assert not editor.as_json()["choices"]
     with pytest.raises(InputError, match="uses no law"):

@@ -366,11 +366,33 @@ def test_a_goal_is_taken_where_the_arm_is(browser: Browser, watched: Watched) ->
     }
 
 
-def test_a_reset_begins_again_from_the_start(browser: Browser) -> None:
-    before = browser.value(TIME)
-    browser.click("#reset")
-    browser.wait(TIME, lambda time: 0 < time < before)
-    browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+def test_a_restart_begins_from_the_start_with_the_changed_law_until_that_is_reset(
+    browser: Browser,
+) -> None:
+    def restart() -> None:
+        before = browser.value(TIME)
+        browser.click("#reset")
+        browser.wait(TIME, lambda time: 0 < time < before)
+        browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")
+
+    settings = "document.getElementById('settings').textContent"
+    hidden = "document.getElementById('law-changed').hidden"
+    restart()  # takes up the cell's own task, after points were picked
+    browser.wait(hidden)
+    browser.value(
+        "(() => { const f = document.querySelector('.knob[data-key=Q] input');"
+        "f.value = 0.003; f.dispatchEvent(new Event('change')) })()"
+    )
+    browser.wait(settings, lambda text: "law.Q=0.003" in text)
+    restart()
+    assert "law.Q=0.003" in browser.value(settings)
+    assert "also stay when the run is restarted" in browser.value(
+        "document.getElementById('law-changed').innerText"
+    )
+    browser.click("#own-law")
+    browser.wait(hidden)
+    assert browser.value(settings) == ""
+    assert browser.value("watch.law.law.knobs.every((knob) => knob.value === knob.own)")
 
 
 def test_nothing_is_fetched_from_elsewhere_and_nothing_goes_wrong(
@@ -390,9 +412,9 @@ def test_ctrl_c_stops_the_arm_though_it_is_paused_and_leaves_a_recording(
     answer = watched.stop()
     assert answer["outcome"]["kind"] == "stopped"
     third = Path(answer["run"])
-    assert third.name == "run-3"
+    assert third.name == "run-4"
     first, picked, last = (
-        Recording.open(third.with_name(name)) for name in ("run", "run-2", "run-3")
+        Recording.open(third.with_name(name)) for name in ("run", "run-2", "run-4")
     )
     assert picked.cameras["wrist"].points_px.shape[1] == 3
     for recording in (first, picked, last):

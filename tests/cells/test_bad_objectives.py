@@ -34,10 +34,17 @@ def test_a_degenerate_desired_feature_is_refused_before_anything_moves(
     feature: str, desired: list[list[float]], said: str
 ) -> None:
     error = refusal(image_based(feature), task={"desired": desired})
-    assert error.key == "law.feature"
+    assert error.key == "law.objectives.0.feature"
     assert f"{feature} of" in str(error)
     assert said in str(error)
     assert "as desired" in str(error)
+
+
+def test_the_only_objective_is_named_as_the_file_has_it() -> None:
+    twice = {"desired": [[100, 100], [100, 100], [300, 200], [300, 200]]}
+    with pytest.raises(InputError) as caught:
+        run("ur5", images=False, law=image_based("lines"), task=twice)
+    assert caught.value.key == "law.feature"
 
 
 def test_points_on_a_line_have_no_pose() -> None:

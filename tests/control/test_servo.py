@@ -25,11 +25,12 @@ from vergence.control import (
     Term,
     axis_mask,
 )
-from vergence.control.objectives import state_of
-from vergence.errors import InputError
+from vergence.control.objectives import least_squares, state_of
+from vergence.errors import InputError, ShapeError
 from vergence.features import Centre, Feature, Lines, LogDepth, Points
 from vergence.geometry import se3_exp, so3_log, transform_points
 from vergence.parts import as_part, knob, part
+from vergence.raised import PartError
 from vergence.signals import JointState, Observation, OutcomeKind, Reference
 
 ARM = puma()
@@ -259,12 +260,22 @@ class Nonsense:
         return Quadratic(np.full((6, 6), np.nan), np.zeros(6))
 
 
-def test_an_objective_that_returns_nonsense_ends_the_task():
+def test_an_objective_that_returns_nonsense_is_named_with_its_file_and_line():
     points, depth = seen(ARM, START, WORLD)
-    command = commanded(Servo(ARM, CAMERA, Nonsense(), depth_m=depth), points, points)
-    assert command.fault is not None
-    assert command.fault[0] is OutcomeKind.INFEASIBLE
-    assert not command.velocity.any()
+    servo = Servo(ARM, CAMERA, Nonsense(), depth_m=depth)
+    with pytest.raises(
+        PartError, match=r"Nonsense: quadratic \(.*test_servo.py:\d+\) returned num"
+    ):
+        commanded(servo, points, points)
+
+
+@pytest.mark.parametrize(
+    ("E", "desired", "weight", "named"),
+    [(7, 8, 8, "desired"), (8, 7, 8, "desired"), (8, 8, 7, "weight")],
+)
+def test_least_squares_of_rows_that_do_not_fit_are_refused(E, desired, weight, named):
+    with pytest.raises(ShapeError, match=named):
+        least_squares(np.zeros((E, 6)), np.zeros(desired), np.ones(weight))
 
 
 def test_points_that_make_no_feature_lose_the_target_with_a_reason():

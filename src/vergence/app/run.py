@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vergence.app.output import FAILURE, SUCCESS, emit, run_folder, say, warn
+from vergence.app.warnings_once import TRACEBACK, tracebacks_in
 from vergence.errors import InputError
 from vergence.places import RECORDING
 from vergence.signals import Outcome, OutcomeKind
@@ -24,13 +25,16 @@ def run(options: "RunOptions") -> int:
     from vergence.runtime import Recorder
 
     recorder = Recorder(folder, options.image_every, options.image_quality)
-    result = _recorded(cell, recorder, options.images, options.driver)
+    with tracebacks_in(folder):
+        result = _recorded(cell, recorder, options.images, options.driver)
     if not options.as_json:
         _tell_outcome(result)  # at once: what has to be read later is written later
     report = _reported(cell, result, folder)
     if options.as_json:
         emit(_answer(cell.name, result, folder, report))
     else:
+        if (traceback := folder / TRACEBACK).exists():
+            say(f"  traceback  {traceback}")
         say(f"  report     {report}")
         say(f"  recording  {folder / RECORDING}  (opens in Foxglove and Rerun)")
     return SUCCESS if result.outcome.succeeded else FAILURE

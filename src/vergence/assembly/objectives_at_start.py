@@ -32,7 +32,7 @@ def require_cameras(context: LawContext) -> None:
         given, seeing = term.camera, context.points_px or cell.cameras
         if given in cell.cameras:
             given += ", which the task shows no features"
-        key = f"{_key(context, number)}.camera"
+        key = f"{cell.law.key_of(number)}.camera"
         raise InputError(str(cell.path), key, given, nearest(term.camera, seeing))
 
 
@@ -83,14 +83,17 @@ def start_state(
 def _require_value(context: LawContext, number: int, state: CameraState, which: str) -> None:
     term: Term = context.terms[number]
     objective: Objective = term.objective
-    source, key = str(context.cell.path), _key(context, number)
-    with asking(objective, source, key):
+    source, key = str(context.cell.path), context.cell.law.key_of(number)
+    part: object = objective
+    if isinstance(objective, ImageBased):
+        part, key = objective.feature, f"{key}.feature"
+    with asking(part, source, key):
         try:
             objective.quadratic(state)
         except InputError as error:
             given = f"{error.given}{which}"
             if isinstance(objective, ImageBased):
-                given, key = f"{kind_of(objective.feature)} of {given}", f"{key}.feature"
+                given = f"{kind_of(objective.feature)} of {given}"
             elif isinstance(objective, PointPose):
                 given, key = f"{kind_of(objective)} of {given}", f"{key}.kind"
             else:
@@ -104,10 +107,5 @@ def _require_in_range(context: LawContext, number: int, position: FloatArray) ->
     if len(beyond):
         j = beyond[0]
         allowed = f"{arm.q_min[j]:.4g} … {arm.q_max[j]:.4g}, its range in rad or m"
-        key, given = f"{_key(context, number)}.position.{j}", f"{position[j]:g}"
+        key, given = f"{context.cell.law.key_of(number)}.position.{j}", f"{position[j]:g}"
         raise InputError(str(context.cell.path), key, given, allowed)
-
-
-def _key(context: LawContext, number: int) -> str:
-    """Return where in the cell file an objective is: in the table of a law that has only one."""
-    return "law" if len(context.terms) == 1 else f"law.objectives.{number}"

@@ -12,6 +12,7 @@ from vergence.drivers.mountings import mountings_of
 from vergence.errors import InputError, VergenceError
 from vergence.loading import Place, load_part, make_part
 from vergence.optional_package import optional_package
+from vergence.raised import raised
 from vergence.registry import find, kinds
 from vergence.runtime import Driver
 from vergence.runtime.hardware import LateStamps
@@ -162,7 +163,7 @@ def _guarded(named: str, opened: Any) -> Any:
     except VergenceError:
         raise
     except Exception as error:
-        given = f"{named}, which raised {type(error).__name__}: {error}"
+        given = f"{named}, which raised {raised(error)}"
         raise InputError("--driver", "", given, "a driver that opens") from error
 
 

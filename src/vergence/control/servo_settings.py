@@ -1,7 +1,7 @@
 """The servo as a cell file declares it."""
 
 from collections.abc import Collection, Mapping
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from vergence.control.depth import Depth
 from vergence.control.image_motion import MotionSettings
@@ -34,6 +34,8 @@ class ServoSettings:
     the same table; several are listed in `objectives`.
     """
 
+    listed: ClassVar[bool] = False  # whether a cell file lists its only objective
+
     # Objectives, each with its weight.
     objectives: tuple[WeightedObjective, ...] = slot("term", many=True)
     limits: Limits | None = slot("limits", None)  # limits; the solver's defaults if absent
@@ -60,6 +62,10 @@ class ServoSettings:
     def objective(self) -> Objective:
         """The first objective."""
         return self.objectives[0].objective
+
+    def key_of(self, number: int) -> str:
+        """Return where in a cell file an objective is, from its number."""
+        return f"law.objectives.{number}" if self.listed or len(self.objectives) > 1 else "law"
 
     def motion(self, depth: Depth, stationary: bool) -> MotionSettings:
         """Return the assumptions about the features between their exposure and now.
@@ -105,6 +111,7 @@ class ServoSettings:
             of_law = {*field_names(cls)} - {"objectives"}
             own["objectives"] = (_term(rest, place, of_law),)
         made: Self = make_part(cls, own, place)
+        object.__setattr__(made, "listed", "objectives" in table)
         return made
 
     def table(self, *, defaults: bool = True) -> dict[str, Any]:

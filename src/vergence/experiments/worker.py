@@ -102,7 +102,8 @@ def _work(connection: "Connection[Any, Any]") -> None:
     """Do tasks until the other process closes the connection or is gone."""
     import numba
 
-    logging.getLogger("vergence").setLevel(logging.ERROR)  # that process warns, too, and once
+    # That process warns, too, and once; results say what a part raised.
+    logging.getLogger("vergence").setLevel(logging.CRITICAL)
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     numba.set_num_threads(1)  # the other cores are those of other processes
     Thread(target=_end_with_parent, daemon=True).start()

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, as_floats, frozen
 from vergence.errors import InputError
 from vergence.features.interaction import depth_interaction, interaction_matrix_points
+from vergence.raised import checked
 
 _STEP_S = 1e-6  # for central differences; unit twists change features at about 1 1/s
 
@@ -71,7 +72,7 @@ class Feature(ABC):
         Raises:
             InputError: if the desired feature has another number of values.
         """
-        s, s_star = self.value(), desired.value()
+        s, s_star = (checked(each, "value", each.value(), (None,)) for each in (self, desired))
         if s.shape != s_star.shape:
             given = f"{len(s_star)} values"
             raise InputError(type(self).__name__, "desired", given, f"{len(s)}, as here")

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 
+from vergence.raised import raised
 from vergence.runtime.listener import Listener
 from vergence.runtime.run_info import RunInfo
 from vergence.runtime.tick import TickRecord
@@ -53,5 +54,5 @@ class Listeners:
             except Exception as error:
                 _LOG.exception("%s is dropped", type(listener).__name__)
                 self._active.remove(listener)
-                text = f"{type(listener).__name__} raised {type(error).__name__}: {error}"
+                text = f"{type(listener).__name__} raised {raised(error)}"
                 self.event(time, "listener dropped", text)

@@ -9,6 +9,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.control import ClearBraking, InnerLaw, Law, Successor
 from vergence.errors import DriverSilent, VergenceError
+from vergence.raised import raised
 from vergence.robot import Clearance
 from vergence.runtime import endings
 from vergence.runtime.arrival import Goal
@@ -22,7 +23,7 @@ from vergence.runtime.listeners import Listeners
 from vergence.runtime.losses import may_move, reasons
 from vergence.runtime.schedule import Schedule, command_share
 from vergence.runtime.stages import Perception, Planner, Stages
-from vergence.runtime.stopping import brake, raised
+from vergence.runtime.stopping import brake
 from vergence.runtime.task_watch import TaskWatch
 from vergence.runtime.tick import TickRecord
 from vergence.runtime.timeouts import Timeouts
@@ -155,10 +156,10 @@ class Loop:
         except DriverSilent as silence:
             return Outcome(OutcomeKind.DRIVER_SILENT, str(silence), self._now)
         except VergenceError as error:  # its message suffices; a traceback would add nothing
-            return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
+            return self._raised(error)
         except Exception as error:
-            _LOG.exception("the %s raised", self._part)
-            return Outcome(OutcomeKind.PART_RAISED, raised(self._part, error), self._now)
+            _LOG.exception("the %s raised", self._part, extra={"in_outcome": True})
+            return self._raised(error)
 
     def _run(self, duration_s: float) -> Outcome:
         while True:
@@ -365,6 +366,10 @@ class Loop:
         if hindered := self._followers[self._arm].hindered(self._now, measured):
             return Outcome(*hindered, self._now)
         return self._task.time_over(end, self._now)
+
+    def _raised(self, error: Exception) -> Outcome:
+        reason = f"the {self._part} raised {raised(error)}"
+        return Outcome(OutcomeKind.PART_RAISED, reason, self._now)
 
     def _stopped(self) -> Outcome:
         return Outcome(OutcomeKind.STOPPED, self._interrupt.reason, self._now)

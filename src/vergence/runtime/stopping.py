@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from vergence.control import Guard
 from vergence.errors import DriverSilent
+from vergence.raised import raised
 from vergence.runtime.driver import Driver
 
 _LOG = logging.getLogger(__name__)
@@ -32,14 +33,7 @@ def brake(driver: Driver, guards: Mapping[str, Guard]) -> str:
             _LOG.exception("the driver rejects set-points during braking")
             refused += 1
             if refused == _TRIES:
-                return raised("driver", error)
+                return f"the driver raised {raised(error)}"
         else:
             refused = 0
     return ""
-
-
-def raised(part: str, error: BaseException) -> str:
-    """Return a sentence that states which error a part raised."""
-    first = next(iter(str(error).splitlines()), "")
-    text = f"{type(error).__name__}: {first}" if first else type(error).__name__
-    return f"the {part} raised {text[:200]}"

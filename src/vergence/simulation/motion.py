@@ -5,6 +5,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.cell.schema import Placement
 from vergence.geometry import rpy_to_matrix, se3
+from vergence.raised import checked
 from vergence.simulation.motions import Motion, TargetPose, TargetPoses
 
 _BLOCK = 256  # ticks
@@ -70,4 +71,8 @@ def target_poses(start: Placement, motion: Motion, seed: int) -> TargetPoses:
         seed: for random motions.
     """
     T_start = placement_pose(start)
-    return lambda times: motion.poses(T_start, times, seed)
+
+    def poses(times: FloatArray) -> FloatArray:
+        return checked(motion, "poses", motion.poses(T_start, times, seed), (len(times), 4, 4))
+
+    return poses

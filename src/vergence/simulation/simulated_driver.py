@@ -8,7 +8,9 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.camera import Camera
 from vergence.cell.cell import Cell
+from vergence.cell.named_targets import target_key
 from vergence.cell.schema import Task
+from vergence.loading import asking
 from vergence.robot import Arm
 from vergence.signals import Frame, JointState, Sample, Setpoint
 from vergence.simulation.arm_motion import JointTrajectory, arm_trajectory
@@ -51,6 +53,9 @@ class SimulatedDriver:
         self._let_go: dict[str, FloatArray] = {}  # (4, 4) where targets were released last, by name
         self._tick = 0
         self._trajectories = {n: self._own_motion(n) for n, t in cell.arms.items() if t.motion}
+        for name, target in cell.targets.items():
+            with asking(target.motion, str(cell.path), f"{target_key(name)}.motion"):
+                self._motions[name](0.0)
         self._move_targets()
         self.world.update()
         self._subject = Subject(cell, self.world)

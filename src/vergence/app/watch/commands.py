@@ -58,7 +58,7 @@ class Stop(_Command):
 
 
 class Reset(_Command):
-    """Begin again."""
+    """Begin again; changes of the law stay."""
 
     do: Literal["reset"]
 
@@ -91,6 +91,12 @@ class ChooseLaw(_Command):
 
     do: Literal["law"]
     name: _Name
+
+
+class ResetLaw(_Command):
+    """Take back all changes of the law, in every task."""
+
+    do: Literal["own law"]
 
 
 class TurnKnob(_Command):
@@ -158,6 +164,7 @@ Command: TypeAlias = (
     | Seek
     | Look
     | ChooseLaw
+    | ResetLaw
     | TurnKnob
     | TrackPoints
     | TakeGoal

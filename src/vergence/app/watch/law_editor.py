@@ -121,6 +121,14 @@ class LawEditor:
         edited.choice, edited.own = name, _values(self.stage)
         return law
 
+    def reset(self, context: LawContext) -> Law:
+        """Return the law as the cell has it; all changes, of other tasks too, are taken back."""
+        self._require_law("do", "own law")
+        law = self._change({}, context)
+        self._edited.clear()  # those of other tasks are read again when these begin
+        self.begin_task(self._number)
+        return law
+
     def turn(self, key: str, value: Any, context: LawContext) -> Law:
         """Return the same law with one number turned.
 

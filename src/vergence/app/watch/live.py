@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from vergence.app.warnings_once import tracebacks_in
 from vergence.app.watch.commands import (
     ChooseLaw,
     Command,
@@ -15,6 +16,7 @@ from vergence.app.watch.commands import (
     Pause,
     Release,
     Reset,
+    ResetLaw,
     Resume,
     SetSpeed,
     Step,
@@ -134,16 +136,17 @@ class Live:
         self.view_state.status(preparing=True)  # until kernels are loaded and the loop begins
         self._tell()
         try:
-            return run_driver(
-                cell,
-                self._driver,
-                (self._recorder, publisher, self._newest),
-                self._images,
-                duration_s=float("inf"),
-                attend=self._attend,
-                most_ticks=_KEPT_TICKS,
-                frames=self._picked_in,
-            )
+            with tracebacks_in(self.folder):
+                return run_driver(
+                    cell,
+                    self._driver,
+                    (self._recorder, publisher, self._newest),
+                    self._images,
+                    duration_s=float("inf"),
+                    attend=self._attend,
+                    most_ticks=_KEPT_TICKS,
+                    frames=self._picked_in,
+                )
         finally:
             self.view_state.status(preparing=False)
             self._loop = None
@@ -249,12 +252,14 @@ class Live:
                 self.scene.look(command)
             case ChooseLaw(name=name):
                 self._change_law(lambda context: self._editor.choose(name, context))
+            case ResetLaw():
+                self._change_law(self._editor.reset)
             case TurnKnob(key=key, value=value):
                 self._change_law(lambda context: self._editor.turn(key, value, context))
             case Move() | Release() if self._loop is None:
                 pass  # of a drag that was refused, or that the end of the run interrupted
             case Grab() | LetGo() if self._loop is None:
-                raise VergenceError("The run has ended; Reset begins another.")
+                raise VergenceError("The run has ended; Restart begins another.")
             case _ if self._driver.world.target_is_free():
                 self._move_target(command)
 

@@ -8,7 +8,6 @@ from vergence.assembly.law_context import LawContext
 from vergence.assembly.objectives_at_start import LEAST_M, start_state
 from vergence.control import CameraVelocity, ImageBased, PointPose
 from vergence.control.servo_settings import ServoSettings
-from vergence.errors import InputError
 from vergence.robot import unmeasured_directions
 from vergence.robot.unserved_directions import listed
 
@@ -36,7 +35,7 @@ def free_directions(context: LawContext) -> str:
             state = start_state(context, name)
             A = np.eye(6) if state.A is None else state.A
             H += term.weight * A.T @ objective.quadratic(state).H @ A
-        except InputError:  # such points make no such feature; the run says so
+        except Exception:  # such points make no such feature, or it raises; the run says so
             return ""
     free = unmeasured_directions(H, max(context.distance_m, LEAST_M))
     if not free:

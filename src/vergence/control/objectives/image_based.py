@@ -22,6 +22,7 @@ from vergence.control.objectives.objective import (
 )
 from vergence.features import Feature, Points, interaction_matrix_points
 from vergence.parts import knob, part, slot
+from vergence.raised import checked
 
 InteractionModel = Literal["current", "desired", "mean"]
 _CURRENT, _DESIRED, _MEAN = range(len(get_args(InteractionModel)))
@@ -73,11 +74,12 @@ class ImageBased:
             )
             return result
         now, goal = self.feature(state.points, state.depth_m), self.feature(desired, desired_depth)
-        error = now.error(goal)
+        error = checked(now, "error", now.error(goal), (None,))
         rows = -gain_at(self.gain, error) * error - now.drift(state.flow)
         if state.desired_velocity is not None:
             rows = rows + goal.drift(state.desired_velocity)
-        return least_squares(self._interaction(now, goal), rows, damping=self.damping)
+        L = checked(now, "interaction", self._interaction(now, goal), (len(error), 6))
+        return least_squares(L, rows, damping=self.damping)
 
     @property
     def numbers(self) -> PointDecay:

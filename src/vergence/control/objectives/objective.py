@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numba import njit
 
-from vergence.arrays import FloatArray
+from vergence.arrays import FloatArray, as_floats
 from vergence.camera import Camera
 from vergence.control.mounting import CameraMounting
 from vergence.features import Points
@@ -142,16 +142,25 @@ def least_squares(
         desired: ė, the desired value of E v, (k,).
         weight: w of each row, (k,), or one number.
         damping: μ of each axis, (6,), or one number.
+
+    Raises:
+        ShapeError: if the shapes do not fit.
     """
-    E = np.ascontiguousarray(E, dtype=np.float64)
-    rows = np.ascontiguousarray(desired, dtype=np.float64)
+    E = np.ascontiguousarray(as_floats(E, (None, 6), "E"))
     result: Quadratic = least_squares_kernel(
         E,
-        rows,
-        np.full(len(E), weight) if np.ndim(weight) == 0 else np.asarray(weight, dtype=np.float64),
-        np.full(6, damping) if np.ndim(damping) == 0 else np.asarray(damping, dtype=np.float64),
+        np.ascontiguousarray(as_floats(desired, (len(E),), "desired")),
+        _each(weight, len(E), "weight"),
+        _each(damping, 6, "damping"),
     )
     return result
+
+
+def _each(values: FloatArray | float, count: int, name: str) -> FloatArray:
+    """Return one value for each of several, (count,)."""
+    if np.ndim(values) == 0:
+        return np.full(count, values, dtype=np.float64)
+    return np.ascontiguousarray(as_floats(values, (count,), name))
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,6 +10,7 @@ from vergence.control.limits import (
     SINGULARITY,
     CollisionLimit,
     ConstraintSettings,
+    Limit,
     Limits,
 )
 from vergence.control.solvers._constrained_rates import Avoidance, ConstrainedRates
@@ -23,7 +24,8 @@ from vergence.control.solvers._program import (
 from vergence.control.solvers.solver import BoundSolver, Problem, Setting, Solution
 from vergence.errors import InputError
 from vergence.parts import knob, part
-from vergence.robot import NearPairs, manipulability_measure
+from vergence.raised import checked, refused
+from vergence.robot import Arm, NearPairs, manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
 _APPROACH_RATE_HZ = 2.0
@@ -142,12 +144,27 @@ class BoundProgram:
         if self.collision is not None and near is not None:
             rows = [(*r, COLLISION) for r in self.collision.rows(near, problem.q, problem.velocity)]
         for k, limit in enumerate(limits.own, start=len(KIND_NAMES)):
-            rows.append((*limit.rows(arm, problem.q, problem.velocity, period), k))
+            rows.append((*_rows(limit, arm, problem.q, problem.velocity, period), k))
         if not rows:
             return no_further_rows(arm.joint_count)
         C = np.ascontiguousarray(np.vstack([row[0] for row in rows]), dtype=np.float64)
         d = np.concatenate([np.asarray(row[1], dtype=np.float64) for row in rows])
         return FurtherRows(C, d, np.repeat([row[2] for row in rows], [len(row[1]) for row in rows]))
+
+
+def _rows(
+    limit: Limit, arm: Arm, q: FloatArray, velocity: FloatArray, period_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return C (m, n) and d (m,) of a user's own limit, held to its shapes.
+
+    Raises:
+        PartError: if they have others, or are not finite.
+    """
+    answer = limit.rows(arm, q, velocity, period_s)
+    if not (isinstance(answer, tuple) and len(answer) == 2):
+        raise refused(limit, "rows", type(answer).__name__, "C and d, with C q̇ ≥ d")
+    C = checked(limit, "rows", answer[0], (None, arm.joint_count))
+    return C, checked(limit, "rows", answer[1], (len(C),))
 
 
 def constraint_settings(setting: Setting, limits: Limits) -> ConstraintSettings:

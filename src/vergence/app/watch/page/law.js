@@ -21,6 +21,7 @@ export class Law {
     this.choice = first(section, "select");
     this.knobs = element("knobs");
     this.settings = element("settings");
+    this.changed = element("law-changed");
     this.ask = ask;
     this.text = "";
     /** @type {LawStatus | undefined} */
@@ -31,6 +32,10 @@ export class Law {
     this.fields = new Map(); // that show a value: always, or unless somebody is about to change it
     /** @type {Map<string, (value: any) => void>} */
     this.undos = new Map();
+    element("own-law").addEventListener("click", () => {
+      this.shown = null;
+      ask({ do: "own law" });
+    });
     this.choice.addEventListener("change", () => {
       this.shown = null;
       ask({ do: "law", name: this.choice.value });
@@ -52,6 +57,7 @@ export class Law {
       this.fields.get(knob.key)?.(knob.value);
       this.undos.get(knob.key)?.(knob.value);
     }
+    this.changed.hidden = !law.settings.length;
     this.settings.replaceChildren(...command(law.settings));
   }
 

@@ -50,7 +50,7 @@ export class Transport {
     this.stop.hidden = !this.robot;
     this.pause.hidden = this.step.hidden = this.reset.hidden = this.robot;
     element("speed-choice").hidden = this.robot;
-    this.reset.textContent = this.recording ? "To the start" : "Reset";
+    this.reset.textContent = this.recording ? "To the start" : "Restart";
   }
 
   toggle() { this.ask({ do: this.robot ? "stop" : this.paused ? "resume" : "pause" }); }
@@ -77,7 +77,7 @@ export class Transport {
     const over = outcome && !this.recording;
     this.pause.disabled = this.step.disabled = this.stop.disabled = Boolean(over);
     if (over) this.measured.textContent = "";
-    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}${over && !this.robot ? ". Reset begins again." : ""}`);
+    if (outcome) this.mark(outcome.kind, outcome.succeeded ? "good" : "bad", `after ${outcome.time.toFixed(2)} s: ${outcome.reason}${over && !this.robot ? ". Restart begins again." : ""}`);
     else if (preparing) this.mark("preparing", "plain", "Loading kernels. The first time on a computer they are compiled, which takes a minute or two.");
     else this.mark(paused ? "paused" : "running", paused ? "plain" : "good", "");
   }
