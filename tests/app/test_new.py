@@ -67,6 +67,19 @@ def test_features_are_found_on_its_board_in_rendered_images(command) -> None:
     assert result.outcome.succeeded
 
 
+def test_a_photograph_of_its_board_is_sharp_and_the_next_command_goes_there(
+    command, capsys
+) -> None:
+    assert command("new", ARMS[6][0], "--body", ARMS[6][1], "--out", "mine") == 0
+    assert command("goal", "mine", "--out", "goal.png") == 0
+    said = capsys.readouterr().out
+    assert "blurred" not in said
+    expected = ["vergence", "run", "mine", "--goal", "goal.png"]
+    _, _, following = said.partition("  next: ")
+    assert following.split() == [*expected, "--set", "target.motion=stationary"]
+    assert command(*following.split()[1:], "--out", "there") == 0
+
+
 def test_the_board_faces_the_camera_above_the_floor(command) -> None:
     assert command("new", ARMS[6][0], "--body", ARMS[6][1], "--out", "mine") == 0
     world = SimulatedDriver(load_cell("mine"), images=False).world

@@ -155,6 +155,13 @@ def test_spline_ends_where_its_waypoints_end_and_follows_them() -> None:
     assert gaps.max() < 0.03
 
 
+def test_a_spline_through_one_waypoint_stays_there() -> None:
+    basis = spline_basis(12, 60, 0.01)
+    q = np.array([[0.1, -0.2, 0.3]])
+    curve = basis.values @ fit_controls(basis, q, np.ones(3))
+    np.testing.assert_allclose(curve, np.tile(q, (60, 1)), atol=1e-5)
+
+
 def test_roughness_is_the_integral_it_stands_for() -> None:
     from scipy.integrate import quad
     from scipy.interpolate import BSpline

@@ -8,6 +8,7 @@ import numpy as np
 
 from vergence.app.output import FAILURE, SUCCESS, emit, say
 from vergence.errors import Absent, InputError
+from vergence.parts import kind_of
 
 if TYPE_CHECKING:
     from vergence.app.options import GoalOptions
@@ -53,8 +54,17 @@ def goal(options: "GoalOptions") -> int:
     say(f"goal  {options.out}, with its camera file and joints beside it")
     if fault:
         say(f"  warning: the image is {fault}; the goal may not be recognised in it")
-    say(f"  next: vergence run {options.cell} --goal {shlex.quote(str(options.out))}")
+    say(f"  next: {shlex.join(_next(options, cell))}")
     return SUCCESS
+
+
+def _next(options: "GoalOptions", cell: "Cell") -> list[str]:
+    """Return the command that goes to the photograph, with the target at rest."""
+    settings = list(options.settings or ())
+    if options.driver is None and kind_of(cell.target.motion) != "stationary":
+        settings.append("target.motion=stationary")
+    changed = [word for setting in settings for word in ("--set", setting)]
+    return ["vergence", "run", str(options.cell), "--goal", str(options.out), *changed]
 
 
 def keep_photograph(

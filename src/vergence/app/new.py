@@ -26,7 +26,7 @@ _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper fac
 <mujoco model="board">
   <asset>
     <texture name="speckles" type="2d" builtin="flat" rgb1="0.9 0.9 0.9" mark="random"
-             markrgb="0.1 0.1 0.1" random="0.2" width="32" height="32"/>
+             markrgb="0.1 0.1 0.1" random="0.2" width="64" height="64"/>
     <material name="speckles" texture="speckles" specular="0"/>
   </asset>
   <worldbody>

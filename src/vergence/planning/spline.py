@@ -44,13 +44,13 @@ def fit_controls(basis: SplineBasis, waypoints: FloatArray, scale: FloatArray) -
 
     Args:
         basis: of the spline.
-        waypoints: two or more.
+        waypoints: one if the arm stays where it is, or more.
         scale: length of a unit of each joint, (n,), for the distance between waypoints.
     """
     lengths = np.linalg.norm(np.diff(waypoints, axis=0) * scale, axis=1)
     at = np.concatenate(([0.0], np.cumsum(lengths + 1e-9)))
-    samples = np.linspace(0, 1, len(basis.values))
-    desired = np.column_stack([np.interp(samples, at / at[-1], column) for column in waypoints.T])
+    samples = np.linspace(0.0, at[-1], len(basis.values))
+    desired = np.column_stack([np.interp(samples, at, column) for column in waypoints.T])
     ends = waypoints[[0, -1]]
     rest = desired - basis.values[:, [0, -1]] @ ends
     inner = basis.values[:, 1:-1]
