@@ -132,8 +132,9 @@ def test_a_task_that_fails_exits_with_one(command: Command, capsys: object) -> N
 def test_an_arm_of_few_joints_says_what_it_cannot_do(command: Command, capsys: object) -> None:
     quick = ("--no-images", "--set", "duration_s=0.2", "--out", "here")
     assert command("run", "so100", *quick) == 0
-    said = "With 5 joints so100 cannot move camera side in every direction: at the start it can "
-    assert f"{said}move along x and turn about y only in combination" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "With its 5 joints, arm so100 cannot move camera side in every direction: at the" in told
+    assert "start it can move along x and turn about y only in combination" in told
     assert "unserved directions" in Path("here", "report.html").read_text()
 
 

@@ -381,11 +381,11 @@ def test_a_restart_begins_from_the_start_with_the_changed_law_until_that_is_rese
     browser.wait(hidden)
     browser.value(
         "(() => { const f = document.querySelector('.knob[data-key=Q] input');"
-        "f.value = 0.003; f.dispatchEvent(new Event('change')) })()"
+        "f.value = 4e-6; f.dispatchEvent(new Event('change')) })()"
     )
-    browser.wait(settings, lambda text: "law.Q=0.003" in text)
+    browser.wait(settings, lambda text: "law.Q=4e-06" in text)
     restart()
-    assert "law.Q=0.003" in browser.value(settings)
+    assert "law.Q=4e-06" in browser.value(settings)
     assert "also stay when the run is restarted" in browser.value(
         "document.getElementById('law-changed').innerText"
     )

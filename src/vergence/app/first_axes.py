@@ -41,7 +41,8 @@ def poorly_measured(draft: "Draft", camera: "Camera") -> str:
     turn_deg = float(np.rad2deg(np.linalg.norm(worst[3:]))) / rate_px
     return (
         f"four features hardly show {_words(found.directions[poor])} (the camera's axes): "
-        f"an error of 1 px there is {shift_mm:.2g} mm and {turn_deg:.2g}°"
+        f"an error of 1 px there is {shift_mm:.2g} mm and {turn_deg:.2g}°; more features, "
+        "farther apart, help"
     )
 
 

@@ -34,7 +34,8 @@ def plan(options: "PlanOptions") -> int:
     cell = load_cell(options.cell, changes, options.seed)
     if not isinstance(cell.task, ReachTable):
         key = "tasks.0.kind" if cell.tasks else "task.kind"
-        raise InputError(str(cell.path), key, cell.task.kind, "reach")
+        allowed = "reach; to a photograph, `vergence run CELL --goal PHOTO` plans by itself"
+        raise InputError(str(cell.path), key, cell.task.kind, allowed)
     from vergence.app.plan_page import write_plan_page
     from vergence.app.progress import working
     from vergence.assembly import plan as plan_path

@@ -15,6 +15,7 @@ def under_actuation(context: LawContext) -> str:
     unserved = unserved_directions(arm.jacobian(context.joints[name]), distance)
     moved = "the target" if context.is_fixed else f"camera {context.camera_name}"
     return (
-        f"With {arm.joint_count} joints {name} cannot move {moved} in every direction: at the "
-        f"start it {unserved} (axes of {moved}). Errors that need such a motion remain."
+        f"With its {arm.joint_count} joints, arm {name} cannot move {moved} in every "
+        f"direction: at the start it {unserved} (axes of {moved}). "
+        "Errors that need such a motion remain."
     )

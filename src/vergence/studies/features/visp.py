@@ -26,7 +26,7 @@ from vergence.studies.features.servo import Servoing
 from vergence.studies.ideal_loop import Ending
 
 SOURCE = Path(__file__).with_name("visp_servo.cpp")
-MISSING = "not compared with ViSP, which is not installed: apt-get install libvisp-dev g++"
+MISSING = "Not compared with ViSP, which is not installed: apt-get install libvisp-dev g++"
 _LIBRARIES = ("-lvisp_vs", "-lvisp_visual_features", "-lvisp_core")
 _COMPILE_S, _RUN_S = 300.0, 1800.0
 _ENDINGS = {

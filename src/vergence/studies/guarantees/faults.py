@@ -127,11 +127,11 @@ def blind_check(arms: tuple[Arm, ...], seed: int) -> Check:
     worst = max(range(len(travels)), key=travels.__getitem__)
     return Check(
         "blind.travel_s",
-        "a camera's period, the time to fade, and braking from full speed: at most that",
+        "motion after the last image: at most a period, fading, and braking from full speed",
         travels[worst] + bounds[worst // BLIND_RUNS],
         "s",
         travels[worst] <= 0.0,
-        f"longest motion after the last image; at most {bounds[worst // BLIND_RUNS]:.3f} s there",
+        f"longest motion after the last image; allowed there: {bounds[worst // BLIND_RUNS]:.3f} s",
     )
 
 

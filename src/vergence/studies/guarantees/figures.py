@@ -1,4 +1,4 @@
-"""Figures of the guarantees: how random runs end, and the way through a singularity."""
+"""Figures of the guarantees: how random runs end, and the path through a singularity."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ from typing import Any
 
 from vergence.arrays import FloatArray
 from vergence.drawing import COLORS, curve, figure, legend
+from vergence.signals import OutcomeKind
 from vergence.studies.check import Figure
 from vergence.studies.ending_bars import ending_bars
 from vergence.studies.figure_files import save_figures
@@ -14,6 +15,13 @@ from vergence.studies.guarantees.laws import LAWS
 from vergence.studies.guarantees.random_runs import Pair, endings
 
 _WIDTH = 7.6  # inches
+# Of the commonest endings, as in the bars of the other figure; further ones take what is left.
+_COLORS = {
+    OutcomeKind.COMPLETED.value: COLORS[2],
+    OutcomeKind.TARGET_LOST.value: COLORS[1],
+    OutcomeKind.JOINT_LIMIT.value: COLORS[5],
+}
+_FURTHER = tuple(color for color in COLORS if color not in _COLORS.values())
 
 
 def draw(
@@ -31,8 +39,8 @@ def draw(
         "ends": (_ends(ends), "How random runs end, law by law."),
         "random": (
             _random(pairs),
-            "How servoing ends from random starts to random goals on the gantry, inside view and "
-            "joint limits or not at all.",
+            "How runs from random starts to random goals on the gantry end: plain laws, and laws "
+            "constrained by view and joint limits.",
         ),
         "singularity": (_singular(singular), "Following a target through the wrist's singularity."),
     }
@@ -46,10 +54,12 @@ def _ends(ends: Counter[tuple[str, str]]) -> Any:
     )
     drawing, (axes,) = figure(_WIDTH, 0.5 * len(laws) + 1.1)
     left = [0.0] * len(laws)
-    for index, kind in enumerate(kinds):
+    further = iter(_FURTHER * len(kinds))
+    for kind in kinds:
         total = [sum(ends[law, other] for other in kinds) for law in laws]
         share = [100.0 * ends[law, kind] / n for law, n in zip(laws, total, strict=True)]
-        axes.barh(laws, share, left=left, label=kind, color=COLORS[index % len(COLORS)], height=0.6)
+        color = _COLORS.get(kind) or next(further)
+        axes.barh(laws, share, left=left, label=kind, color=color, height=0.6)
         left = [a + b for a, b in zip(left, share, strict=True)]
     axes.set_xlabel("runs (%)")
     axes.set_xlim(0, 100)

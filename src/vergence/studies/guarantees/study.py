@@ -172,7 +172,7 @@ def _headings(arm: Arm) -> Check:
     ]
     return Check(
         "headings.completed",
-        "the 12 directions of the first paper: 12",
+        "runs completed, of the 12 directions of [Nelson1995]: 12",
         12 - len(failed),
         "of 12",
         not failed,
@@ -191,7 +191,7 @@ def _speed(arm: Arm) -> Check:
     ours, paper = fastest("constrained tracking"), fastest("optimal tracking")
     return Check(
         "speed.max_m_s",
-        "above the paper law's, both directions of 2.5 m",
+        "fastest target followed over 2.5 m, both ways: above that of the paper's law",
         ours,
         "m/s",
         ours > paper,
@@ -269,5 +269,5 @@ def _conflict(arm: Arm) -> Check:
         len(named),
         "constraints",
         kept and lost and "view" in named and named <= set(RELAXED),
-        ", ".join(sorted(named)) or "nothing was named",
+        f"relaxed: {', '.join(sorted(named))}" if named else "nothing was named",
     )

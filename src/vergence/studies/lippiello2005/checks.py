@@ -107,8 +107,8 @@ def _ours_beside(trials: Trials) -> Check:
         ours / paper,
         "",
         trials["ours_calibrated"].outcome.succeeded and within(ours / paper, 0.0, 1.0),
-        f"{1e3 * ours:.2f} over {1e3 * paper:.2f} mm; with exact calibration {1e3 * exact:.2f} "
-        f"over {1e3 * paper_exact:.2f} mm",
+        f"largest {1e3 * ours:.2f} mm against {1e3 * paper:.2f} mm; with exact calibration "
+        f"{1e3 * exact:.2f} mm against {1e3 * paper_exact:.2f} mm",
         "at most 1",
     )
 
@@ -124,8 +124,8 @@ def _begun(cell: Cell, begun: Sequence[Trial]) -> Check:
         len(held),
         "",
         not lost,
-        f"of {len(begun)} starts off by {1e3 * metres:g} mm and {degrees:g} degrees, the paper's "
-        f"filter, first seconds; at most {worst:.2g} m where held"
+        f"{len(begun)} starts off by {1e3 * metres:g} mm and {degrees:g} degrees, with the paper's "
+        f"filter, first seconds; largest error where held: {worst:.2g} m"
         + "".join(f"; {end}" for end in lost),
         f"all {len(begun)}",
     )
@@ -145,7 +145,10 @@ def _sensitivity(cell: Cell, trials: Trials, name: str) -> _Sensitivity:
     fast, slow = trials[name], trials[f"{name}_slow"]
     m = [rms(fast.position(*twice)), rms(slow.position(*half))]
     deg = [rms(fast.orientation_deg(*twice)), rms(slow.orientation_deg(*half))]
-    words = f"{1e3 * m[0]:.2g} over {1e3 * m[1]:.2g} mm and {deg[0]:.2g} over {deg[1]:.2g} degrees"
+    words = (
+        f"{1e3 * m[0]:.2g} mm and {deg[0]:.2g} degrees at twice the slow pass's speed, "
+        f"{1e3 * m[1]:.2g} mm and {deg[1]:.2g} degrees at half of it"
+    )
     return _Sensitivity(m[0] / m[1], deg[0] / deg[1], words)
 
 
@@ -162,12 +165,12 @@ def _speed(cell: Cell, trials: Trials) -> list[Check]:
         Check(
             "fixed.speed_sensitivity", sensible, fixed.position, "",
             within(fixed.position, _SENSIBLY),
-            f"at twice over half the slow pass's speed: {fixed.words}", much,
+            fixed.words, much,
         ),
         Check(
             "fixed.orientation_speed_sensitivity", f"{sensible}, especially for the orientation",
             fixed.orientation, "", within(fixed.orientation, _SENSIBLY),
-            f"the position's is {fixed.position:.2g}", much,
+            f"that of the position is {fixed.position:.2g}", much,
         ),
         Check(
             "hybrid.speed_sensitivity", steady, hybrid.position, "",
@@ -176,13 +179,13 @@ def _speed(cell: Cell, trials: Trials) -> list[Check]:
         Check(
             "hybrid.orientation_speed_sensitivity", steady, hybrid.orientation, "",
             hybrid.orientation < fixed.orientation,
-            f"with the fixed camera {fixed.orientation:.2g}", less,
+            f"with the fixed camera: {fixed.orientation:.2g}", less,
         ),
         Check(
             "hybrid.speed_sensitivity_exact", exactly, hybrid_exact.position, "",
             hybrid_exact.position < fixed_exact.position,
-            f"{hybrid_exact.words}; with the fixed camera {fixed_exact.position:.2g} and "
-            f"{fixed_exact.orientation:.2g}", less,
+            f"{hybrid_exact.words}; with the fixed camera the ratios are "
+            f"{fixed_exact.position:.2g} and {fixed_exact.orientation:.2g}", less,
         ),
     ]  # fmt: skip
 
@@ -197,15 +200,15 @@ def _slave(trials: Trials) -> list[Check]:
         Check(
             "slave.paper_position_error_max_m", delayed, paper.hand_m(), "m",
             paper.hand_m() > paper.position().max() and within(paper.hand_m(), 0.0, _FIG7_M),
-            "relative to the estimated object frame, as in the paper; to the true one "
-            f"{paper.pose_m().max():.2g}",
+            "relative to the estimated object frame, as in the paper; to the true one: "
+            f"{paper.pose_m().max():.2g} m",
             f"above the estimate's, at most {_FIG7_M:g}",
         ),
         Check(
             "slave.paper_orientation_error_max_deg", delayed, paper.hand_deg(), "deg",
             paper.hand_deg() > paper.orientation_deg().max()
             and within(paper.hand_deg(), 0.0, _FIG7_DEG),
-            f"relative to the true object frame {paper.pose_deg().max():.2g}",
+            f"relative to the true object frame: {paper.pose_deg().max():.2g} degrees",
             f"above the estimate's, at most {_FIG7_DEG:g}",
         ),
         Check(
@@ -213,23 +216,23 @@ def _slave(trials: Trials) -> list[Check]:
             "the end effector's error is not affected by the camera configuration",
             ratio_m, "",
             all(within(ratio, 1.0 / _ALIKE, _ALIKE) for ratio in (ratio_m, ratio_deg)),
-            "fixed camera over both, relative to the estimated object frame; orientation "
-            f"{ratio_deg:.3g}",
+            "error with the fixed camera divided by that with both, relative to the estimated "
+            f"object frame; of the orientation: {ratio_deg:.3g}",
             f"both within {1.0 / _ALIKE:g} and {_ALIKE:g}",
         ),
         Check(
             "slave.position_error_max_m", "not in the paper: ours", position, "m",
             within(position, 0.0, _FIG7_M),
             "true object frame; error-state filter, feed-forward, prediction over the latency; "
-            f"cameras calibrated as badly as the paper's "
-            f"{trials['ours_calibrated'].pose_m().max():.2g}",
+            "with cameras calibrated as badly as the paper's: "
+            f"{trials['ours_calibrated'].pose_m().max():.2g} m",
             f"at most {_FIG7_M:g}",
         ),
         Check(
             "slave.orientation_error_max_deg", "not in the paper: ours", angle, "deg",
             within(angle, 0.0, _FIG7_DEG),
-            f"cameras calibrated as badly as the paper's "
-            f"{trials['ours_calibrated'].pose_deg().max():.2g}",
+            "with cameras calibrated as badly as the paper's: "
+            f"{trials['ours_calibrated'].pose_deg().max():.2g} degrees",
             f"at most {_FIG7_DEG:g}",
         ),
     ]  # fmt: skip
@@ -245,10 +248,10 @@ def _late(cell: Cell, trials: Trials) -> Check:
         ratio,
         "",
         late.outcome.succeeded and within(ratio, 1.2),
-        f"slow pass, at most {1e3 * late.position(*slow).max():.2g} over "
-        f"{1e3 * usual.position(*slow).max():.2g} mm; with feed-forward and prediction "
-        f"{'the object is lost' if ours.diverged else 'it holds'}: {ours.outcome}, "
-        f"{ours.position().max():.2g} m",
+        f"slow pass: at most {1e3 * late.position(*slow).max():.2g} mm, against "
+        f"{1e3 * usual.position(*slow).max():.2g} mm with the right joints; with feed-forward and "
+        f"prediction the estimate is off by up to {ours.position().max():.2g} m "
+        f"({ours.outcome})",
         "at least 1.2: it matters",
     )
 
@@ -262,7 +265,10 @@ def _view_loss(trials: Trials) -> Check:
         usual = rms(seeing.position(end + 0.5, end + 2.0))
         worst = float(blind.position(start, end).max(initial=0.0))
         recovered += int(after < 1.5 * usual + 1e-4 and not blind.diverged)
-        notes.append(f"{name} blind: at most {worst:.2g} m, then {after:.2g} m (else {usual:.2g})")
+        notes.append(
+            f"{name} camera blind: at most {worst:.2g} m, afterwards {after:.2g} m "
+            f"({usual:.2g} m without the loss)"
+        )
     return Check(
         "view_loss.recovered",
         "not in the paper: each camera blind for 4 s, the error afterwards as before",
@@ -295,7 +301,7 @@ def _singular_pitch(errors: Mapping[str, FloatArray]) -> Check:
         ours,
         "deg",
         ours < 4.0 < paper,
-        f"roll-pitch-yaw state: {paper:.3g}",
+        f"with the roll-pitch-yaw state: {paper:.3g} degrees",
         "below 4, where the roll-pitch-yaw state is not",
     )
 
@@ -309,7 +315,7 @@ def _four_features(trials: Trials) -> Check:
         float(held.position().max()),
         "m",
         not held.diverged and within(float(held.position().max()), 0.0, 0.01),
-        f"by the indexes of [10]: {ends}",
+        f"chosen by the indexes of the paper's reference [10]: {ends}",
         "at most 0.01",
     )
 
@@ -318,8 +324,8 @@ def _cost(few: Cost, many: Cost) -> list[Check]:
     first, last = CAMERAS
 
     def times(part: str) -> str:
-        spent = f"{1e6 * getattr(many, part):.0f} over {1e6 * getattr(few, part):.0f} µs"
-        return f"{last} cameras over {first}, {BUDGET} features: {spent}"
+        spent = [f"{1e6 * getattr(cost, part):.0f} µs" for cost in (many, few)]
+        return f"{spent[0]} with {last} cameras, {spent[1]} with {first}; {BUDGET} features"
 
     independent = "independent of the number of cameras"
     return [
@@ -330,7 +336,7 @@ def _cost(few: Cost, many: Cost) -> list[Check]:
             "",
             within(getattr(many, part) / getattr(few, part), 0.0, most),
             times(part),
-            f"at most {most:g}" + (", as the cameras" if part == "total" else ""),
+            f"at most {most:g}" + (", the ratio of the cameras" if part == "total" else ""),
         )
         for part, said, most in (
             ("update", independent, 1.5),

@@ -70,21 +70,23 @@ def checks_of(results: Sequence[TrialResult]) -> tuple[Check, ...]:
     )
     return (
         Check(
-            "photograph.reached", "at least 97 % of the feasible starts", share, "%",
+            "photograph.reached", "reached from at least 97 % of the feasible starts", share, "%",
             within(share, 97.0), f"{len(feasible)} feasible, {lost} of them not reached",
         ),
         Check(
-            "photograph.reached_wrongly", "none outside the tolerance", len(wrong), "",
-            not wrong, of_all,
+            "photograph.reached_wrongly", "no run reports reached outside the tolerance",
+            len(wrong), "", not wrong, of_all,
         ),
-        _most("photograph.median_mm", 0.3, float(np.median(mm)), "mm"),
-        _most("photograph.median_deg", 0.05, float(np.median(deg)), "°"),
-        _most("photograph.worst_mm", 3.0, float(mm.max()), "mm"),
-        _most("photograph.worst_deg", 0.7, float(deg.max()), "°"),
+        _most("photograph.median_mm", "median final distance", 0.3, float(np.median(mm)), "mm"),
+        _most("photograph.median_deg", "median final angle", 0.05, float(np.median(deg)), "°"),
+        _most("photograph.worst_mm", "largest final distance", 3.0, float(mm.max()), "mm"),
+        _most("photograph.worst_deg", "largest final angle", 0.7, float(deg.max()), "°"),
         Check(
-            "photograph.refused", "every trial that does not begin says why",
-            len(refused), "refused",
-            all(r.reason for r in refused), f"{sum(r.feasible for r in refused)} of them feasible",
+            "photograph.refused", "every run that is refused before a move says why",
+            len(refused), "",
+            all(r.reason for r in refused),
+            f"refused: {len(refused)} of {len(results)}, "
+            f"{sum(r.feasible for r in refused)} of them feasible",
         ),
     )  # fmt: skip
 
@@ -115,5 +117,6 @@ _ERRORS = (
 _METHODS = "True final position of the camera by method, whatever the run reported."
 
 
-def _most(name: str, most: float, measured: float, unit: str) -> Check:
-    return Check(name, f"at most {most:g}", measured, unit, within(measured, high=most))
+def _most(name: str, what: str, most: float, measured: float, unit: str) -> Check:
+    claim = f"{what} from the goal, where reached: at most {most:g} {unit}".replace(" °", "°")
+    return Check(name, claim, measured, unit, within(measured, high=most))
