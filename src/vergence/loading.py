@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vergence.errors import NOTHING, Absent, InputError, VergenceError
+from vergence.part_answers import PartError
 from vergence.parts import Slot, field_names, is_part, kind_of, slots_of
-from vergence.raised import PartError, raised
+from vergence.raised import raised
 from vergence.registry import find, kinds
 
 

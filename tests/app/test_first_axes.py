@@ -28,7 +28,7 @@ def test_the_motion_that_is_named_moves_the_features_by_a_pixel(draft: Draft) ->
     said = poorly_measured(draft, CAMERA)
     assert "a move along x combined with a turn about y" in said
     assert "a move along y combined with a turn about x" in said
-    shift_m, turn_rad = numbers(said)[0] * 1e-3, np.deg2rad(float(said.split()[-1][:-1]))
+    shift_m, turn_rad = numbers(said)[0] * 1e-3, np.deg2rad(numbers(said)[1])
     half = np.minimum([160 / 600, 120 / 600], draft.half_side_m / draft.distance_m)
     points = np.array([(x, y, 1.0) for x in (-1, 1) for y in (-1, 1)]) * (*half, 1.0)
     points *= draft.distance_m

@@ -370,7 +370,7 @@ def test_a_restart_begins_from_the_start_with_the_changed_law_until_that_is_rese
     browser: Browser,
 ) -> None:
     def restart() -> None:
-        before = browser.value(TIME)
+        before = browser.wait(TIME, lambda time: time > 5.0)
         browser.click("#reset")
         browser.wait(TIME, lambda time: 0 < time < before)
         browser.wait("document.getElementById('badge').textContent", lambda text: text == "running")

@@ -29,8 +29,8 @@ from vergence.control.objectives import least_squares, state_of
 from vergence.errors import InputError, ShapeError
 from vergence.features import Centre, Feature, Lines, LogDepth, Points
 from vergence.geometry import se3_exp, so3_log, transform_points
+from vergence.part_answers import PartError
 from vergence.parts import as_part, knob, part
-from vergence.raised import PartError
 from vergence.signals import JointState, Observation, OutcomeKind, Reference
 
 ARM = puma()

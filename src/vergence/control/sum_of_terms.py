@@ -10,7 +10,7 @@ from vergence.control.objectives import CameraState, JointQuadratic, Objective, 
 from vergence.control.solvers.solver import NO_JOINTS
 from vergence.control.term import Term
 from vergence.errors import InputError
-from vergence.raised import checked, is_own, refused
+from vergence.part_answers import checked, is_own, refused
 from vergence.signals import OutcomeKind
 
 # The fault of an objective without a meaningful quadratic.

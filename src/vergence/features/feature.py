@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from vergence.arrays import FloatArray, as_floats, frozen
 from vergence.errors import InputError
 from vergence.features.interaction import depth_interaction, interaction_matrix_points
-from vergence.raised import checked
+from vergence.part_answers import checked
 
 _STEP_S = 1e-6  # for central differences; unit twists change features at about 1 1/s
 

@@ -5,7 +5,7 @@ import numpy as np
 from vergence.arrays import FloatArray
 from vergence.cell.schema import Placement
 from vergence.geometry import rpy_to_matrix, se3
-from vergence.raised import checked
+from vergence.part_answers import checked
 from vergence.simulation.motions import Motion, TargetPose, TargetPoses
 
 _BLOCK = 256  # ticks

@@ -21,8 +21,8 @@ from vergence.control.objectives.objective import (
     state_of,
 )
 from vergence.features import Feature, Points, interaction_matrix_points
+from vergence.part_answers import checked
 from vergence.parts import knob, part, slot
-from vergence.raised import checked
 
 InteractionModel = Literal["current", "desired", "mean"]
 _CURRENT, _DESIRED, _MEAN = range(len(get_args(InteractionModel)))

@@ -23,8 +23,8 @@ from vergence.control.solvers._program import (
 )
 from vergence.control.solvers.solver import BoundSolver, Problem, Setting, Solution
 from vergence.errors import InputError
+from vergence.part_answers import checked, refused
 from vergence.parts import knob, part
-from vergence.raised import checked, refused
 from vergence.robot import Arm, NearPairs, manipulability_measure
 
 _VIEW_MARGIN_PX, _JOINT_MARGIN = 10.0, 0.01
