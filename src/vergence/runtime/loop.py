@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control import ClearBraking, InnerLaw, Law, Successor
+from vergence.control import InnerLaw, Law, Successor
 from vergence.errors import DriverSilent, VergenceError
 from vergence.raised import raised
 from vergence.robot import Clearance
@@ -16,21 +16,20 @@ from vergence.runtime.arrival import Goal
 from vergence.runtime.border import Border
 from vergence.runtime.driver import Driver, ExactDriver
 from vergence.runtime.endings import Fault
-from vergence.runtime.following import Follower, FollowingBound
+from vergence.runtime.following import FollowingBound
+from vergence.runtime.guarded_arms import GuardedArms
 from vergence.runtime.interrupt import Interrupt
 from vergence.runtime.listener import Listener
 from vergence.runtime.listeners import Listeners
 from vergence.runtime.losses import may_move, reasons
 from vergence.runtime.schedule import Schedule, command_share
 from vergence.runtime.stages import Perception, Planner, Stages
-from vergence.runtime.stopping import brake
 from vergence.runtime.task_watch import TaskWatch
 from vergence.runtime.tick import TickRecord
 from vergence.runtime.timeouts import Timeouts
 from vergence.signals import JointCommand, Observation, Outcome, OutcomeKind, Reference, Sample
 
 _LOG = logging.getLogger(__name__)
-_OUTSIDE = 0.5  # rad or m beyond its range from which a joint is still brought back
 _IMAGE_AGE_S = 0.5  # the smallest allowed limit on the age of an image on arrival
 
 
@@ -77,22 +76,20 @@ class Loop:
         clearance: Clearance | None = None,
     ) -> None:
         self._driver, self._arm = driver, arm
-        self._timeouts, self._following = timeouts or Timeouts(), following or FollowingBound()
+        self._timeouts = timeouts or Timeouts()
         self._next_stages = next_stages
         alone = isinstance(driver, ExactDriver) and len(driver.arms) == 1
         self._exact: ExactDriver | None = driver if alone else None  # type: ignore[assignment]
         self._period_s, self._half_tick_s = 1.0 / outer_rate_hz, 0.5 / driver.inner_rate_hz
         self._schedule = Schedule(driver.inner_rate_hz, outer_rate_hz)
         age_s = max(self._timeouts.image_s, _IMAGE_AGE_S)
-        self._border = Border(driver, lambda: not self._moving, age_s)
+        self._border = Border(driver, lambda: not self._arms.moving, age_s)
         self._listeners = Listeners(listeners)
-        self._clearance = clearance
+        self._arms = GuardedArms(driver, arm, following or FollowingBound(), clearance)
         self._interrupt = Interrupt()
         self._part = "driver"  # the one at work, to be named if it raises
-        self._followers: dict[str, Follower] = {}
-        self._rest = {name: np.zeros(arm.joint_count) for name, arm in driver.arms.items()}
+        self._rest = np.zeros(driver.arms[arm].joint_count)
         self._tick, self._now, self._end = 0, 0.0, np.inf
-        self._stuck = np.ones(driver.arms[arm].joint_count, dtype=np.bool_)
         self._held = ""  # kind of the last reported hold
         self.take_up(Stages(perception, planner, law, self._timeouts, goal))
 
@@ -116,7 +113,7 @@ class Loop:
             try:
                 outcome = self._outcome(duration_s)
             except BaseException:
-                self._brake()
+                self._arms.brake()
                 raise
             outcome = self._braked(outcome)
         if not outcome.succeeded:
@@ -167,8 +164,11 @@ class Loop:
             if isinstance(sample, Fault):
                 return Outcome(*sample, self._now)
             self._now = self._border.time
-            if not self._followers and (outcome := self._begin(sample)):
-                return outcome
+            if not self._arms.begun:
+                # Compiled or loaded before anything moves.
+                command_share(0.0, self._period_s, self._timeouts.decay_s)
+                if fault := self._arms.begin(sample, self._timeouts.robot_s):
+                    return Outcome(*fault, self._now)
             if self._interrupt.asked:
                 return self._stopped()
             if outcome := self._turn(sample, duration_s):
@@ -179,34 +179,13 @@ class Loop:
             if outcome := self._step(sample):
                 return outcome
 
-    def _begin(self, sample: Sample) -> Outcome | None:
-        """Start set-points at the measured joints; reject a start far outside the limits."""
-        dt, timeouts = 1.0 / self._driver.inner_rate_hz, self._timeouts
-        command_share(0.0, self._period_s, timeouts.decay_s)  # compiles or loads it
-        for name, arm in self._driver.arms.items():
-            start = sample.joints[name].position
-            outside = np.maximum(arm.q_min - start, start - arm.q_max)
-            if (worst := float(outside.max())) > _OUTSIDE:
-                joint = f"{arm.names[int(outside.argmax())]} of {name}"
-                reason = f"{joint} starts {worst:.3g} outside its range"
-                return Outcome(OutcomeKind.JOINT_LIMIT, reason, self._now)
-            braking = None
-            if self._clearance is not None and name == self._arm:
-                braking = ClearBraking(arm, self._clearance, dt)
-            self._followers[name] = Follower(
-                arm, name, start, dt, self._following, timeouts.robot_s, braking
-            )
-        return None
-
     def _turn(self, sample: Sample, duration_s: float) -> Outcome | None:
         """Process what arrived and decide how to continue; return the outcome if the run ends."""
         turns = self._schedule.turns(self._tick, bool(sample.frames))
         if self._schedule.period_over:
-            stuck, self._stuck[:] = self._stuck.copy(), True
-            if self._tick and stuck.any():
-                names = self._driver.arms[self._arm].names
-                at_limit = [name for name, held in zip(names, stuck, strict=True) if held]
-                return endings.joint_limit(at_limit, self._now)
+            stuck = self._arms.stuck()
+            if self._tick and stuck:
+                return endings.joint_limit(stuck, self._now)
         self._end = self._task.end(duration_s)
         if self._now > self._end - self._half_tick_s:
             return self._completed(self._end, sample)
@@ -256,10 +235,10 @@ class Loop:
                 return endings.target_lost(reasons(observation), self._now)
             return None
         self._last_seen = self._now
-        if self._followers[self._arm].holding is not None:
+        if self._arms.moved.holding is not None:
             self._record(sample, observation, reference)
             return None
-        joints = self._followers[self._arm].ahead(sample.joints[self._arm])
+        joints = self._arms.moved.ahead(sample.joints[self._arm])
         command = self._law.command(observation, reference, joints)
         if fault := self._border.check_command(self._arm, command):
             return Outcome(*fault, self._now)
@@ -271,26 +250,18 @@ class Loop:
 
     def _step(self, sample: Sample) -> Outcome | None:
         """Send the next set-points to the driver; return the outcome if the run ends."""
-        for name, follower in self._followers.items():
-            robot = sample.robots.get(name)
-            if name == self._arm or robot is not None:
-                measured = sample.joints[name].position
-                if fault := follower.observe(self._now, measured, robot):
-                    return Outcome(*fault, self._now)
+        if fault := self._arms.observe(self._now, sample):
+            return Outcome(*fault, self._now)
         self._tell_of_hold()
         rates = self._rates()
         if isinstance(rates, Fault):
             return Outcome(*rates, self._now)
         if not self._advanced(rates):
-            setpoints = {
-                name: follower.step(rates if name == self._arm else self._rest[name])
-                for name, follower in self._followers.items()
-            }
+            setpoints = self._arms.step(rates)
             self._part = "driver"
             self._driver.step(setpoints)
             self._tick += 1
-        self._stuck &= self._followers[self._arm].guard.at_limit
-        hindrance = self._followers[self._arm].guard.hindrance
+        hindrance = self._arms.moved.guard.hindrance
         return endings.collision(hindrance, self._now) if hindrance else None
 
     def _advanced(self, rates: FloatArray) -> bool:
@@ -303,11 +274,11 @@ class Loop:
         last = self._now + (ticks - 1) / self._driver.inner_rate_hz
         if ticks < 2 or (self._command is not None and self._share_at(last) < 1.0):
             return False
-        setpoint = self._followers[self._arm].steps(rates, ticks)
-        if setpoint is None:
+        setpoints = self._arms.steps(rates, ticks)
+        if setpoints is None:
             return False
         self._part = "driver"
-        self._exact.advance({self._arm: setpoint}, ticks)
+        self._exact.advance(setpoints, ticks)
         self._tick += ticks
         return True
 
@@ -319,11 +290,11 @@ class Loop:
             self._command = None
             if self._inner_law is not None:
                 self._inner_law.hold()
-            return self._rest[self._arm]
+            return self._rest
         assert self._command is not None
         rates = self._command.velocity
         if self._inner_law is not None:
-            rates = self._inner_law.follow(self._followers[self._arm].guard.setpoint)
+            rates = self._inner_law.follow(self._arms.moved.guard.setpoint)
             if fault := self._border.check_rates(self._arm, rates):
                 return fault
         return rates if share == 1.0 else share * rates
@@ -335,7 +306,7 @@ class Loop:
         return command_share(time - self._last_image, self._period_s, self._timeouts.decay_s)
 
     def _tell_of_hold(self) -> None:
-        holding = self._followers[self._arm].holding
+        holding = self._arms.moved.holding
         kind = holding.kind.value if holding else ""
         if holding is not None:
             self._command = None
@@ -352,8 +323,7 @@ class Loop:
             share, asked = self._share_at(self._now), self._command
             faded = replace(asked, velocity=share * asked.velocity, v_camera=share * asked.v_camera)
             commands = {self._arm: asked if share == 1.0 else faded}
-        setpoints = {name: follower.guard.setpoint for name, follower in self._followers.items()}
-        aimed = self._aimed(reference)
+        aimed, setpoints = self._aimed(reference), self._arms.setpoints
         record = TickRecord(self._now, sample, observation, aimed, commands, setpoints)
         self._listeners.tick(record)
 
@@ -363,7 +333,7 @@ class Loop:
 
     def _completed(self, end: float, sample: Sample) -> Outcome:
         measured = sample.joints[self._arm].position
-        if hindered := self._followers[self._arm].hindered(self._now, measured):
+        if hindered := self._arms.moved.hindered(self._now, measured):
             return Outcome(*hindered, self._now)
         return self._task.time_over(end, self._now)
 
@@ -376,16 +346,9 @@ class Loop:
 
     def _braked(self, outcome: Outcome) -> Outcome:
         """Brake every arm; if the driver becomes silent meanwhile, that is the outcome."""
-        failure = self._brake()
+        failure = self._arms.brake()
         if not failure or outcome.kind is OutcomeKind.DRIVER_SILENT:
             return outcome
         if outcome.succeeded or outcome.kind is OutcomeKind.STOPPED:
             return Outcome(OutcomeKind.DRIVER_SILENT, failure, self._now)
         return replace(outcome, reason=f"{outcome.reason}; not braked from here: {failure}")
-
-    def _brake(self) -> str:
-        return brake(self._driver, {name: f.guard for name, f in self._followers.items()})
-
-    @property
-    def _moving(self) -> bool:
-        return any(follower.guard.moving for follower in self._followers.values())
