@@ -124,7 +124,7 @@ def _bodies(spec: Any, given: str, known: Collection[str]) -> str:
     others = len(known) - len(ends)
     if given or others <= _FEW_BODIES:
         return f"{allowed}; all bodies: {nearest(given, known)}"
-    return f"{allowed}; {others} other bodies, which `--body list` names"
+    return f"{allowed}; {others} other bodies (see `--body list`)"
 
 
 def _arm(model: Any, body: str) -> tuple[Arm, str]:

@@ -13,6 +13,7 @@ from vergence.studies.defaults.moving import KEPT_PX
 from vergence.studies.defaults.run import NOISE_PX
 
 REACHED, PLAN_WORST_S = 0.97, 1.0  # what the defaults have to come to
+_SETTINGS = "interaction matrix L, source of depth, share of w' kept and joint margin"
 
 
 def checks_of(found: Mapping[str, Sequence[Tried]]) -> tuple[Check, ...]:
@@ -43,7 +44,7 @@ def _reached(name: str, tried: Sequence[Tried], noisy: bool) -> Check:
         "",
         share >= REACHED,
         f"{len(tried)} starts, {len(tried) - len(feasible)} left out as proved infeasible; "
-        f"without a plan: {_served(feasible)}"
+        f"share that arrives without a plan, by {_SETTINGS}: {_served(feasible)}"
         + "".join(f"; {count} × {what}" for what, count in missed.items()),
     )
 
@@ -53,7 +54,7 @@ def _served(tried: Sequence[Tried]) -> str:
         sum(one.served[k].end is End.REACHED for one in tried) / len(tried)
         for k in range(len(CHOICES))
     )
-    return ", ".join(f"{c.name}: {share:.2f}" for c, share in zip(CHOICES, shares, strict=True))
+    return "; ".join(f"{c.name}: {share:.2f}" for c, share in zip(CHOICES, shares, strict=True))
 
 
 def _others(found: Mapping[str, Sequence[Tried]]) -> tuple[Check, ...]:

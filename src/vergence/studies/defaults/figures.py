@@ -51,11 +51,13 @@ def _endings(found: Mapping[str, Sequence[Tried]]) -> "Drawing":
     left = np.zeros(len(names))
     for index, end in enumerate(End):
         share = np.array([100.0 * count[end] / count.total() for count in counts])
+        if not share.any():
+            continue
         again, color = divmod(index, len(COLORS))
         look = {"color": COLORS[color], "hatch": "/////" * again, "edgecolor": "white"}
         axes.barh(names, share, left=left, label=end.value, linewidth=0.0, **look)
         left += share
-    axes.invert_yaxis()
+    axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlabel("runs (%)")
     axes.set_xlim(0, 100)
     axes.grid(visible=False, axis="y")
