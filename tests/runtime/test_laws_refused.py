@@ -88,6 +88,9 @@ def test_another_kind_keeps_the_keys_that_it_has_and_refuses_the_others_by_name(
     assert error.key == "law.axes"
     assert "image_based does not have" in str(error.given)
     assert "--set law.axes= removes it" in error.allowed
+    error = complaint("ur5", target__motion__kind="stationary")
+    assert error.key == "target.motion.amplitude_m"
+    assert "--set target.motion.amplitude_m= removes it" in error.allowed
 
 
 def test_limits_beside_a_solver_that_keeps_none():

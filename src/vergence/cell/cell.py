@@ -38,6 +38,7 @@ from vergence.cell.tagged import check_tags, with_tags
 from vergence.cell.tasks import check_sequence, naming_task, with_first_task
 from vergence.cell.toml_text import read_toml, setting
 from vergence.cell.with_parts import with_parts
+from vergence.errors import Absent, InputError
 from vergence.places import find_cell
 from vergence.validation import explain
 
@@ -195,7 +196,20 @@ def load_cell(
         values["seed"] = seed
         text += f"\n# set: seed = {seed}"
     check_tags(values, str(path))
-    return _validate(values, path, text)
+    try:
+        return _validate(values, path, text)
+    except InputError as error:
+        if not _is_left_over(error, overrides or {}):
+            raise
+        hint = f"{error.allowed}; --set {error.key}= removes it"
+        raise InputError(error.source, error.key, error.given, hint) from None
+
+
+def _is_left_over(error: InputError, overrides: Mapping[str, str]) -> bool:
+    """Return whether a key of the file does not fit a kind that was given for its table."""
+    table = error.key.rpartition(".")[0]
+    given = error.key not in overrides and not isinstance(error.given, Absent)
+    return given and f"{table}.kind" in overrides
 
 
 def _validate(values: dict[str, Any], path: Path, text: str) -> Cell:

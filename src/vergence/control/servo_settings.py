@@ -152,8 +152,7 @@ def _term(given: Any, place: Place, of_law: Collection[str] = ()) -> WeightedObj
         if key not in known:
             full = f"{place.key}.{key}"
             given_text = f"a key that {kind_of(objective)} does not have"
-            allowed = f"{nearest(key, known)}; --set {full}= removes it"
-            raise InputError(place.source, full, given_text, allowed)
+            raise InputError(place.source, full, given_text, nearest(key, known))
     made: WeightedObjective = make_part(
         WeightedObjective, {"objective": make_part(objective, rest, place), **beside}, place
     )
