@@ -10,9 +10,8 @@ from contextlib import suppress
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.control.aligned import lifted
 from vergence.errors import InputError
-from vergence.features import Feature, Points, interaction_matrix_points
+from vergence.features import Feature, Points
 from vergence.geometry import se3_exp, se3_inverse, transform_points
 from vergence.parts import kind_of
 
@@ -60,7 +59,7 @@ def nearest_points(features: Features, now: Points, desired: Points) -> FloatArr
         None if the features leave no motion free, so that the desired points are the goal; also if
         a feature has no value here.
     """
-    body = lifted(now.points, now.depth_m)
+    body = np.column_stack((now.points, np.ones(len(now.points)))) * now.depth_m[:, None]
     with suppress(InputError, np.linalg.LinAlgError):
         goals = _made(features, desired)
         error, L = _linear(features, goals, body)
@@ -76,7 +75,7 @@ def nearest_points(features: Features, now: Points, desired: Points) -> FloatArr
             body, error, L = moved, left, L_there
             if length < _NEAR:
                 break
-        return _image(body)
+        return _seen(body).points
     return None
 
 
@@ -88,7 +87,7 @@ def _linear(
     features: Features, goals: Sequence[Feature], body: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the errors (K,) of features of points (M, 3), and interaction matrices (K, 6)."""
-    now = _made(features, Points(_image(body), body[:, 2]))
+    now = _made(features, _seen(body))
     errors = [one.error(goal) for one, goal in zip(now, goals, strict=True)]
     return np.concatenate(errors), np.concatenate([one.interaction() for one in now])
 
@@ -97,13 +96,12 @@ def _nearer(
     body: FloatArray, error: FloatArray, L: FloatArray, longest: float
 ) -> tuple[FloatArray, float]:
     """Return points (M, 3) after a step, and how far it would move one in the image, unlimited."""
-    to_twist = np.linalg.pinv(interaction_matrix_points(_image(body), body[:, 2].copy()))
+    to_twist = np.linalg.pinv(_seen(body).interaction())
     shift = -np.linalg.pinv(L @ to_twist, rcond=_DETERMINED) @ error
     length = float(np.abs(shift).max())
     twist = to_twist @ shift * longest / max(length, longest)
     return transform_points(se3_inverse(se3_exp(twist)), body), length
 
 
-def _image(body: FloatArray) -> FloatArray:
-    points: FloatArray = body[:, :2] / body[:, 2:]
-    return points
+def _seen(body: FloatArray) -> Points:
+    return Points(body[:, :2] / body[:, 2:], body[:, 2])
