@@ -185,6 +185,7 @@ BOARD = ["calibrate", ".", "--board", "9x6", "--square-mm", "25"]
         (["reproduce", "honesty", "--imaging", "real"], "--imaging: given real; allowed"),
         (["watch", "ur5", "--host", ""], "--host: given an empty text; allowed: 127.0.0.1"),
         (["plan", "gantry", "--planner", "none"], "vergence plan: --planner: given none; "),
+        (["check", "ur5"], "vergence check: --driver: missing; needed: one of franka, "),
     ],
 )
 def test_a_mistake_is_one_message_and_exit_code_two(

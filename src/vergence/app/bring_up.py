@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vergence.app import markup
+from vergence.app import markup, names
 from vergence.app.check import table_with_notes
 from vergence.app.output import FAILURE, SUCCESS, emit, page_folder, say
 from vergence.app.report import REPORT
 from vergence.app.run import overrides
+from vergence.errors import NOTHING, InputError
 
 if TYPE_CHECKING:
     from vergence.app.options import CheckOptions
@@ -37,11 +38,15 @@ def check(options: "CheckOptions") -> int:
     from vergence.cell import load_cell
     from vergence.drivers.bring_up import bring_up, killed_client_finding
 
-    loaded = load_cell(options.cell, overrides(options.settings))
+    loaded, driver = load_cell(options.cell, overrides(options.settings)), options.driver
+    if driver is None:
+        known = f"one of {', '.join(names.drivers())}, or module:Class of your own"
+        without = f"without a robot: vergence run {options.cell}"
+        raise InputError("vergence check", "--driver", NOTHING, f"{known}; {without}")
     folder = page_folder(options.out, f"check-{loaded.name}")
-    check_driver(loaded, options.driver)
+    check_driver(loaded, driver)
     rehearse(loaded)
-    opened = open_driver(loaded, options.driver)
+    opened = open_driver(loaded, driver)
     findings: list[Finding] = []
     try:
         rates = {name: loaded.cameras[name].rate_hz for name in loaded.watched}
@@ -55,15 +60,15 @@ def check(options: "CheckOptions") -> int:
     finally:
         opened.close()
     if all(found.holds for found in findings):
-        again = partial(open_driver, loaded, options.driver)
+        again = partial(open_driver, loaded, driver)
         by = np.where(arm.sliding, nudges[1], nudges[0])
         findings.append(killed_client_finding(again, loaded.task.arm, by))
         if not options.as_json:
             say(_words(findings[-1]))
-    page = _write_page(folder, loaded.name, options.driver, findings)
+    page = _write_page(folder, loaded.name, driver, findings)
     holds = all(found.holds for found in findings)
     if options.as_json:
-        emit(_answer(loaded.name, options.driver, findings, page))
+        emit(_answer(loaded.name, driver, findings, page))
     else:
         for reminder in _to_do(holds):
             say(f"  to do  {reminder}")

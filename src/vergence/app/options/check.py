@@ -15,13 +15,13 @@ class CheckOptions:
 
     cell: CellName
     driver: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME[:ADDRESS]",
             help="Driver of the robot: its name, or module:Class for your own.",
             autocompletion=names.drivers,
         ),
-    ]
+    ] = None
     nudge_deg: Annotated[
         float, typer.Option(min=0.1, max=20, help="Angle by which to turn each joint, in degrees.")
     ] = 2.0
