@@ -64,9 +64,9 @@ class KeyConflict(InputError):
     """
 
     def __init__(self, source: str, key: str, other: str, delete: Sequence[str]) -> None:
-        listing = " and ".join(filter(None, (", ".join(delete[:-1]), delete[-1])))
         super().__init__(source, key, "a second value", f"{other} alone")
-        self.args = (f"{echo(source)}: {key} cannot be combined with {other}; delete {listing}",)
+        why = f"{key} cannot be combined with {other}; delete {listed(delete)}"
+        self.args = (f"{echo(source)}: {why}",)
 
 
 class RenderingError(VergenceError):
@@ -88,6 +88,11 @@ def echo(given: object, most: int = _MOST_ECHOED) -> str:
     shown = "".join(c if c.isprintable() else " " for c in text[: 4 * most])
     line = " ".join(shown.split())
     return line if len(line) <= most else line[: most - 1] + "…"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return one word or more as in a sentence: ``a, b and c``."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

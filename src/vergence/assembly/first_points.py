@@ -8,7 +8,7 @@ from vergence.assembly.own_parts import started_tracker
 from vergence.assembly.started_driver import StartedDriver
 from vergence.assembly.tag import TagFinder
 from vergence.cell.schema import TrackTable
-from vergence.errors import InputError
+from vergence.errors import InputError, listed
 from vergence.estimation import TrackedPoints
 from vergence.geometry import se3_inverse, transform_points
 from vergence.parts import kind_of
@@ -177,9 +177,7 @@ def _corners_near(image: ImageArray, points_px: FloatArray, radius_px: float) ->
 
 def _out_of_sight(context: LawContext, key: str, camera: str, missing: IntArray) -> InputError:
     """Return which features a camera does not see, and why."""
-    which = f"feature {missing[0]}"
-    if len(missing) > 1:
-        which = f"features {', '.join(map(str, missing[:-1]))} and {missing[-1]}"
+    which = f"feature{'s' if len(missing) > 1 else ''} {listed([str(j) for j in missing])}"
     why = _reason(context, camera, missing)
     given = f"at the start camera {camera} does not see {which}{why}"
     allowed = "a start from which the camera sees every feature"

@@ -44,7 +44,7 @@ class ServoGoals:
         """
         errors: dict[str, float] = {}
         aimed = reference
-        for name in self._features.keys() & states.keys():
+        for name in [name for name in self._features if name in states]:
             main = name == self._first
             goal = self._goal(
                 name, states[name], reference.points_px if main else reference.elsewhere_px[name]
@@ -66,9 +66,8 @@ class ServoGoals:
         found, features = view.found, self._features[name]
         if desired_px is None or not found.any():
             return _Goal({}, None)
-        at_goal = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
         now = Points(camera.normalize(view.points_px[found]), state.depth_m)
-        desired = Points(camera.normalize(desired_px[found]), at_goal)
+        desired = Points(camera.normalize(desired_px[found]), state.desired.depth_m)
         nearest = nearest_points(features, now, desired) if name in self._free else None
         points_px = None
         if nearest is not None:

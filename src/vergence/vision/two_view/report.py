@@ -58,8 +58,7 @@ class Report(NamedTuple):
         H = fit.state.R + np.outer(fit.state.t, fit.state.n)
         H = H / np.linalg.svd(H)[1][1]
         motions = zip(*decompose_homography(H), strict=True)
-        scale = max(found.scale, fit.chi_square / max(fit.freedom, 1))
-        scale = max(scale, _variance(fit, found))
+        scale = max(_variance(fit, found), fit.chi_square / max(fit.freedom, 1))
         results = [self._planar_motion(fit, scale, *motion) for motion in motions]
         possible = sorted(
             (result for result in results if result is not None),
