@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 _MOST_ECHOED = 200  # characters of what was given that a message repeats
-_MOST_NAMES = 40  # of those that are known, likewise
+MOST_NAMES = 40  # of those that are known, likewise
 
 
 class VergenceError(Exception):
@@ -96,10 +96,13 @@ def listed(words: Sequence[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return which names there are, the one probably meant first."""
-    names = sorted(known)
-    listing = ", ".join(echo(each) for each in names[:_MOST_NAMES]) if names else "none"
-    if len(names) > _MOST_NAMES:
-        listing += f" and {len(names) - _MOST_NAMES} more"
-    close = get_close_matches(name[:_MOST_ECHOED], names, n=1)
+    """Return which names there are; of more than 40 those most like the name, that first."""
+    names, name = sorted(known), name[:_MOST_ECHOED]
+    close = get_close_matches(name, names, n=1)
+    shown = names
+    if name and len(names) > MOST_NAMES:
+        shown = get_close_matches(name, names, n=MOST_NAMES, cutoff=0.0)
+    listing = ", ".join(map(echo, shown[:MOST_NAMES])) or "none"
+    if len(names) > MOST_NAMES:
+        listing += f" and {len(names) - MOST_NAMES} more"
     return f"{listing} (did you mean {echo(close[0])}?)" if close else listing

@@ -138,9 +138,24 @@ def test_of_many_bodies_the_ends_of_the_arms_are_named_and_the_others_counted(
     said = capsys.readouterr().err
     assert "probably right_gripper (7 joints) or left_gripper (7 joints); 55 other" in said
     assert "sonar_ring" not in said
-    assert command("new", model, "--body", "list") == 2
+    assert command("new", model, "--body", "left_wrst") == 2
     said = capsys.readouterr().err
-    assert said.index("right_gripper (7 joints)") < said.index("all bodies: base, ")
+    assert said.index("right_gripper (7 joints)") < said.index("; bodies: left_wrist, ")
+
+
+def test_the_list_of_bodies_has_all_of_them_with_the_joints_that_move_each(command, capsys) -> None:
+    model = f"{ROBOTS}/baxter_description/urdf/baxter.urdf"
+    assert command("new", model, "--body", "list") == 0
+    first, *rows = capsys.readouterr().out.splitlines()
+    assert first == "bodies of baxter.urdf, and how many joints move each:"
+    counts = {row.split()[0]: row.split()[1] for row in rows}
+    assert len(counts) == len(rows) == 57
+    assert (counts["base"], counts["head"], counts["left_gripper"]) == ("0", "1", "7")
+    ends = [row.split()[0] for row in rows if row.endswith("the arm probably ends here")]
+    assert sorted(ends) == ["left_gripper", "right_gripper"]
+    assert command("new", model, "--body", "list", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {name: str(count) for name, count in answer["bodies"].items()} == counts
 
 
 @pytest.mark.parametrize(

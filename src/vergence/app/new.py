@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from vergence.app.options import NewOptions
     from vergence.arrays import FloatArray
     from vergence.camera import Camera
-    from vergence.simulation.draft import Draft
+    from vergence.simulation.draft import Bodies, Draft
 
+_LIST = "list"  # as --body: which bodies there are
 _SHARE = 0.85  # of the image's height that the board fills
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
@@ -121,12 +122,15 @@ focal_px = [600.0, 600.0]  # your lens, see `vergence calibrate --help`"""
 
 
 def new(options: "NewOptions") -> int:
-    """Write a cell for an arm into a new folder; return the exit code."""
+    """Write a cell for an arm into a new folder, or list the bodies; return the exit code."""
     from vergence.camera import read_camera
     from vergence.cell.locate import locate_model
-    from vergence.simulation.draft import SPAN, draft_cell
+    from vergence.simulation.draft import SPAN, draft_cell, list_bodies
 
     path = locate_model(Path(options.model), Path.cwd(), "vergence new", "MODEL")
+    if options.body == _LIST and _LIST not in (bodies := list_bodies(path)).joints:
+        _tell_bodies(bodies, path.name, options.as_json)
+        return SUCCESS
     folder = options.out or Path(path.stem)
     if (folder / CELL).exists():
         given = Absent(f"{folder} holds a cell already")
@@ -177,6 +181,18 @@ def _gripper_joint(draft: "Draft") -> str:
         f"joint {name}, the last one, seems to move a gripper: to leave it out of the "
         "arm's motion, give a body before it as --body"
     )
+
+
+def _tell_bodies(bodies: "Bodies", model: str, as_json: bool) -> None:
+    """List the bodies of a model, with the number of joints that move each."""
+    if as_json:
+        emit({"bodies": bodies.joints, "ends": bodies.ends})
+        return
+    say(f"bodies of {model}, and how many joints move each:")
+    width = max(map(len, bodies.joints), default=0)
+    for name, count in bodies.joints.items():
+        note = "   the arm probably ends here" if name in bodies.ends else ""
+        say(f"  {name:{width}}  {count:3d}{note}")
 
 
 def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:

@@ -33,6 +33,19 @@ def arm_ends(spec: Any) -> list[ArmEnd]:
     return sorted(arms, key=lambda end: -end.joint_count)
 
 
+def bodies_with_joints(spec: Any) -> dict[str, int]:
+    """Return the named bodies of an MjSpec, from each base outwards: how many joints move each."""
+    found = {}
+    reached = [(child, 0) for child in reversed(list(spec.worldbody.bodies))]
+    while reached:
+        body, before = reached.pop()
+        count = before + _joint_count(body)
+        if body.name:
+            found[body.name] = count
+        reached += [(child, count) for child in reversed(list(body.bodies))]
+    return found
+
+
 def _ends(body: Any, before: int) -> list[ArmEnd]:
     count = before + _joint_count(body)
     rigid = _moving_as_one(body)

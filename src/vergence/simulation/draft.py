@@ -1,19 +1,19 @@
 """A first cell for a new arm: its posture, its camera and its target."""
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from vergence.arrays import FloatArray
-from vergence.errors import Absent, InputError, nearest
+from vergence.errors import MOST_NAMES, Absent, InputError, nearest
 from vergence.geometry import se3_compose
 from vergence.robot import Arm, manipulability_measure
-from vergence.robot.arm_ends import arm_ends
+from vergence.robot.arm_ends import arm_ends, bodies_with_joints
 from vergence.robot.model_files import read_model
 from vergence.robot.mujoco_chain import read_chain
 from vergence.robot.mujoco_coupling import joints_above
@@ -97,6 +97,26 @@ def draft_cell(
     raise InputError(str(model_path), "", given, "an arm with room before its last body")
 
 
+class Bodies(NamedTuple):
+    """The bodies of a model that may carry the camera."""
+
+    joints: Mapping[str, int]  # how many joints move each, from the bases outwards
+    ends: tuple[str, ...]  # those at which an arm probably ends
+
+
+def list_bodies(model_path: Path) -> Bodies:
+    """Return the bodies of a model.
+
+    Args:
+        model_path: URDF or MJCF file.
+
+    Raises:
+        InputError: if the file does not exist or cannot be used.
+    """
+    spec = read_model(model_path, "")
+    return Bodies(bodies_with_joints(spec), tuple(end.body for end in arm_ends(spec)))
+
+
 def _compile(path: Path, body: str) -> Any:
     spec = read_model(path, body)
     try:
@@ -116,15 +136,17 @@ def _compile(path: Path, body: str) -> Any:
 
 
 def _bodies(spec: Any, given: str, known: Collection[str]) -> str:
-    """Return which bodies there are: the ends of arms first, and all if a wrong one was given."""
+    """Return which bodies there are: the ends of arms first, others if a wrong one was given."""
     ends = [f"{name} ({count} joints)" for name, count in arm_ends(spec)[:_MOST_ENDS]]
     allowed = "the last body of the arm"
     if ends:
         allowed += f", probably {' or '.join(ends)}"
     others = len(known) - len(ends)
-    if given or others <= _FEW_BODIES:
-        return f"{allowed}; all bodies: {nearest(given, known)}"
-    return f"{allowed}; {others} other bodies (see `--body list`)"
+    if not given and others > _FEW_BODIES:
+        return f"{allowed}; {others} other bodies (see `--body list`)"
+    if len(known) > MOST_NAMES:
+        return f"{allowed}; bodies: {nearest(given, known)}; see `--body list`"
+    return f"{allowed}; all bodies: {nearest(given, known)}"
 
 
 def _arm(model: Any, body: str) -> tuple[Arm, str]:

@@ -19,7 +19,7 @@ class NewOptions:
     body: Annotated[
         str,
         typer.Option(
-            help="Last body of the arm; the camera is mounted on it. Omit it to list the bodies."
+            help="Last body of the arm; the camera is mounted on it. `list` names all bodies."
         ),
     ] = ""
     out: Annotated[
