@@ -77,6 +77,7 @@ def test_laws_are_compared_in_one_table() -> None:
     assert len(table.runs) == 4
     assert table.runs[3].labels == {"law": "constrained", "start": 1}
     assert table.runs[3].outcome.startswith(table.runs[3].ending)
+    assert repr(table) == str(table)
     lines = str(table).splitlines()
     assert lines[0].split()[0] == "law"
     assert [line.split()[0] for line in lines[2:]] == ["image_based", "constrained"]

@@ -10,7 +10,7 @@ from vergence.assembly import run_cell
 from vergence.cell import load_cell
 from vergence.errors import InputError
 from vergence.geometry import so3_log
-from vergence.runtime import Recorder, Recording, Run, RunInfo, TickRecord
+from vergence.runtime import Recorder, Recording, Run, RunInfo, RunRecorder, TickRecord
 from vergence.runtime.results import Columns, TargetTrace, largest, tick_pose_errors
 
 
@@ -50,6 +50,31 @@ def followed(folder: Path) -> tuple[Run, TickByTick]:
     cell, ticks = load_cell("eye_to_hand_pose", {"duration_s": "1.0"}), TickByTick()
     recorder = Recorder(folder / "followed", image_every=0)
     return run_cell(cell, [recorder, ticks], images=False), ticks
+
+
+def test_a_run_shows_itself_in_few_words(tracked, folder: Path) -> None:
+    run, _ = tracked
+    ending = "completed at 1.00 s: ran for 1 s with the target in view"
+    assert repr(run) == f"Run(puma560: {ending}; arms: puma; cameras: wrist)"
+    read = Recording.open(folder / "tracked")
+    assert repr(read) == f"Recording(puma560: {ending}; arms: puma; cameras: wrist)"
+    shown = repr(run.cameras["wrist"])
+    assert shown.startswith(f"CameraTrace({len(run.cameras['wrist'].time)} rows of time, received,")
+    assert len(shown) < 300
+
+
+def test_events_are_in_order_of_time(tmp_path: Path) -> None:
+    ticks, kept = TickByTick(), RunRecorder()
+    run = run_cell(load_cell("puma560", {"duration_s": "0.1"}), [ticks], images=False)
+    for listener in (Recorder(tmp_path / "again", image_every=0), kept):
+        listener.begin(ticks.info)
+        for record in ticks.records:
+            listener.tick(record)
+        for time, name in ((0.08, "late"), (0.04, "early"), (0.08, "later")):
+            listener.event(time, name, "")
+        listener.close(run.outcome, run.summary)
+    for made in (kept.run(), Recording.open(tmp_path / "again")):
+        assert [event.name for event in made.events] == ["early", "late", "later"]
 
 
 def check_same(one: object, other: object) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _USUAL = set(Ending) - {Ending.OTHER, Ending.REFUSED}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """What came of every run, and a line for each law; `print` shows the table."""
 
@@ -73,7 +73,7 @@ class Comparison:
             table.add_row(*self.row(score))
         return table
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         """The table as text."""
         from io import StringIO
 

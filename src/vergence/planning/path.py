@@ -10,7 +10,7 @@ from vergence.geometry import se3_inverse, transform_points
 from vergence.planning.problem import PlanningProblem
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Path:
     """Waypoints that are dense enough for interpolating splines."""
 
@@ -20,6 +20,12 @@ class Path:
     points_px: FloatArray  # (K, N, 2) image of the points
     depth_m: FloatArray  # (K, N) of the points along the optical axis
     planner: str  # name of the planner that found it
+
+    def __repr__(self) -> str:
+        """How many waypoints there are, and of what."""
+        points, joints = self.points_px.shape[1], self.q.shape[1]
+        what = f"{len(self.q)} waypoints of {joints} joints and {points} points"
+        return f"Path({what}, by {self.planner})"
 
     def __bool__(self) -> bool:
         """A path is true as a condition."""

@@ -40,7 +40,7 @@ _SUMMARY: TypeAdapter[dict[str, float | str | None]] = TypeAdapter(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Recording(Run):
     """A run read from its folder, with the recorded images; `Recording.open` reads one.
 
@@ -176,7 +176,7 @@ class _Messages:
         return cameras, target if len(target.time) else None
 
     def events(self) -> tuple[Event, ...]:
-        """Return the events, in order."""
+        """Return the events, in order of time."""
         kept = []
         for message in self._messages.get("/events", ())[:_MOST_EVENTS]:
             try:
@@ -185,7 +185,7 @@ class _Messages:
                 kept.append(Event(wire.time_of(parts, 1), echo(name), echo(text, _LONGEST_TEXT)))
             except ValueError:
                 self.skipped += 1
-        return tuple(kept)
+        return tuple(sorted(kept, key=lambda event: event.time))
 
 
 def _any(cameras: Mapping[str, CameraTrace], target: TargetTrace | None) -> bool:

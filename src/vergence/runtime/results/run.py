@@ -37,7 +37,7 @@ class Event:
     text: str  # one sentence for the user
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Run:
     """The result of a run: its outcome and all its numbers; images are not kept."""
 
@@ -50,6 +50,12 @@ class Run:
     summary: Mapping[str, float]  # the key figures of the run
     # Targets other than the task's, by name.
     others: Mapping[str, OtherTarget]
+
+    def __repr__(self) -> str:
+        """How it ended, and whose numbers it has."""
+        arms, cameras = ", ".join(self.arms), ", ".join(self.cameras)
+        what = f"{type(self).__name__}({self.info.cell}: {self.outcome}"
+        return f"{what}; arms: {arms or 'none'}; cameras: {cameras or 'none'})"
 
     @property
     def times(self) -> FloatArray:

@@ -96,7 +96,7 @@ class RunRecorder:
             self._info,
             {name: columns.table() for name, columns in self._arms.items()},
             *self._served.tables(),
-            tuple(self._events),
+            tuple(sorted(self._events, key=lambda event: event.time)),
             self._outcome,
             {},
             {name: OtherTarget(*seen.tables()) for name, seen in self._others.items()},

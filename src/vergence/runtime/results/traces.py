@@ -15,6 +15,11 @@ class Trace:
 
     __slots__ = ()
 
+    def __repr__(self) -> str:
+        """How many rows there are, and of what."""
+        names = ", ".join(one.name for one in fields(self))  # type: ignore[arg-type]
+        return f"{type(self).__name__}({len(self.time)} rows of {names})"  # type: ignore[attr-defined]
+
     def at(self, rows: BoolArray | IntArray) -> Self:
         """Return some of the rows, by a mask (K,) or by indices."""
         numbers = np.arange(len(self.time))[rows]  # type: ignore[attr-defined]
@@ -27,7 +32,7 @@ class Trace:
         return values[numbers]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ArmTrace(Trace):
     """The motion of an arm with n joints over K ticks."""
 
@@ -46,7 +51,7 @@ class ArmTrace(Trace):
     errors: tuple[Mapping[str, float], ...] = column(kind=dict)  # (K,) s - s_star of features
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CameraTrace(Trace):
     """The observations of a camera in K images of up to M points.
 
@@ -87,7 +92,7 @@ class CameraTrace(Trace):
         return np.where(self.found, distance, np.nan)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TargetTrace(Trace):
     """A filter's K estimates of the target's pose."""
 
