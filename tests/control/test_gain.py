@@ -128,7 +128,7 @@ def test_a_cell_file_takes_it_alone_and_in_a_stack_and_the_live_page_turns_it() 
         ("{ near = 400, far = 1, slope = 1 }", "law.gain.near: given 400; allowed: at most 100"),
         ("{ near = 4, far = 1 }", "law.gain.slope: missing"),
         ("{ near = 4, far = 1, slope = 3, fra = 1 }", "law.gain.fra: given a key"),
-        ("'high'", "law.gain: given high; allowed: a number, or a table of near, far and slope"),
+        ("'high'", "law.gain: given high; allowed: a number, or { near, far, slope }"),
         ("-1", "law.gain: given -1; allowed: greater than 0"),
     ],
 )

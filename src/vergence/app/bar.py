@@ -8,6 +8,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TextColum
 from rich.text import Text
 
 from vergence.app.compilations import Compilations
+from vergence.app.durations import whole_seconds
 from vergence.app.heartbeat import Heartbeat
 
 _LATE, _LATE_S = 1.2, 2.0  # up to so many times an estimate, and so much more, it counts as right
@@ -91,7 +92,7 @@ class Bar(Progress):
             return ""
         if worked_s > _LATE * expected_s + _LATE_S:
             return "takes longer than estimated"
-        return f"{max(expected_s - worked_s, 0.0):.0f} s left"
+        return f"{whole_seconds(expected_s - worked_s)} left"
 
     def _worked_s(self, task: Any) -> float:
         return max((task.elapsed or 0.0) - self._set_up_s - self._compilations.spent_s, 0.0)

@@ -26,6 +26,11 @@ def remember_s(name: str, seconds: float) -> None:
         fresh.replace(path)
 
 
+def whole_seconds(seconds: float) -> str:
+    """Return an estimate in words, which is never nothing."""
+    return f"{seconds:.0f} s" if seconds >= 0.5 else "under 1 s"
+
+
 def _read() -> Mapping[str, float]:
     try:
         noted = json.loads(_path().read_text(encoding="utf-8"))

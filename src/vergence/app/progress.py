@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from vergence.app.compilations import Compilations
-from vergence.app.durations import remember_s, usual_s
+from vergence.app.durations import remember_s, usual_s, whole_seconds
 from vergence.app.heartbeat import Heartbeat
 from vergence.runtime import RunInfo, TickRecord
 from vergence.signals import Outcome
@@ -46,7 +46,7 @@ def working(words: str, about: str = "") -> Iterator[None]:
 
     began, name = time.perf_counter(), " ".join(filter(None, (words, about)))
     usual = usual_s(name)
-    said = words if usual is None else f"{words}, {usual:.0f} s the last time"
+    said = words if usual is None else f"{words}, {whole_seconds(usual)} the last time"
     status = Console(stderr=True, quiet=not sys.stderr.isatty()).status(said)
 
     def compiling(how_far: str) -> None:

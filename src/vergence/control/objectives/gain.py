@@ -62,7 +62,7 @@ def _number_or_table(given: Any) -> Any:
     if isinstance(given, Mapping):
         return AdaptiveGain(**given)
     if not isinstance(given, Real | AdaptiveGain):
-        raise InputError("", "", given, "a number, or a table of near, far and slope")
+        raise InputError("", "", given, "a number, or { near, far, slope }")
     return given
 
 

@@ -46,7 +46,7 @@ class ImageBased:
     Points are weighted by their measurement accuracy; other features use all points equally.
     """
 
-    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    # Decay rate λ of the error; in a cell file it may also be { near, far, slope }.
     gain: Gain = knob(1.0, "1/s")
     # Points at which the interaction matrix L is evaluated; mean: that of both.
     interaction: InteractionModel = knob("mean")

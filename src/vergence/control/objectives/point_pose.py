@@ -34,7 +34,7 @@ class PointPose:
     it is the law of [Malis1999], "2½D".
     """
 
-    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    # Decay rate λ of the error; in a cell file it may also be { near, far, slope }.
     gain: Gain = knob(1.0, "1/s")
     # Camera axes that it controls; it leaves the others to other objectives.
     axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = knob(AXES)

@@ -18,7 +18,7 @@ class Posture:
 
     supplements = True  # other objectives; alone it serves no task
 
-    # Decay rate λ of the error; a number, or a table of near, far and slope.
+    # Decay rate λ of the error; in a cell file it may also be { near, far, slope }.
     gain: Gain = knob(1.0, "1/s")
     # Desired joint positions, rad or m; the middle of each range if absent.
     position: tuple[float, ...] | None = knob(None)
