@@ -25,7 +25,15 @@ RUN_S, RUNS = 25.0, 500
 SHARED = 1400  # runs of 5 s that two workers share: about a minute for one
 RATE_HZ = 30.0  # of images
 POSE_CELLS = ("lippiello2005", "four_cameras")  # tasks that follow a pose, in physics
-LAWS = ("image_based", "constrained", "point_pose")
+LAWS = ("image_based", "constrained", "point_pose", "2.5D")
+TWO_AND_A_HALF_D = {  # [Malis1999]
+    "objectives": [
+        {"kind": "image_based", "feature": "centre"},
+        {"kind": "image_based", "feature": "log_depth"},
+        {"kind": "point_pose", "axes": ["rx", "ry", "rz"]},
+    ],
+    "solver": "pseudo_inverse",
+}
 
 
 def first_papers_run() -> KinematicRun:
@@ -49,10 +57,14 @@ def first_papers_run() -> KinematicRun:
     return KinematicRun(ideal, parts.law, desired, RUN_S)
 
 
+def source_of(cell: str) -> CellSource:
+    """A cell for 5 s, with a law that is a sum beside the usual ones."""
+    return CellSource.changed(cell, {"duration_s": 5.0, "laws": {"2.5D": TWO_AND_A_HALF_D}})
+
+
 def preset_run(law: str) -> KinematicRun:
     """A UR5 that follows a board that wanders and tilts, for 5 s."""
-    source = CellSource.changed("ur5", {"duration_s": 5.0})
-    cell = source.load()
+    cell = source_of("ur5").load()
     trial = start_trials(cell, [law], 1, 0, Sampling(("starts",)))[0]
     return KinematicRuns().run_of(cell.replace(**trial.changes))
 
@@ -67,7 +79,7 @@ def runs_a_second(run: KinematicRun) -> float:
 
 def runs_a_cpu_second(law: str, cell: str = "ur5") -> float:
     """How many runs of 5 s a core makes of a cell under a law, from a cell to results."""
-    source = CellSource.changed(cell, {"duration_s": 5.0})
+    source = source_of(cell)
     trials = start_trials(source.load(), [law], 5, 0, Sampling(("starts",)))
     run_trials(source, trials[:1], 2.0)
     start = time.process_time()

@@ -44,6 +44,14 @@ def test_no_other_motion_of_the_body_is_shorter() -> None:
             assert np.linalg.norm(tried.points - now.points) > 0.9 * shortest
 
 
+@pytest.mark.parametrize("feature", [Centre, Size, LogDepth])
+def test_points_whose_features_are_as_desired_stay_where_they_are(feature: type[Feature]) -> None:
+    now = seen(np.full(6, 0.02))
+    nearest = nearest_points([feature], now, now)
+    assert nearest is not None
+    np.testing.assert_allclose(nearest, now.points, atol=1e-9)
+
+
 def test_features_that_leave_no_motion_free_have_the_desired_points_as_goal() -> None:
     now, desired = seen(np.full(6, 0.02)), seen(np.zeros(6))
     assert nearest_points([Moments], now, desired) is None

@@ -113,18 +113,25 @@ def check_same(results, looped):
                 assert value == pytest.approx(getattr(other, name), rel=1e-9, abs=1e-9), name
 
 
+MALIS = """{ objectives = [
+    { kind = 'image_based', feature = 'centre', gain = 2.0 },
+    { kind = 'image_based', feature = 'log_depth', gain = 2.0 },
+    { kind = 'point_pose', axes = ['rx', 'ry', 'rz'], gain = 2.0 },
+], solver = 'damped_pseudo_inverse' }"""
+
+
 @pytest.mark.parametrize(
     ("name", "laws"),
     [
         ("ur5", ("image_based", "constrained", "optimal_tracking")),
-        ("ur5", ("point_pose", "constrained_point_pose")),
+        ("ur5", ("point_pose", "constrained_point_pose", "malis")),
         ("puma560", ("image_based", "constrained")),
     ],
 )
 def test_laws_of_shipped_cells_come_in_the_kernel_to_what_they_come_to_in_the_loop(
     name, laws, monkeypatch
 ):
-    source = CellSource.of(name, {"duration_s": "2.0"}, None)
+    source = CellSource.of(name, {"duration_s": "2.0", "laws.malis": MALIS}, None)
     trials = start_trials(source.load(), laws, 3, seed=3, sampling=Sampling(spread=0.2))
     for trial in {trial.labels["law"]: trial for trial in trials}.values():  # compiled, if need be
         run_batch([KinematicRuns().run_of(source.load().replace(**trial.changes))])

@@ -1,6 +1,7 @@
 """From a servo to the numbers of a law that one kernel can compute."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from vergence.control.objectives import (
     Objective,
     OptimalTracking,
     PointPose,
+    Posture,
     pack_setup,
 )
 from vergence.control.past_joints import no_joints
@@ -23,6 +25,10 @@ from vergence.control.point_law import (
     CARRIED,
     FROM_FEATURES,
     HELD,
+    IMAGE,
+    POSE,
+    POSTURE,
+    TRACKING,
     AsMeasured,
     InverseSolver,
     LawMemory,
@@ -30,22 +36,25 @@ from vergence.control.point_law import (
     NoMemory,
     PointGoal,
     PointLaw,
-    PoseGoal,
     PredictedMotion,
     ProgramSolver,
-    TrackingGoal,
+    TermNumbers,
     TrackingLaw,
 )
 from vergence.control.point_weights import row_variance
 from vergence.control.servo_camera import ServoCamera
 from vergence.control.solvers import BoundSolver
 from vergence.control.solvers._program import ProgramState
-from vergence.control.solvers.pseudo_inverse import BoundPseudoInverse
+from vergence.control.solvers.pseudo_inverse import (
+    BoundDampedPseudoInverse,
+    BoundPseudoInverse,
+)
 from vergence.control.solvers.quadratic_program import BoundProgram
 from vergence.control.target_flow import no_flow
+from vergence.control.term import Term
 from vergence.estimation.feature_faces import FeatureFaces
 from vergence.estimation.pose_minima import spread_rotations
-from vergence.features import Points
+from vergence.features.compiled_features import COMPILED_FEATURES
 from vergence.robot import Arm
 from vergence.signals import Reference
 
@@ -67,7 +76,7 @@ class CompiledLaw(NamedTuple):
 def compile_law(
     arm: Arm,
     camera: ServoCamera,
-    objective: Objective,
+    terms: Sequence[Term],
     solver: BoundSolver,
     tracking: TrackingTickLaw | None,
     reference: Reference,
@@ -78,7 +87,7 @@ def compile_law(
     Args:
         arm: up to its tip, the camera.
         camera: without distortion.
-        objective: the only one, of weight 1.
+        terms: its objectives, all about this camera.
         solver: for the same arm.
         tracking: the servo, if it is optimal tracking by the inverse of the Jacobian.
         reference: s_star (M, 2), and the depth there if known.
@@ -103,16 +112,17 @@ def compile_law(
             setup,
             desired,
             tracking.singular_below,
+            not as_it_is,
         )
     else:
-        depth_m = reference.desired_depth_m
-        goal = _goal(objective, camera, desired, depth_m, variance)
+        depth_m, focal_px = reference.desired_depth_m, intrinsics.focal_px
+        numbers = _numbers(terms, arm, count, camera.period_s)
         there = None if depth_m is None else lifted(desired, depth_m)
         solved_by = _solver(solver, arm, camera, there)
-        if goal is None or solved_by is None:
+        if numbers is None or solved_by is None:
             return None
-        if isinstance(goal, TrackingGoal) and isinstance(solved_by, InverseSolver):
-            return None
+        at_goal = np.full(count, np.nan) if depth_m is None else np.array(depth_m)
+        goal = PointGoal(numbers, desired, at_goal, variance, focal_px, camera.period_s)
         law = PointLaw(arm.chain, motion, goal, solved_by)
         if isinstance(solver, BoundProgram):
             if solver.state is None:
@@ -148,29 +158,40 @@ def _motion(camera: ServoCamera, covariance: FloatArray) -> PredictedMotion | No
     )
 
 
-def _goal(
-    objective: Objective,
-    camera: ServoCamera,
-    desired: FloatArray,
-    depth_m: FloatArray | None,
-    variance: float,
-) -> PointGoal | PoseGoal | TrackingGoal | None:
-    at_goal = np.full(len(desired), np.nan) if depth_m is None else np.array(depth_m)
-    if isinstance(objective, ImageBased) and objective.feature is Points:
-        return PointGoal(objective.numbers, desired, at_goal, variance)
+def _numbers(terms: Sequence[Term], arm: Arm, count: int, period_s: float) -> TermNumbers | None:
+    """Return objectives as numbers; None if kernels do not know one of them."""
+    nothing: dict[str, Any] = dict.fromkeys(("feature", "interaction"), 0)
+    nothing |= dict.fromkeys(("damping", "Q", "strength"), 0.0)
+    nothing |= dict.fromkeys(("controlled", "R"), np.zeros(6))
+    nothing |= {"gain": np.zeros(3), "position": np.zeros(arm.joint_count)}
+    rows = [_row(term.objective, arm, count, period_s) for term in terms]
+    if None in rows:
+        return None
+    whole = [nothing | (row or {}) for row in rows]
+    columns = {name: np.array([row[name] for row in whole]) for name in TermNumbers._fields[1:]}
+    return TermNumbers(np.array([term.weight for term in terms]), **columns)
+
+
+def _row(objective: Objective, arm: Arm, count: int, period_s: float) -> dict[str, Any] | None:
+    if isinstance(objective, ImageBased) and objective.feature in COMPILED_FEATURES:
+        feature = COMPILED_FEATURES[objective.feature]
+        return {"kind": IMAGE, **objective.numbers(feature)._asdict()}
     if isinstance(objective, PointPose):
-        return PoseGoal(objective.numbers, desired, at_goal)
+        return {"kind": POSE, **objective.numbers._asdict()}
     if isinstance(objective, OptimalTracking) and objective.S == 0.0:
-        gains = objective.gains(len(desired), camera.period_s)
-        return TrackingGoal(gains, desired, camera.mounting.camera.focal_px)
+        gains = objective.gains(count, period_s)
+        return {"kind": TRACKING, "controlled": gains.controlled, "Q": gains.Q, "R": gains.R}
+    if isinstance(objective, Posture):
+        return {"kind": POSTURE, **objective.numbers(arm)._asdict()}
     return None
 
 
 def _solver(
     solver: BoundSolver, arm: Arm, camera: ServoCamera, goal: FloatArray | None
 ) -> InverseSolver | ProgramSolver | None:
-    if isinstance(solver, BoundPseudoInverse):
-        return InverseSolver(arm.rate_max, solver.singular_below)
+    if isinstance(solver, BoundPseudoInverse | BoundDampedPseudoInverse):
+        damped = isinstance(solver, BoundDampedPseudoInverse)
+        return InverseSolver(arm.rate_max, solver.singular_below, damped)
     if not isinstance(solver, BoundProgram) or solver.has_own_limits:
         return None
     faces, features = camera.faces, camera.features

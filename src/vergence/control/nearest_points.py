@@ -69,10 +69,10 @@ def nearest_points(features: Features, now: Points, desired: Points) -> FloatArr
         for _ in range(_STEPS):
             moved, length = _nearer(body, error, L, longest)
             left, L_there = _linear(features, goals, moved)
-            if not np.linalg.norm(left) < np.linalg.norm(error):
+            if np.linalg.norm(left) < np.linalg.norm(error):
+                body, error, L = moved, left, L_there
+            else:
                 longest = _SHORTER * min(length, longest)
-                continue
-            body, error, L = moved, left, L_there
             if length < _NEAR:
                 break
         return _seen(body).points

@@ -2,20 +2,19 @@
 
 from typing import NamedTuple
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.control.depth.carried import CarriedPoints
 from vergence.control.image_motion import ExposedFeatures, FeatureState
-from vergence.control.objectives import Quadratic
-from vergence.control.objectives._tracking import PackedSetup, TrackingGains
-from vergence.control.objectives.image_based import PointDecay
-from vergence.control.objectives.point_pose import PoseDecay
+from vergence.control.objectives import PackedSetup
 from vergence.control.past_joints import PastJoints
 from vergence.control.solvers._program import ProgramSettings, ProgramState
+from vergence.control.sum_of_terms import Total
 from vergence.control.target_flow import FlowState
 from vergence.robot.chain import Chain
 
 FINE, SINGULAR, NONSENSE, UNDETERMINED = range(4)  # how a tick ends
 HELD, CARRIED, FROM_FEATURES = range(3)  # kinds of depth
+IMAGE, POSE, TRACKING, POSTURE = range(4)  # kinds of objective
 
 
 class SeenPoints(NamedTuple):
@@ -54,36 +53,39 @@ class PredictedMotion(NamedTuple):
     prediction: bool
 
 
-class PointGoal(NamedTuple):
-    """The objective of `ImageBased`."""
+class TermNumbers(NamedTuple):
+    """The objectives of a sum, a row each; zero is what an objective does not have."""
 
-    decay: PointDecay
+    weight: FloatArray  # (T,)
+    kind: IntArray  # (T,) IMAGE, POSE, TRACKING or POSTURE
+    gain: FloatArray  # (T, 3) fields of `GainNumbers`
+    feature: IntArray  # (T,) of `COMPILED_FEATURES`
+    interaction: IntArray  # (T,) see `PointDecay`
+    damping: FloatArray  # (T,)
+    controlled: FloatArray  # (T, 6) 1 for a camera axis that it controls, else 0
+    Q: FloatArray  # (T,) of `TrackingGains`
+    R: FloatArray  # (T, 6)
+    position: FloatArray  # (T, n) see `PostureDecay`
+    strength: FloatArray  # (T,)
+
+
+class PointGoal(NamedTuple):
+    """What the objectives are about."""
+
+    terms: TermNumbers
     desired: FloatArray  # (M, 2) normalized coordinates
     depth_m: FloatArray  # (M,) at the goal; NaN if unknown
     variance: float  # of a point's row
-
-
-class PoseGoal(NamedTuple):
-    """The objective of `PointPose`."""
-
-    decay: PoseDecay
-    desired: FloatArray  # (M, 2) normalized coordinates
-    depth_m: FloatArray  # (M,) at the goal; NaN if unknown
-
-
-class TrackingGoal(NamedTuple):
-    """The objective of `OptimalTracking` without avoidance."""
-
-    gains: TrackingGains
-    desired: FloatArray  # (M, 2) normalized coordinates
     focal_px: FloatArray  # (2,)
+    period_s: float  # between two images
 
 
 class InverseSolver(NamedTuple):
-    """The solver `PseudoInverse`."""
+    """The solver `PseudoInverse` or `DampedPseudoInverse`."""
 
     rate_max: FloatArray  # (n,)
     singular_below: float
+    damped: bool
 
 
 class ProgramSolver(NamedTuple):
@@ -99,11 +101,11 @@ class ProgramSolver(NamedTuple):
 
 
 class PointLaw(NamedTuple):
-    """A law by an objective and a solver."""
+    """A law by objectives and a solver."""
 
     chain: Chain  # up to the camera
     motion: PredictedMotion
-    goal: PointGoal | PoseGoal | TrackingGoal
+    goal: PointGoal
     solver: InverseSolver | ProgramSolver
 
 
@@ -115,6 +117,7 @@ class TrackingLaw(NamedTuple):
     setup: PackedSetup
     desired: FloatArray  # (M, 2) normalized coordinates
     singular_below: float
+    feeds_forward: bool
 
 
 class NoMemory(NamedTuple):
@@ -139,11 +142,11 @@ class LawMemory(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """What an objective wants of a solver."""
+    """What the objectives want of a solver."""
 
     now: Moment
     features: FeatureState  # those found
-    quadratic: Quadratic
+    total: Total
 
 
 class LawTick(NamedTuple):

@@ -1,8 +1,8 @@
 """The tick of a servo on image points as one kernel.
 
-It is `Servo.command` for one camera at the arm's tip, one objective and a constant reference, by
-the same kernels in the same order. Parts are told apart by their types, so that only what a law
-uses is compiled.
+It is `Servo.command` for one camera at the arm's tip and a constant reference, by the same kernels
+in the same order. Solvers and motions are told apart by their types, so that only what a law uses
+is compiled; objectives by numbers, so that it is compiled once for all of their sums.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,17 +25,23 @@ from vergence.control.image_motion import (
     unexplained_flow,
 )
 from vergence.control.limits import pack_features
-from vergence.control.objectives import Quadratic, optimal_tracking_tick
-from vergence.control.objectives.image_based import point_quadratic
+from vergence.control.objectives import optimal_tracking_tick
+from vergence.control.objectives._tracking import TrackingGains
+from vergence.control.objectives.gain import GainNumbers
+from vergence.control.objectives.image_based import PointDecay, point_quadratic
 from vergence.control.objectives.optimal_tracking import tracking_quadratic
-from vergence.control.objectives.point_pose import pose_quadratic
+from vergence.control.objectives.point_pose import PoseDecay, pose_quadratic
+from vergence.control.objectives.posture import PostureDecay, posture_quadratic
 from vergence.control.past_joints import past_position, remember
 from vergence.control.point_law import (
     CARRIED,
     FINE,
     FROM_FEATURES,
     HELD,
+    IMAGE,
     NONSENSE,
+    POSE,
+    POSTURE,
     SINGULAR,
     UNDETERMINED,
     AsMeasured,
@@ -47,17 +53,17 @@ from vergence.control.point_law import (
     NoMemory,
     PointGoal,
     PointLaw,
-    PoseGoal,
     PredictedMotion,
     ProgramSolver,
-    TrackingGoal,
+    SeenPoints,
     TrackingLaw,
     Wish,
 )
 from vergence.control.shown_faces import shown_faces
 from vergence.control.solvers._program import FurtherRows, ProgramState, program_tick
-from vergence.control.solvers.pseudo_inverse import pseudo_inverse_rates
+from vergence.control.solvers.pseudo_inverse import damped_rates, pseudo_inverse_rates
 from vergence.control.solvers.solver import Problem
+from vergence.control.sum_of_terms import Total
 from vergence.control.target_flow import flow_at, measured_flow
 from vergence.geometry import se3_inverse
 from vergence.robot.chain import forward_kinematics
@@ -146,62 +152,74 @@ def _depth_at_goal(depth_m: FloatArray, now: FeatureState, found: BoolArray) -> 
     return now.depth if np.isnan(depth_m).any() else depth_m[found]
 
 
-def _point_goal(goal: PointGoal, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
-    depth_m, no_weights = _depth_at_goal(goal.depth_m, now, found), np.empty((0, 2, 2))
-    quadratic = point_quadratic(
-        goal.decay, now.points, now.depth, goal.desired[found], depth_m, now.flow, no_weights,
-        goal.variance,
-    )  # fmt: skip
-    return FINE, quadratic
+@njit(cache=True, error_model="numpy")
+def _total(
+    goal: PointGoal, now: FeatureState, image: SeenPoints, q: FloatArray
+) -> tuple[int, Total]:
+    """Return the sum of the objectives as `total_of` does, or why there is none."""
+    terms, found = goal.terms, image.found
+    desired, there = goal.desired[found], _depth_at_goal(goal.depth_m, now, found)
+    n = len(q) if (terms.kind == POSTURE).any() else 0
+    H, g, variance = np.zeros((6, 6)), np.zeros(6), 0.0
+    H_joints, g_joints = np.zeros((n, n)), np.zeros(n)
+    for i in range(len(terms.kind)):
+        gain, kind, weight = _gain(terms.gain[i]), terms.kind[i], terms.weight[i]
+        if kind == POSTURE:
+            pull = posture_quadratic(PostureDecay(gain, terms.position[i], terms.strength[i]), q)
+            H_joints += weight * pull.H
+            g_joints += weight * pull.g
+            continue
+        if kind == IMAGE:
+            decay = PointDecay(terms.feature[i], gain, terms.interaction[i], terms.damping[i])
+            quadratic = point_quadratic(
+                decay, now.points, now.depth, desired, there, now.flow, np.empty((0, 2, 2)),
+                goal.variance,
+            )  # fmt: skip
+        elif kind == POSE:
+            seen, aim = lifted(now.points, now.depth), lifted(desired, there)
+            if not (fixes_orientation(seen) and fixes_orientation(aim)):
+                return UNDETERMINED, Total(H, g, H_joints, g_joints, variance)
+            quadratic = pose_quadratic(PoseDecay(gain, terms.controlled[i]), seen, aim)
+        else:
+            axes, T = terms.controlled[i], goal.period_s
+            quadratic = tracking_quadratic(
+                _columns(now, desired, True), goal.focal_px,
+                TrackingGains(terms.Q[i], terms.R[i], 0.0, axes, axes, 0.0, T), 1.0, np.zeros(6),
+            )  # fmt: skip
+        H += weight * quadratic.H
+        g += weight * quadratic.g
+        variance += weight * quadratic.variance
+    finite = np.isfinite(H).all() and np.isfinite(g).all() and np.isfinite(g_joints).all()
+    return FINE if finite else NONSENSE, Total(H, g, H_joints, g_joints, variance)
 
 
-def _pose_goal(goal: PoseGoal, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
-    seen = lifted(now.points, now.depth)
-    desired = lifted(goal.desired[found], _depth_at_goal(goal.depth_m, now, found))
-    if not (fixes_orientation(seen) and fixes_orientation(desired)):
-        return UNDETERMINED, Quadratic(np.zeros((6, 6)), np.zeros(6), 0.0)
-    return FINE, pose_quadratic(goal.decay, seen, desired)
+@njit(cache=True, error_model="numpy")
+def _gain(row: FloatArray) -> GainNumbers:
+    return GainNumbers(row[0], row[1], row[2])
 
 
-def _tracking_goal(
-    goal: TrackingGoal, now: FeatureState, found: BoolArray
-) -> tuple[int, Quadratic]:
-    columns = np.empty((len(now.points), 7))
-    columns[:, :2], columns[:, 2:4], columns[:, 5:] = now.points, goal.desired[found], now.flow
-    columns[:, 4] = now.depth
-    return FINE, tracking_quadratic(columns, goal.focal_px, goal.gains, 1.0, np.zeros(6))
-
-
-@by_type({PointGoal: _point_goal, PoseGoal: _pose_goal, TrackingGoal: _tracking_goal})
-def quadratic_of(goal: Any, now: FeatureState, found: BoolArray) -> tuple[int, Quadratic]:
-    """Return the quadratic of an objective for the features found; or why there is none."""
-    raise NotImplementedError
-
-
-def _with_flow(_motion: PredictedMotion, now: FeatureState, desired: FloatArray) -> FloatArray:
-    columns = np.empty((len(desired), 7))
-    columns[:, :2], columns[:, 2:4], columns[:, 5:] = now.points, desired, now.flow
-    columns[:, 4] = now.depth
-    return columns
-
-
-def _without_flow(_motion: AsMeasured, now: FeatureState, desired: FloatArray) -> FloatArray:
-    columns = np.empty((len(desired), 5))
+@njit(cache=True, error_model="numpy")
+def _columns(now: FeatureState, desired: FloatArray, with_flow: bool) -> FloatArray:
+    """Return features as the kernels of optimal tracking take them, (M, 5), or (M, 7) with flow."""
+    columns = np.empty((len(desired), 7 if with_flow else 5))
     columns[:, :2], columns[:, 2:4], columns[:, 4] = now.points, desired, now.depth
+    if with_flow:
+        columns[:, 5:] = now.flow
     return columns
-
-
-@by_type({AsMeasured: _without_flow, PredictedMotion: _with_flow})
-def tracking_columns(_motion: Any, now: FeatureState, desired: FloatArray) -> FloatArray:
-    """Return features as `optimal_tracking_tick` takes them, (M, 5), or (M, 7) with flow."""
-    raise NotImplementedError
 
 
 def _by_inverse(
     solver: InverseSolver, state: ProgramState, wish: Wish
 ) -> tuple[ProgramState, LawTick]:
-    now, H, g = wish.now, wish.quadratic.H, wish.quadratic.g
-    tick = pseudo_inverse_rates(now.chain, now.q, solver.rate_max, H, g, np.zeros(len(now.q)))
+    now, total, secondary = wish.now, wish.total, np.zeros(len(wish.now.q))
+    if len(total.g_joints):
+        secondary[:] = np.linalg.solve(total.H_joints, total.g_joints)
+    if solver.damped:
+        rates, _ = damped_rates(
+            now.chain, now.q, solver.rate_max, total.H, total.g, secondary, solver.singular_below
+        )
+        return state, LawTick(rates, FINE, np.nan)
+    tick = pseudo_inverse_rates(now.chain, now.q, solver.rate_max, total.H, total.g, secondary)
     end = SINGULAR if tick.sigma < solver.singular_below else FINE
     return state, LawTick(tick.rates, end, tick.sigma)
 
@@ -209,7 +227,7 @@ def _by_inverse(
 def _by_program(
     solver: ProgramSolver, state: ProgramState, wish: Wish
 ) -> tuple[ProgramState, LawTick]:
-    now, features, found = wish.now, wish.features, wish.now.image.found
+    now, features, found, total = wish.now, wish.features, wish.now.image.found, wish.total
     n, faces, none = len(now.q), np.empty((0, 6)), np.empty(0)
     if solver.surface_known:
         here, goal = lifted(features.points, features.depth), solver.goal
@@ -219,16 +237,16 @@ def _by_program(
     problem = Problem(
         now.q,
         now.velocity,
-        wish.quadratic.H,
-        wish.quadratic.g,
+        total.H,
+        total.g,
         pack_features(features.points, features.flow, features.depth, None),
         np.zeros(n),
-        np.empty((0, 0)),
-        none,
+        total.H_joints,
+        total.g_joints,
         np.empty((0, 0)),
         0.0,
         features.depth_share,
-        wish.quadratic.variance,
+        total.variance,
         faces,
         solver.surface_known,
     )
@@ -239,20 +257,18 @@ def _by_program(
 
 @by_type({InverseSolver: _by_inverse, ProgramSolver: _by_program})
 def solved_by(solver: Any, state: ProgramState, wish: Wish) -> tuple[ProgramState, LawTick]:
-    """Return the joint rates that serve an objective best, and the solver's state after it."""
+    """Return the joint rates that serve the objectives best, and the solver's state after it."""
     raise NotImplementedError
 
 
 def _point_law_tick(law: PointLaw, memory: LawMemory, now: Moment) -> tuple[LawMemory, LawTick]:
     motion, features = features_now(law.motion, memory.motion, now)
     features = _found(features, now.image.found)
-    end, quadratic = quadratic_of(law.goal, features, now.image.found)
-    if not (np.isfinite(quadratic.H).all() and np.isfinite(quadratic.g).all()):
-        end = NONSENSE
-    if end != FINE:
+    end, total = _total(law.goal, features, now.image, now.q)
+    if end != FINE or not total.H.any():
         after = LawMemory(motion, memory.program)
         return after, LawTick(np.zeros(len(now.q)), end, float(len(features.points)))
-    program, tick = solved_by(law.solver, memory.program, Wish(now, features, quadratic))
+    program, tick = solved_by(law.solver, memory.program, Wish(now, features, total))
     return LawMemory(motion, program), tick
 
 
@@ -261,7 +277,7 @@ def _tracking_law_tick(
 ) -> tuple[LawMemory, LawTick]:
     motion, features = features_now(law.motion, memory.motion, now)
     features, desired = _found(features, now.image.found), law.desired[now.image.found]
-    columns = tracking_columns(law.motion, features, desired)
+    columns = _columns(features, desired, law.feeds_forward)
     answer, n = np.empty(len(now.q) + 10), len(now.q)
     optimal_tracking_tick(law.setup.weights, law.setup.joints, now.q, columns, answer)
     sigma = answer[n + 9]

@@ -131,11 +131,10 @@ class Servo:
             reference: constant, of points.
             covariance_px: of every point in every image, (2, 2); a multiple of the unit matrix.
         """
-        if not len(self._terms) == len(self._cameras) == 1 or self._terms[0].weight != 1.0:
+        if len(self._cameras) > 1 or self._goals.free:
             return None
-        objective = self._terms[0].objective
         return compile_law(
-            self._arm, self._main, objective, self._solver, self._kernel, reference, covariance_px
+            self._arm, self._main, self._terms, self._solver, self._kernel, reference, covariance_px
         )
 
     @property

@@ -24,13 +24,16 @@ class ServoGoals:
     Args:
         terms: the objectives of the servo.
         cameras: of the servo, the main one first.
+
+    Attributes:
+        free: the cameras whose features alone say where they should come to.
     """
 
     def __init__(self, terms: Sequence[Term], cameras: Mapping[str, ServoCamera]) -> None:
         self._cameras, self._first = cameras, next(iter(cameras))
         features = {name: _features(terms, name) for name in cameras}
         self._features = {name: known for name, known in features.items() if known}
-        self._free = {name for name in self._features if _only_features(terms, name)}
+        self.free = {name for name in self._features if _only_features(terms, name)}
 
     def added(
         self, command: JointCommand, states: Mapping[str, CameraState], reference: Reference
@@ -68,7 +71,7 @@ class ServoGoals:
             return _Goal({}, None)
         now = Points(camera.normalize(view.points_px[found]), state.depth_m)
         desired = Points(camera.normalize(desired_px[found]), state.desired.depth_m)
-        nearest = nearest_points(features, now, desired) if name in self._free else None
+        nearest = nearest_points(features, now, desired) if name in self.free else None
         points_px = None
         if nearest is not None:
             points_px = desired_px.copy()

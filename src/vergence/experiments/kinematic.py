@@ -56,8 +56,15 @@ def is_quick(cell: Cell) -> bool:
         return False
     few = len(cell.target.features or ()) < 4  # more of them give the depth
     as_it_is = law.feed_forward is False and not law.prediction and (few or law.depth is not None)
-    tracking = isinstance(law.objective, OptimalTracking) and isinstance(law.solver, PseudoInverse)
-    return is_ideal(cell) and tracking and as_it_is and len(law.objectives) == 1
+    alone = len(law.objectives) == 1 and law.objectives[0].weight == 1.0
+    return (
+        is_ideal(cell)
+        and alone
+        and isinstance(law.objective, OptimalTracking)
+        and law.objective.measure == "squared"
+        and isinstance(law.solver, PseudoInverse)
+        and as_it_is
+    )
 
 
 class KinematicRuns:

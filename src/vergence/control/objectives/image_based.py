@@ -20,7 +20,14 @@ from vergence.control.objectives.objective import (
     least_squares_kernel,
     state_of,
 )
-from vergence.features import Feature, Points, interaction_matrix_points
+from vergence.features import Feature, Points
+from vergence.features.compiled_features import (
+    COMPILED_FEATURES,
+    POINTS,
+    feature_drift,
+    feature_interaction,
+    feature_value,
+)
 from vergence.part_answers import checked
 from vergence.parts import knob, part, slot
 
@@ -30,8 +37,9 @@ _ALL_ONE = np.empty((0, 2, 2))
 
 
 class PointDecay(NamedTuple):
-    """The numbers of the objective for image points."""
+    """The numbers of the objective for a feature that kernels know."""
 
+    feature: int  # of `COMPILED_FEATURES`
     gain: GainNumbers
     interaction: int  # where L is evaluated: at the present points, the desired ones, or both
     damping: float
@@ -60,16 +68,17 @@ class ImageBased:
         desired = state.desired_points
         assert desired is not None
         desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
-        if self.feature is Points or not len(state.points):
+        feature = COMPILED_FEATURES.get(self.feature) if len(state.points) else POINTS
+        if feature is not None:
             velocity, weights = state.desired_velocity, state.weights
             result: Quadratic = point_quadratic(
-                self.numbers,
+                self.numbers(feature),
                 state.points,
                 state.depth_m,
                 desired,
                 desired_depth,
                 state.flow if velocity is None else state.flow - velocity,
-                _ALL_ONE if weights is None else weights,
+                _ALL_ONE if weights is None or feature != POINTS else weights,
                 state.variance,
             )
             return result
@@ -81,11 +90,10 @@ class ImageBased:
         L = checked(now, "interaction", self._interaction(now, goal), (len(error), 6))
         return least_squares(L, rows, damping=self.damping)
 
-    @property
-    def numbers(self) -> PointDecay:
-        """The objective's numbers, for kernels."""
+    def numbers(self, feature: int) -> PointDecay:
+        """Return the objective's numbers, with those of a feature of `COMPILED_FEATURES`."""
         where = get_args(InteractionModel).index(self.interaction)
-        return PointDecay(gain_numbers(self.gain), where, self.damping)
+        return PointDecay(feature, gain_numbers(self.gain), where, self.damping)
 
     def twist(self, features: Points, desired: Points) -> FloatArray:
         """Return v_camera (6,) of this objective alone, for a stationary target.
@@ -117,7 +125,7 @@ def point_quadratic(
     weights: FloatArray,
     variance: float,
 ) -> Quadratic:
-    """Return the quadratic of `ImageBased` for image points.
+    """Return the quadratic of `ImageBased` for a feature that kernels know.
 
     Args:
         decay: the objective's numbers.
@@ -126,22 +134,24 @@ def point_quadratic(
         desired: s_star, (M, 2).
         desired_depth_m: (M,).
         drift: ∂s/∂t - ∂s_star/∂t, (M, 2), 1/s.
-        weights: roots of the weights of each point, (M, 2, 2); (0, 2, 2) if all are 1.
+        weights: roots of the weights of each image point, (M, 2, 2); (0, 2, 2) if all are 1.
         variance: of a point's weighted row.
     """
-    error = points - desired
-    largest = np.max(np.abs(error)) if len(error) else 0.0
-    gain = falling_gain(decay.gain, largest)
-    change = -gain * error - drift
+    feature = decay.feature
+    error = feature_value(feature, points, depth_m)
+    error -= feature_value(feature, desired, desired_depth_m)
+    gain = falling_gain(decay.gain, np.max(np.abs(error)) if len(error) else 0.0)
+    rows = -gain * error - feature_drift(feature, drift)
     if decay.interaction == _CURRENT:
-        L = interaction_matrix_points(points, depth_m)
+        L = feature_interaction(feature, points, depth_m)
     else:
-        L = interaction_matrix_points(desired, desired_depth_m)
+        L = feature_interaction(feature, desired, desired_depth_m)
         if decay.interaction == _MEAN:
-            L = 0.5 * (interaction_matrix_points(points, depth_m) + L)
+            L = 0.5 * (feature_interaction(feature, points, depth_m) + L)
     for j in range(len(weights)):
-        change[j] = weights[j] @ change[j]
+        rows[2 * j : 2 * j + 2] = weights[j] @ rows[2 * j : 2 * j + 2]
         L[2 * j : 2 * j + 2] = weights[j] @ L[2 * j : 2 * j + 2]
-    rows = change.reshape(len(L))
     quadratic = least_squares_kernel(L, rows, np.ones(len(L)), np.full(6, decay.damping))
+    if feature != POINTS:
+        variance = 0.0
     return Quadratic(quadratic.H, quadratic.g, gain * gain * variance)

@@ -136,23 +136,25 @@ class DampedPseudoInverse:
     def bind(self, setting: Setting) -> BoundSolver:
         """Return the solver for one arm."""
         _require_no_limits(setting, "damped_pseudo_inverse")
-        return _BoundDampedPseudoInverse(self, setting.arm)
+        return BoundDampedPseudoInverse(self, setting.arm)
 
 
-class _BoundDampedPseudoInverse:
+class BoundDampedPseudoInverse:
+    """The damped pseudo-inverse for one arm."""
+
     names: tuple[str, ...] = KIND_NAMES
     keeps_limits = False
     view = UNBOUNDED
 
     def __init__(self, numbers: DampedPseudoInverse, arm: Arm) -> None:
-        self._numbers, self._arm = numbers, arm
+        self.singular_below, self._arm = numbers.singular_below, arm
 
     def solve(self, problem: Problem) -> Solution:
         """Return the joint rates for one tick."""
         arm, secondary = self._arm, secondary_rates(problem)
         rates, v_tip = damped_rates(
             arm.chain, problem.q, arm.rate_max, problem.H, problem.g, secondary,
-            self._numbers.singular_below,
+            self.singular_below,
         )  # fmt: skip
         none = np.zeros(len(KIND_NAMES))
         return Solution(rates, v_tip, np.nan, np.nan, none, none, True)
