@@ -106,6 +106,25 @@ def test_runs_in_folders_of_one_name_are_told_apart(tmp_path: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
 
 
+def test_what_only_one_of_the_runs_has_is_named(runs: dict[str, Recording]) -> None:
+    slow, quick = runs.values()
+    assert "not compared" not in make_pair(runs, dict.fromkeys(runs, ""))
+    renamed = replace(quick, cameras={"wall": quick.cameras["wrist"]}, arms={"other": _arm(quick)})
+    info = replace(quick.info, arms={"other": next(iter(quick.info.arms.values()))})
+    page = make_pair(
+        {"slow": slow, "quick": replace(renamed, info=info)}, {"slow": "", "quick": ""}
+    )
+    arm = next(iter(slow.arms))
+    assert (
+        "Only in one of the runs, so not compared: "
+        f"camera wrist and arm {arm} of slow; camera wall and arm other of quick." in page
+    )
+
+
+def _arm(run: Recording) -> object:
+    return next(iter(run.arms.values()))
+
+
 def test_a_second_run_without_a_recording_is_named(
     runs: dict[str, Recording], tmp_path: Path
 ) -> None:

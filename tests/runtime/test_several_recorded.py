@@ -1,9 +1,12 @@
 """What is kept of several targets: in memory, in a recording, in its report and on the page."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import vergence as vg
+from vergence.app.marks_legend import marks_legend
 from vergence.app.recorded_poses import RecordedPoses
 from vergence.app.recorded_world import RecordedWorld
 from vergence.app.report import make_report
@@ -82,7 +85,8 @@ def test_report_table_and_page_tell_of_each(both: tuple[Run, Recording]) -> None
     page = make_report(recording)
     for name in ("wedge", "block"):
         assert f"Target {name}" in page
-        assert f"final target {name} error" in page
+        for what in ("position", "rotation"):
+            assert f"final target {name} error, {what}" in page
         assert f"target {name}" in [c.partition(".")[0] for c in _columns(run)]
     playback = Playback(recording, None)
     keys = [plot.key for plot in playback.plots]
@@ -90,6 +94,17 @@ def test_report_table_and_page_tell_of_each(both: tuple[Run, Recording]) -> None
     (hand,) = (view for view in playback.views(1.0) if view.camera == "hand")
     (wedge,) = hand.header["others"]
     assert len(wedge["points"]) == 6
+
+
+def test_the_marks_of_every_target_are_explained(both: tuple[Run, Recording]) -> None:
+    recording = both[1]
+    own = recording.cameras["right"]
+    none = replace(own, found=np.zeros_like(own.found))
+    unseen = replace(recording, cameras={**recording.cameras, "right": none})
+    assert unseen.others["wedge"].cameras["right"].found.any()
+    assert "tracked" in marks_legend(unseen, "right")
+    nothing = replace(unseen, others={})
+    assert "tracked" not in marks_legend(nothing, "right")
 
 
 def _columns(run: Run) -> list[str]:

@@ -223,4 +223,4 @@ def reasons_table(results: "Sequence[TrialResult]", name: str) -> str:
         f'<td class="note">{escape(_why(result))}</td></tr>'
         for result in failed
     )
-    return f"<table><tbody>\n{lines}\n</tbody></table>" if failed else ""
+    return f'<table class="reasons"><tbody>\n{lines}\n</tbody></table>' if failed else ""

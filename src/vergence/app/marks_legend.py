@@ -4,7 +4,7 @@ import numpy as np
 
 from vergence.app import markup
 from vergence.app.overlay import DESIRED, FOUND, LOST, TRUE, UNASKED, WINDOW, web_color
-from vergence.runtime.results import CameraTrace
+from vergence.runtime.results import CameraTrace, Run
 
 _INK = {
     "tracked": (
@@ -24,8 +24,14 @@ _INK = {
 }
 
 
-def marks_legend(trace: CameraTrace) -> str:
-    """Return the marks that occur in a camera's images, with their meaning."""
+def marks_legend(run: Run, camera: str) -> str:
+    """Return the marks that occur in a camera's images, of whichever target, with their meaning."""
+    found = {name for trace in run.seen_by(camera) for name in _occurring(trace)}
+    return markup.marks({name: ink for name, ink in _INK.items() if name in found})
+
+
+def _occurring(trace: CameraTrace) -> list[str]:
+    """Return the names of the marks of one target."""
     known = np.isfinite(trace.points_px[..., 0])
     occurs = {
         "tracked": trace.found,
@@ -35,4 +41,4 @@ def marks_legend(trace: CameraTrace) -> str:
         "desired": np.isfinite(trace.desired_px),
         "true": np.isfinite(trace.true_px),
     }
-    return markup.marks({name: _INK[name] for name, where in occurs.items() if where.any()})
+    return [name for name, where in occurs.items() if where.any()]

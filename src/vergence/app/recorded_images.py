@@ -41,8 +41,7 @@ def camera_images(recording: Recording, camera: str) -> CameraImages:
     film = film_numbers(count)
     key = {round(number) for number in np.linspace(0, count - 1, _KEY_FRAMES)} if count else set()
     number_at = {time: number for number, time in enumerate(times)}
-    seen = (recording.cameras, *(other.cameras for other in recording.others.values()))
-    traces = [traces[camera] for traces in seen if len(traces[camera].time)]
+    traces = recording.seen_by(camera)
     frames, key_frames = [], []
     for time, image in recording.images(camera, only={*film, *key}):
         number = number_at[time]

@@ -157,7 +157,7 @@ def _images(run: Run, camera: str) -> tuple[str, str]:
     if not isinstance(run, Recording):
         return "", ""
     images = camera_images(run, camera)
-    player = markup.film(images.film, f"images of {camera}", marks_legend(run.cameras[camera]))
+    player = markup.film(images.film, f"images of {camera}", marks_legend(run, camera))
     return player, markup.stills(images.key_frames)
 
 

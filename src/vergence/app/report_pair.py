@@ -12,6 +12,7 @@ from vergence.app.report import page_at
 from vergence.app.robot_film import robot_film
 from vergence.app.signals_csv import write_signals
 from vergence.app.table import Row, arm_rows, camera_rows, run_rows
+from vergence.errors import listed
 from vergence.runtime.recording import Recording
 
 Runs = Mapping[str, Recording]  # by the name that distinguishes them
@@ -97,7 +98,25 @@ def _summary(runs: Runs, cameras: Sequence[str], arms: Sequence[str]) -> str:
     for name in arms:
         rows = [arm_rows(run.info.arms[name], run.arms[name]) for run in runs.values()]
         tables.append(_table(markup.titled("Arm", name), runs, rows))
-    return markup.section("Summary", *tables)
+    return markup.section("Summary", *tables, _left_out(runs))
+
+
+def _left_out(runs: Runs) -> str:
+    """Say which cameras and arms only one run has: they are not compared."""
+    alone = []
+    for label, run in runs.items():
+        others = [other for other in runs.values() if other is not run]
+        own = [f"camera {name}" for name in run.cameras if _misses(name, others, "cameras")]
+        own += [f"arm {name}" for name in run.arms if _misses(name, others, "arms")]
+        if own:
+            alone.append(f"{listed(own)} of {label}")
+    if not alone:
+        return ""
+    return f"<p>Only in one of the runs, so not compared: {escape('; '.join(alone))}.</p>"
+
+
+def _misses(name: str, runs: Sequence[Recording], kind: str) -> bool:
+    return any(name not in getattr(run, kind) for run in runs)
 
 
 def _task_rows(run: Recording) -> list[Row]:
@@ -155,7 +174,7 @@ def _camera(runs: Runs, name: str) -> str:
         markup.film(
             camera_images(run, name).film,
             f"{name}, {label}",
-            f"{escape(label)}<br>{marks_legend(run.cameras[name])}",
+            f"{escape(label)}<br>{marks_legend(run, name)}",
         )
         for label, run in runs.items()
     ]

@@ -1,5 +1,6 @@
 """The numbers of a run at the top of its report."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -197,6 +198,9 @@ _NOTES = {
     "max_pose_error": "between the camera's true and desired pose, any image",
 }
 
+_OF_ONE_TARGET = re.compile("_target_.+_error$")  # in the name of a number
+_OF_A_POSE = {"m": "position", "°": "rotation"}
+
 _UNITS = {
     "_m_s": "m/s",
     "_rad_s": "rad/s",
@@ -216,9 +220,11 @@ def _summary_row(name: str, value: float | str) -> Row:
     ending = next((end for end in _UNITS if name.endswith(end)), "")
     stem = name.removesuffix(ending)
     words = stem.replace("_", " ").replace("max ", "largest ").replace("min ", "least ")
-    unit, note = _UNITS.get(ending, ""), _NOTES.get(stem, "")
+    unit, note = _UNITS.get(ending, ""), _NOTES.get(_OF_ONE_TARGET.sub("_target_error", stem), "")
     if isinstance(value, str):
         return Row(words, value, unit, note)
+    if note and unit in _OF_A_POSE:
+        words += f", {_OF_A_POSE[unit]}"
     if unit == "m" and abs(value) < 0.1:
         value, unit = 1e3 * value, "mm"
     return Row(words, f"{value:.3g}", unit, note)

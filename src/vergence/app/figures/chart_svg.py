@@ -13,7 +13,7 @@ from vergence.app.figures.axis import range_of, thinned, ticks
 from vergence.app.figures.chart import Band, Chart, Curve, Marks, Panel, Shade
 from vergence.arrays import BoolArray, FloatArray
 
-WIDTH, LEFT, RIGHT = 940.0, 62.0, 14.0  # of the whole, and free beside the axes
+WIDTH, LEFT, RIGHT = 940.0, 70.0, 14.0  # of the whole, and free beside the axes
 _IMAGE_WIDTH = 420.0  # of an image's frame with its margin
 _TITLE, _EVENTS, _TICKS, _GAP = 24.0, 14.0, 18.0, 10.0  # heights around a panel
 _HEIGHT, _ROW, _BAR = 140.0, 36.0, 12.0  # heights of a panel, of a row of stretches, of its bar
@@ -211,7 +211,7 @@ def _stretches(axes: _Axes) -> Iterator[str]:
     for row, name in enumerate(panel.rows):
         y = axes.top + _ROW * row + 0.7 * _ROW
         yield f'<path class="grid" d="M{axes.left:.0f} {y:.1f}H{axes.right:.0f}"/>'
-        yield _text(axes.left, y - 10, name, "")
+        yield _text(axes.left + 5, y - 10, name, "")  # beside a line at the start
     for one in panel.stretches:
         y = axes.top + _ROW * one.row + 0.7 * _ROW - 0.5 * _BAR
         for start, length in one.spans:

@@ -69,6 +69,11 @@ class Run:
         cameras = (trace.received for trace in self.cameras.values())
         return max((float(time[-1]) for time in (*arms, *cameras) if len(time)), default=0.0)
 
+    def seen_by(self, camera: str) -> list[CameraTrace]:
+        """Return what a camera observed of each target in at least one image, the task's first."""
+        of_each = (self.cameras, *(other.cameras for other in self.others.values()))
+        return [traces[camera] for traces in of_each if len(traces[camera].time)]
+
     @property
     def pose_errors(self) -> PoseErrors:
         """Errors of the estimated pose, and of the task's camera, against the truth."""
