@@ -27,6 +27,7 @@ extensions = [
     "docstrings",
     "gallery",
     "mathml",
+    "public_names",
     "references",
     "table_names",
 ]

@@ -1,4 +1,4 @@
-"""Names in tables may break after `_` and `.`, so that on a narrow screen no word is cut."""
+"""Lines in tables: names may break after `_` and `.`, and a number stays beside its unit."""
 
 import re
 from typing import Any
@@ -7,6 +7,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 
 _AFTER = re.compile(r"(?<=[A-Za-z\]][_.])(?=\w)")
+_QUANTITY = re.compile(r"-?[\d.]+(e[-+]?\d+)? (\S{1,4}|of \d+)")  # "0.85 px", "4 of 4"
 
 
 def let_break(doctree: nodes.document) -> None:
@@ -23,8 +24,17 @@ def let_break(doctree: nodes.document) -> None:
                 literal += nodes.Text(part)
 
 
+def keep_together(doctree: nodes.document) -> None:
+    """Keep numbers in the tables of a page on the line of their units."""
+    for entry in doctree.findall(nodes.entry):
+        if _QUANTITY.fullmatch(entry.astext()):
+            for text in list(entry.findall(nodes.Text)):
+                text.parent.replace(text, nodes.Text(text.replace(" ", "\u00a0")))
+
+
 def _resolved(app: Sphinx, doctree: nodes.document, page: str) -> None:
     let_break(doctree)
+    keep_together(doctree)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

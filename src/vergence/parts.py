@@ -15,7 +15,7 @@ from vergence.validation import explain
 
 C = TypeVar("C", bound=type)
 
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(gt=0)]  # a number above zero, as the type of a field
 
 
 class Slot(NamedTuple):

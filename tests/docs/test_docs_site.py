@@ -1,6 +1,7 @@
 """The documentation holds what it promises: an entry for every citation, a page for every room."""
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,9 @@ from command_line import reference as commands
 from docutils import nodes
 from docutils.utils import new_document
 from gallery import gallery
-from table_names import let_break
+from public_names import described, meaning
+from public_names import reference as public_names
+from table_names import keep_together, let_break
 
 import vergence
 from vergence.cell import schema
@@ -47,6 +50,16 @@ def rooms() -> list[str]:
 def test_every_room_is_in_the_api(room):
     assert f"automodule:: vergence.{room}\n" in (API / f"{room}.md").read_text()
     assert f"api/{room}\n" in (API.parent / "api.md").read_text()
+
+
+@pytest.mark.parametrize("name", vergence.__all__)
+def test_every_public_name_is_described_on_one_page_and_listed_with_its_meaning(name):
+    pages = "".join(page.read_text() for page in API.glob("*.md"))
+    module = described(name).removesuffix(f".{name}")
+    assert f"automodule:: {module}\n" in pages or f":: {module}.{name}\n" in pages
+    assert getattr(import_module(module), name) is getattr(vergence, name)
+    assert f"`{name} <{module}.{name}>` | {meaning(name)[:10]}" in "\n".join(public_names())
+    assert meaning(name).endswith(".")
 
 
 def test_every_key_of_a_cell_file_says_what_it_means():
@@ -99,6 +112,17 @@ def test_names_in_tables_break_after_underscores_and_dots_and_nowhere_else():
     shown = ["".join(child.astext() for child in name) for name in page.findall(nodes.literal)]
     broken = "law.<wbr>optimal_<wbr>tracking"
     assert shown == [broken, "0.5 s; a, b", "law.optimal_tracking"]
+
+
+def test_a_number_in_a_table_stays_beside_its_unit():
+    page = new_document("page")
+    told = ["0.85 px", "4 of 4", "-2.4e-05 m/s", "1.2 (1.1 ... 1.3)", "2 motions possible"]
+    page += [nodes.entry("", nodes.paragraph("", text)) for text in told]
+    page += nodes.paragraph("", "0.85 px")
+    keep_together(page)
+    kept = [text.replace(" ", "\u00a0") for text in told[:3]]
+    assert [entry.astext() for entry in page.findall(nodes.entry)] == [*kept, *told[3:]]
+    assert page.children[-1].astext() == "0.85 px"
 
 
 def test_the_gallery_has_every_cell_with_its_image():

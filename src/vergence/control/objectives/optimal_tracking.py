@@ -42,7 +42,7 @@ class Avoidance(NamedTuple):
 
 @part("objective", "optimal_tracking")
 class OptimalTracking:
-    """F = (x - x_D)ᵀ Q (x - x_D) + uᵀ R u + S / w'(q), [Nelson1995] eq. (28).
+    """Minimises F = (x - x_D)ᵀ Q (x - x_D) + uᵀ R u + S / w'(q), [Nelson1995] eq. (28).
 
     Penalises feature errors, camera motion and poor configurations of the arm. The paper's two-axis
     and four-axis strategies are choices of `axes`; with three or more features and all six axes it

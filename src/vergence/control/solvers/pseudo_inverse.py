@@ -44,7 +44,7 @@ def singular_fault(sigma: float, singular_below: float) -> tuple[OutcomeKind, st
 
 @part("solver", "pseudo_inverse")
 class PseudoInverse:
-    """v = H⁻¹ g, q̇ = J⁺ v + (I - J⁺ J) q̇_null, scaled uniformly to satisfy the rate limits.
+    """Solves without limits: v = H⁻¹ g, q̇ = J⁺ v + (I - J⁺ J) q̇_null, scaled to the rate limits.
 
     Ends the run near a singularity.
     """

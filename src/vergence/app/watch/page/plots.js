@@ -300,6 +300,6 @@ function ticks(low, high, count) {
 function label(value, low, high) {
   const size = Math.max(Math.abs(low), Math.abs(high));
   if (value === 0) return "0";
-  if (size < 1e-3 || size >= 1e5) return value.toExponential(1);
-  return String(Number(value.toPrecision(6)));
+  const plain = size >= 1e-3 && size < 1e5;
+  return (plain ? String(Number(value.toPrecision(6))) : value.toExponential(1)).replaceAll("-", "−");
 }
