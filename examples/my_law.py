@@ -33,10 +33,13 @@ class TransposeLaw:
         self, observation: Observation, reference: Reference, joints: JointState
     ) -> JointCommand:
         """Return joint rates for the next outer period."""
-        seen = self._camera.normalize(observation.views[-1].points_px)
-        error = (seen - self._camera.normalize(reference.points_px)).ravel()
-        L = vg.Points(seen, self._depth_m).interaction()
-        v_camera = -self._gain * L.T @ error
+        view = observation.views[-1]
+        points_px = np.array([view.points_px, reference.points_px])[:, view.found]
+        if not len(points_px[0]):
+            return JointCommand(np.zeros(len(joints.position)), np.zeros(6))
+        seen, desired = map(self._camera.normalize, points_px)
+        L = vg.Points(seen, self._depth_m[view.found]).interaction()
+        v_camera = -self._gain * L.T @ (seen - desired).ravel()
         return JointCommand(
             np.linalg.pinv(self._arm.jacobian(joints.position)) @ v_camera, v_camera
         )

@@ -154,6 +154,15 @@ def test_a_whole_law_beside_the_cell_runs_and_is_compared(tmp_path: Path) -> Non
     assert "my_law:Transpose (as in the cell)" in law_choices(cell)
 
 
+def test_a_law_of_ones_own_goes_on_with_the_points_that_are_found(tmp_path: Path) -> None:
+    motion = '{ kind = "line", velocity_m_s = [1.0, 0.0, 0.0], distance_m = 3.0 }'
+    settings = {"duration_s": "3", "task.feature_count": "4", "target.motion": motion}
+    law = {"law": '{ kind = "my_law:Transpose" }'}
+    run = run_cell(own(tmp_path, "puma560", settings | law), images=False)
+    assert run.outcome.kind is OutcomeKind.TARGET_LOST
+    assert set(run.cameras["wrist"].found.sum(axis=1)) == {4, 2, 0}  # two points leave first
+
+
 BAD = '''
 import numpy as np
 import vergence as vg
@@ -274,7 +283,7 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("puma560", "task.tracker", "bad:NoTracker", "whose start returned str"),
         ("puma560", "task.tracker", "sdd", "did you mean ssd"),
         ("puma560", "task.planner", "optimised", "does not have; allowed"),
-        ("lippiello2005", "perception.filter", "bad:Halves", "has no method update"),
+        ("lippiello2005", "perception.filter", "bad:Halves", "methods start, predict and update"),
         ("lippiello2005", "perception.filter", "kalman", "pose, rpy, or module:Class"),
     ],
 )

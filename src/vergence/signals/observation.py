@@ -48,7 +48,8 @@ class ImagePoints:
 
     camera: str
     time: float  # s, of exposure
-    points_px: FloatArray  # (M, 2); where a point was not found, its last or predicted place
+    # (M, 2); of a point that was not found the last or predicted place, or NaN.
+    points_px: FloatArray
     covariance_px: FloatArray  # (M, 2, 2) px²
     found: BoolArray  # (M,)
     reasons: tuple[str, ...]  # (M,) empty where found, else why not
