@@ -57,6 +57,8 @@ def test_an_objective_beside_the_cell_runs_and_is_compared(folder: Path) -> None
         ("law.gian", "1", "did you mean gain?"),
         ("law.kind", "mine:Center", "mine has no Center; its parts: Centre (did you mean Centre?)"),
         ("law.kind", "nowhere:Centre", "but no nowhere.py is in "),
+        ("law.kind", "mine:Center", "allowed: a class declared as objective or law"),
+        ("law.kind", "lacking:Law", "has no method bind; allowed: a class with the method bind"),
         ("law.kind", "mine:vg", "is not a class"),
         ("law.kind", "pathlib:Path", "declared as nothing"),
         ("law.solver", "mine:Centre", "declared as objective"),
@@ -69,6 +71,9 @@ def test_a_part_that_cannot_be_used_is_named_with_key_and_reason(
     folder: Path, key: str, value: str, said: str
 ) -> None:
     (folder / "broken.py").write_text("1 / 0")
+    (folder / "lacking.py").write_text(
+        "from vergence.parts import part\n@part('law')\nclass Law:\n    gain: float = 1.0\n"
+    )
     declared = "from vergence.parts import part\n@part('objective')\nclass X:\n"
     (folder / "empty.py").write_text(f"{declared}    gain: float = 1.0\n")
     (folder / "raising.py").write_text(

@@ -9,7 +9,7 @@ from vergence.errors import NOTHING, Absent, InputError, VergenceError
 from vergence.part_answers import PartError
 from vergence.parts import Slot, field_names, is_part, kind_of, slots_of
 from vergence.raised import raised
-from vergence.registry import find, kinds
+from vergence.registry import IncompletePartError, find, kinds
 
 
 class Place(NamedTuple):
@@ -70,12 +70,12 @@ def asking(part: Any, source: str, key: str) -> Iterator[None]:
         raise InputError(source, key, given, "a part that works in this cell") from error
 
 
-def part_class(role: str, kind: Any, place: Place) -> Any:
+def part_class(role: str, kind: Any, place: Place, or_role: str = "") -> Any:
     """Return the class of a kind, see `registry.find`."""
     key = f"{place.key}.kind" if place.key else "kind"
     if not isinstance(kind, str):
         raise InputError(place.source, key, kind, "a name")
-    return find(role, kind, folder=place.folder, source=place.source, key=key)
+    return find(role, kind, folder=place.folder, source=place.source, key=key, or_role=or_role)
 
 
 def names_law(kind: Any, place: Place) -> bool:
@@ -86,6 +86,8 @@ def names_law(kind: Any, place: Place) -> bool:
         return kind in kinds("law")
     try:
         find("law", kind, folder=place.folder)
+    except IncompletePartError:
+        return True  # whoever asks for the law then says what it lacks
     except InputError:
         return False  # whoever asks for an objective then says what is wrong with it
     return True

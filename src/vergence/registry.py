@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from vergence.errors import InputError, nearest
+from vergence.errors import InputError, listed, nearest
 from vergence.raised import raised
 
 ENTRY_POINTS = "vergence.parts"  # each named ROLE.KIND, such as "objective.centre"
@@ -135,8 +135,18 @@ def kinds(role: str) -> tuple[str, ...]:
     return tuple(sorted({*BUILT_IN.get(role, {}), *_installed(role)}))
 
 
+class IncompletePartError(InputError):
+    """A class that is declared for a role, but lacks a method of it."""
+
+
 def find(
-    role: str, kind: str, *, folder: Path | None = None, source: str = "part", key: str = "kind"
+    role: str,
+    kind: str,
+    *,
+    folder: Path | None = None,
+    source: str = "part",
+    key: str = "kind",
+    or_role: str = "",
 ) -> Any:
     """Return the class of a part.
 
@@ -147,6 +157,7 @@ def find(
         folder: where the cell lies.
         source: the file that names it, for messages.
         key: where in that file.
+        or_role: another role whose parts may stand there, for messages.
 
     Raises:
         InputError: if there is no such part, it cannot be imported or does not fit the role.
@@ -157,8 +168,10 @@ def find(
         raise InputError(source, key, kind, allowed)
     name, _, attribute = dotted.partition(":")
 
+    allowed = f"a class declared as {' or '.join(filter(None, (role, or_role)))}"
+
     def refuse(why: str) -> InputError:
-        return InputError(source, key, f"{kind}, {why}", f"a class declared as {role}")
+        return InputError(source, key, f"{kind}, {why}", allowed)
 
     try:
         module = _own_module(name, folder, Path.cwd()) or importlib.import_module(name)
@@ -184,7 +197,9 @@ def find(
         raise refuse(f"which is {what}")
     missing = [method for method in METHODS.get(role, ()) if not hasattr(found, method)]
     if missing:
-        raise refuse(f"which has no method {missing[0]}")
+        given, methods = f"{kind}, which has no method {missing[0]}", METHODS[role]
+        some = f"the method{'s' if len(methods) > 1 else ''} {listed(methods)}"
+        raise IncompletePartError(source, key, given, f"a class with {some}")
     if ":" in kind:
         found.__part_kind__ = kind  # type: ignore[attr-defined]
     return found

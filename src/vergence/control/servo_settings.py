@@ -146,7 +146,7 @@ def _term(given: Any, place: Place, of_law: Collection[str] = ()) -> WeightedObj
     if "kind" not in rest:
         key = f"{place.key}.kind"
         raise InputError(place.source, key, NOTHING, "a value")
-    objective = part_class("objective", rest.pop("kind"), place)
+    objective = part_class("objective", rest.pop("kind"), place, "law" if of_law else "")
     known = {*field_names(objective), *_OF_TERM, *of_law}
     for key in rest:
         if key not in known:
