@@ -3,10 +3,12 @@
 import ast
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import vergence as vg
 from vergence.errors import ShapeError
@@ -81,6 +83,10 @@ def test_laws_are_compared_in_one_table() -> None:
     lines = str(table).splitlines()
     assert lines[0].split()[0] == "law"
     assert [line.split()[0] for line in lines[2:]] == ["image_based", "constrained"]
+    narrow = StringIO()
+    Console(file=narrow, width=80).print(table)
+    assert "collision" not in narrow.getvalue()  # no run ended so
+    assert all(word in narrow.getvalue() for word in ("converged", "off goal", "path (m)"))
     frame = table.to_frame()
     assert list(frame["law"]) == ["image_based"] * 2 + ["constrained"] * 2
     assert frame["final_error_px"].notna().all()

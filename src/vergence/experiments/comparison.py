@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.table import Table
 
-_USUAL = set(Ending) - {Ending.OTHER, Ending.REFUSED}
-
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
@@ -39,7 +37,7 @@ class Comparison:
 
     @property
     def headings(self) -> list[str]:
-        """The names of the table's columns: the usual endings, and others that occurred."""
+        """The names of the table's columns: converged, and all other endings that occurred."""
         return ["law", *(ending.value for ending in self._endings), "time (s)", "path (m)"]
 
     def row(self, score: Score) -> list[str]:
@@ -59,7 +57,8 @@ class Comparison:
 
     @property
     def _endings(self) -> list[Ending]:
-        return [e for e in Ending if e in _USUAL or any(score.count(e) for score in self.scores)]
+        occurred = {result.ending for result in self.runs} | {Ending.CONVERGED}
+        return [ending for ending in Ending if ending in occurred]
 
     def __rich__(self) -> "Table":
         """The table for a terminal."""
@@ -68,7 +67,12 @@ class Comparison:
 
         table = Table(box=box.SIMPLE_HEAD)
         for number, heading in enumerate(self.headings):
-            table.add_column(heading, justify="right" if number else "left", no_wrap=not number)
+            table.add_column(
+                heading,
+                justify="right" if number else "left",
+                no_wrap=not number,
+                min_width=max(map(len, heading.split())),  # a heading breaks between its words
+            )
         for score in self.scores:
             table.add_row(*self.row(score))
         return table

@@ -216,7 +216,7 @@ class View {
  * @param {ImageHeader} header
  */
 function described({ found = [], asked = [], time, reasons = [] }) {
-  const at = `${time.toFixed(2)} s`;
+  const at = `${time.toFixed(2)}\u00a0s`;
   const sought = asked.filter(Boolean).length;
   if (!sought) return `nothing looked for · ${at}`;
   const seen = found.filter(Boolean).length;
