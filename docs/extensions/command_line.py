@@ -42,7 +42,8 @@ def _command(command: Any, name: str) -> Iterator[str]:
     yield from ("```text", f"{name}{usage} [OPTIONS]", "```", "")
     if command.epilog:
         word, _, example = command.epilog.partition(": ")
-        yield from (f"{word}: `{example}`", "")
+        examples = "` or `".join(re.split(" +or +", example))
+        yield from (f"{word}: `{examples}`", "")
     yield from ("| | meaning | default |", "|---|---|---|")
     for parameter in (*arguments, *options):
         cells = (_name(parameter), _meaning(parameter.help or ""), _default(parameter))

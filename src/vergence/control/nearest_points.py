@@ -1,7 +1,7 @@
 """The errors of features, and the nearest view in which they are zero.
 
 A feature such as a size or a centre leaves some motions of the camera free. Its points then never
-come to those of a goal picture, and their distance from there says nothing about the law.
+come to those of a goal image, and their distance from there says nothing about the law.
 """
 
 from collections.abc import Sequence

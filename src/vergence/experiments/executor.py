@@ -22,7 +22,7 @@ _SCHEDULER = "the address of a Dask scheduler, such as tcp://10.0.0.1:8786"
 
 
 class WorkersLostError(VergenceError):
-    """Nobody is left to do some trials, or nobody survives them."""
+    """No worker is left for some trials, or a trial ends every worker that runs it."""
 
     def __init__(self, trials: Sequence[Trial], what: str) -> None:
         first, more = trials[0].key, len(trials) - 1

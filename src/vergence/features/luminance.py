@@ -25,7 +25,7 @@ class Luminance:
         image: grey, (height, width).
         camera: its model.
         depth_m: of what the image shows, one number or (height, width).
-        level: of the pyramid: the image is smoothed and halved so often.
+        level: of the pyramid: how many times the image is smoothed and halved.
 
     Raises:
         InputError: if the image has another size, a depth is not above zero, or the level leaves

@@ -30,8 +30,8 @@ class Curve(NamedTuple):
 def curves_of(joined: IntArray | BoolArray) -> tuple[Curve, ...]:
     """Return the curves of a measurement, from its `joined` (M,); marks alone are none.
 
-    A curve that goes on from the last point closes, as in recordings of before there were several
-    closed curves.
+    A curve that continues from the last point is closed, as in recordings made before an image
+    could have several closed curves.
     """
     numbers = np.arange(len(joined))
     parts = np.split(numbers, numbers[joined != CONTINUES] + 1)
