@@ -154,6 +154,21 @@ def test_a_whole_law_beside_the_cell_runs_and_is_compared(tmp_path: Path) -> Non
     assert "my_law:Transpose (as in the cell)" in law_choices(cell)
 
 
+def test_a_feature_beside_the_cell_is_brought_to_its_desired_value(tmp_path: Path) -> None:
+    settings = {
+        **SHORT,
+        "duration_s": "2",
+        "target.features": "[[0.05, -0.05, 0.0], [-0.05, -0.05, 0.0], [0.0, 0.06, 0.0]]",
+        "task.feature_count": "3",
+        "task.desired": "[[225, 160], [415, 160], [320, 330]]",  # a larger triangle
+        "law": '{ kind = "image_based", feature = "my_feature:Area", gain = 3.0 }',
+    }
+    run = run_cell(own(tmp_path, "puma560", settings), images=False)
+    errors = [abs(of["my_feature:Area"]) for of in run.arms["puma"].errors if of]
+    assert errors[0] > 0.3
+    assert errors[-1] < 0.03 * errors[0]
+
+
 def test_a_law_of_ones_own_goes_on_with_the_points_that_are_found(tmp_path: Path) -> None:
     motion = '{ kind = "line", velocity_m_s = [1.0, 0.0, 0.0], distance_m = 3.0 }'
     settings = {"duration_s": "3", "task.feature_count": "4", "target.motion": motion}

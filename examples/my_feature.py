@@ -1,4 +1,7 @@
-"""A feature of your own, the area of a triangle, stacked with its points."""
+"""A feature of your own, the area of a triangle, stacked with its points.
+
+feature = "my_feature:Area" under [law] uses it in a cell beside this file that tracks three points.
+"""
 
 from pathlib import Path
 
@@ -24,9 +27,10 @@ class Area(vg.Feature):
         return slope.reshape(1, -1) / twice @ vg.Points(self.points, self.depth_m).interaction()
 
 
-triangle = np.array([[-0.1, -0.1], [0.1, -0.1], [0.0, 0.1]])
-near, far = vg.Points(1.2 * triangle, 0.5), vg.Points(triangle, 0.6)
-stack = [vg.Term(vg.ImageBased()), vg.Term(vg.ImageBased(feature=Area), weight=0.5)]
-arm = vg.Arm.from_urdf(Path(__file__).with_name("my_arm.urdf"), tip="tool0")
-q = [0, -1.2, 1.5, -1.6, -1.5, 0]
-print(vg.Servo(arm, vg.Camera(640, 480, focal_px=600), stack).rates(near, far, q))
+if __name__ == "__main__":
+    triangle = np.array([[-0.1, -0.1], [0.1, -0.1], [0.0, 0.1]])
+    near, far = vg.Points(1.2 * triangle, 0.5), vg.Points(triangle, 0.6)
+    stack = [vg.Term(vg.ImageBased()), vg.Term(vg.ImageBased(feature=Area), weight=0.5)]
+    arm = vg.Arm.from_urdf(Path(__file__).with_name("my_arm.urdf"), tip="tool0")
+    q = [0, -1.2, 1.5, -1.6, -1.5, 0]
+    print(vg.Servo(arm, vg.Camera(640, 480, focal_px=600), stack).rates(near, far, q))
