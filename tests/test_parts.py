@@ -57,7 +57,11 @@ def test_an_objective_beside_the_cell_runs_and_is_compared(folder: Path) -> None
         ("law.gian", "1", "did you mean gain?"),
         ("law.kind", "mine:Center", "mine has no Center; its parts: Centre (did you mean Centre?)"),
         ("law.kind", "nowhere:Centre", "but no nowhere.py is in "),
-        ("law.kind", "mine:Center", "allowed: a class declared as objective or law"),
+        (
+            "law.kind",
+            "mine:Center",
+            'a class declared with @vg.objective or declared with @vg.part("law")',
+        ),
         ("law.kind", "lacking:Law", "has no method bind; allowed: a class with the method bind"),
         ("law.kind", "mine:vg", "is not a class"),
         ("law.kind", "pathlib:Path", "declared as nothing"),
@@ -163,7 +167,7 @@ def test_a_cell_runs_with_a_driver_of_ones_own(folder: Path, capsys, monkeypatch
     [
         ("nowhere:Robot", "but no nowhere.py is in "),
         ("no_such_robot", "module:Class"),
-        ("mine:Centre", "declared as objective"),
+        ("mine:Centre", "as objective; allowed: a class that inherits from vg.Driver"),
         ("broken_robot:MyRobot", "which raised OSError: no robot answers"),
     ],
 )

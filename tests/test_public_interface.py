@@ -167,7 +167,7 @@ def test_an_arm_is_read_from_a_urdf_and_ends_where_its_tip_is_put(arm: vg.Arm) -
 
 
 def test_a_mistake_with_an_arm_names_what_is_wrong(arm: vg.Arm, tmp_path: Path) -> None:
-    with pytest.raises(ShapeError, match=r"q has shape \(3,\); it must have shape \(2\)"):
+    with pytest.raises(ShapeError, match=r"q has shape \(3,\); it must have shape \(2,\)"):
         arm.jacobian([0, 0, 0])
     with pytest.raises(vg.InputError, match="a rotation and a translation"):
         arm.with_tip(2 * np.eye(4))

@@ -16,8 +16,13 @@ class ShapeError(VergenceError, ValueError):
 
     def __init__(self, name: str, given: tuple[int, ...], allowed: tuple[int | None, ...]) -> None:
         self.name, self.given, self.allowed = name, given, allowed
-        shape = "(" + ", ".join("any" if n is None else str(n) for n in allowed) + ")"
-        super().__init__(f"{name} has shape {given}; it must have shape {shape}")
+        super().__init__(f"{name} has shape {given}; it must have shape {shape_text(allowed)}")
+
+
+def shape_text(shape: tuple[int | None, ...]) -> str:
+    """Return the shape of an array as Python writes it; None stands for any length."""
+    lengths = ["any" if length is None else str(length) for length in shape]
+    return f"({', '.join(lengths)}{',' if len(lengths) == 1 else ''})"
 
 
 class Absent(str):

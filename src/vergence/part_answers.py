@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vergence.arrays import FloatArray
-from vergence.errors import VergenceError
+from vergence.errors import VergenceError, shape_text
 from vergence.raised import IN_VERGENCE, shown_place
 
 
@@ -46,8 +46,8 @@ def checked(part: Any, method: str, values: ArrayLike, shape: tuple[int | None, 
         allowed in (None, length) for allowed, length in zip(shape, answer.shape, strict=True)
     )
     if not fits:
-        allowed = ", ".join("any" if length is None else str(length) for length in shape)
-        raise refused(part, method, f"an array of shape {answer.shape}", f"shape ({allowed})")
+        needed = f"shape {shape_text(shape)}"
+        raise refused(part, method, f"an array of shape {answer.shape}", needed)
     if is_own(part) and not np.isfinite(answer).all():
         raise refused(part, method, "numbers that are not finite", "finite numbers")
     return answer

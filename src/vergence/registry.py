@@ -168,7 +168,8 @@ def find(
         raise InputError(source, key, kind, allowed)
     name, _, attribute = dotted.partition(":")
 
-    allowed = f"a class declared as {' or '.join(filter(None, (role, or_role)))}"
+    declared_by = " or ".join(map(_declaration, filter(None, (role, or_role))))
+    allowed = f"a class {declared_by}"
 
     def refuse(why: str) -> InputError:
         return InputError(source, key, f"{kind}, {why}", allowed)
@@ -203,6 +204,14 @@ def find(
     if ":" in kind:
         found.__part_kind__ = kind  # type: ignore[attr-defined]
     return found
+
+
+def _declaration(role: str) -> str:
+    """Say how a class is declared for a role."""
+    if role == "driver":
+        return "that inherits from vg.Driver"
+    own = role in ("objective", "feature")
+    return f"declared with @vg.{role}" if own else f'declared with @vg.part("{role}")'
 
 
 def _installed(role: str) -> dict[str, str]:

@@ -36,7 +36,7 @@ def test_lists_and_arrays_of_any_type_and_order_are_taken() -> None:
 
 
 def test_a_wrong_shape_is_named() -> None:
-    with pytest.raises(ShapeError, match=r"twist has shape \(5,\); it must have shape \(6\)"):
+    with pytest.raises(ShapeError, match=r"twist has shape \(5,\); it must have shape \(6,\)"):
         transforms.se3_exp([0, 0, 0, 0, 0])
     with pytest.raises(ShapeError, match="points_b"):
         transforms.transform_points(TURNED, [1, 2, 3])
