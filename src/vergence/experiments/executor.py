@@ -11,6 +11,7 @@ from vergence.experiments.kinematic import is_ideal, is_quick
 from vergence.experiments.run_trial import as_they_come, run_trials
 from vergence.experiments.source import CellSource
 from vergence.experiments.trial import Trial, TrialResult
+from vergence.experiments.worker import prepare_workers
 from vergence.experiments.workers import DEATHS, DeadlyTaskError, Workers
 from vergence.optional_package import optional_package
 
@@ -57,6 +58,9 @@ class Executor:
         """
         workers = Workers(self.workers)
         count = workers.count
+        shared = self.scheduler is None and min(count, len(trials)) > 1
+        if shared and not _by_pace(source, trials[:1], physics)[0]:  # not quick: others share them
+            prepare_workers()
         quick, ideal, slow = _by_pace(source, trials, physics)
         if self.scheduler is None:
             for some in _chunks(quick, _CHUNK):

@@ -4,11 +4,12 @@ import logging
 import os
 import signal
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from multiprocessing.forkserver import ensure_running
 from multiprocessing.process import BaseProcess
 from threading import Thread
 from time import process_time
@@ -47,14 +48,13 @@ class Worker:
     def start(cls) -> "Worker":
         """Start a process, which Ctrl-C does not reach."""
         context = get_context("forkserver")
-        context.set_forkserver_preload(list(IMPORTED))
         ours, theirs = context.Pipe()
         process = context.Process(target=_work, args=(theirs,), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # they inherit this
+        prepare_workers()
         try:
-            process.start()
+            with _sigint_blocked():
+                process.start()
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             theirs.close()
         return cls(process, ours)
 
@@ -96,6 +96,26 @@ class Worker:
             self.process.kill()
             self.process.join()
         self.process.close()
+
+
+def prepare_workers() -> None:
+    """Begin to import what all processes share, in the one that they are copied from, if need be.
+
+    Returns at once, while the first `Worker.start` waits until that is done: about a second.
+    """
+    get_context("forkserver").set_forkserver_preload(list(IMPORTED))
+    with _sigint_blocked():
+        ensure_running()
+
+
+@contextmanager
+def _sigint_blocked() -> Iterator[None]:
+    """Let processes that are started meanwhile not be reached by Ctrl-C: they inherit this."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(connection: "Connection[Any, Any]") -> None:
