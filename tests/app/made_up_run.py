@@ -69,7 +69,7 @@ def renamed(tick: TickRecord, arm: str, camera: str) -> TickRecord:
     return replace(
         tick,
         sample=Sample(tick.time, {arm: two}, (replace(frame, camera=camera, joints={}),)),
-        observation=Observation(tick.time, (replace(view, camera=camera),)),
+        observation=Observation(tick.time, (view._replace(camera=camera),)),
         commands={arm: command},
     )
 

@@ -328,7 +328,7 @@ def test_a_second_camera_that_finds_nothing_leaves_the_arm_to_the_first(objectiv
         depth_m={"wrist": depth, "wall": depth},
     )  # fmt: skip
     (view,) = observed(points).views
-    blind = replace(view, camera="wall", found=np.zeros(len(points), dtype=np.bool_))
+    blind = view._replace(camera="wall", found=np.zeros(len(points), dtype=np.bool_))
     reference = Reference(0.0, desired, elsewhere_px={"wall": desired})
     joints = JointState(0.0, START, np.zeros(6))
     command = both.command(Observation(0.0, (view, blind)), reference, joints)

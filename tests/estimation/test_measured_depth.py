@@ -1,7 +1,5 @@
 """The depth of image points off a depth image: right where it is known, refused where it is not."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from vergence.estimation import WithMeasuredDepth, depth_of_points
@@ -43,7 +41,7 @@ def test_points_get_the_depth_of_their_own_image() -> None:
     class Points:
         def observe(self, frames: tuple[Frame, ...]) -> Observation:
             view = ImagePoints("", 0.0, np.array([[30.0, 20.0]]), np.eye(2)[None], FOUND, ("",))
-            views = tuple(replace(view, camera=f.camera, time=f.time) for f in frames)
+            views = tuple(view._replace(camera=f.camera, time=f.time) for f in frames)
             return Observation(frames[-1].time, views)
 
     near, far = (np.full((48, 64), z, np.float32) for z in (0.5, 2.0))

@@ -1,7 +1,6 @@
 """How the corners of a target are measured: in images, or from what a simulated camera knows."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,7 +68,7 @@ def with_outliers(measure: Measure, share: float, rng: np.random.Generator) -> M
         wrong = rng.random(len(features)) < share
         anywhere = points_px + rng.uniform(-1.0, 1.0, points_px.shape) * half_px
         places = np.where((wrong & seen.found)[:, None], anywhere, seen.points_px)
-        return replace(seen, points_px=places)
+        return seen._replace(points_px=places)
 
     return mistaken
 
@@ -86,7 +85,7 @@ def with_noise(measure: Measure, noise_px: float) -> Measure:
     ) -> ImagePoints:
         seen = measure(frame, features, points_px, half_px, T_camera_target)
         covariance = np.tile(np.eye(2) * noise_px**2, (len(features), 1, 1))
-        return replace(seen, covariance_px=covariance)
+        return seen._replace(covariance_px=covariance)
 
     return claimed
 

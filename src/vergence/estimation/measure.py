@@ -1,7 +1,6 @@
 """The interfaces that perception needs: camera poses, and points measured in windows."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -207,4 +206,4 @@ def fill_points(
 def nothing_found(points: ImagePoints, why: str) -> ImagePoints:
     """Return the same points, all marked as not found for one reason."""
     none = np.zeros(len(points.found), dtype=np.bool_)
-    return replace(points, found=none, reasons=(why,) * len(none))
+    return points._replace(found=none, reasons=(why,) * len(none))

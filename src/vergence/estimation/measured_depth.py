@@ -35,7 +35,7 @@ class WithMeasuredDepth:
             return None
         images = {(f.camera, f.time): f.depth_m for f in frames if f.depth_m is not None}
         views = tuple(
-            replace(view, depth_m=depth, depth_deviation_m=deviation)
+            view._replace(depth_m=depth, depth_deviation_m=deviation)
             for view in observation.views
             for depth, deviation in [
                 depth_of_points(images.get((view.camera, view.time)), view.points_px, view.found)

@@ -1,12 +1,13 @@
 """Predict-select-measure-update tracking loop."""
 
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import Generic
 
 import numpy as np
 from numba import njit
 
-from vergence.arrays import BoolArray, FloatArray, IntArray
+from vergence.arrays import BoolArray, FloatArray, ImageArray, IntArray
 from vergence.camera.lens import HEIGHT, WIDTH
 from vergence.errors import InputError
 from vergence.estimation.filters.history import FilterHistory
@@ -129,7 +130,7 @@ class PosePerception(Generic[B]):
         known = [frame for frame in frames if frame.camera in self._rig.numbers]
         if not known:
             return None
-        predicted = self._predict(sorted(known, key=lambda frame: (frame.time, frame.camera)))
+        predicted = self._predict(sorted(known, key=attrgetter("time", "camera")))
         visibility = self._see(predicted)
         chosen = self._choose(predicted, visibility)
         windows = self._open(predicted, chosen, visibility)
@@ -154,7 +155,8 @@ class PosePerception(Generic[B]):
     def _predict(self, frames: list[Frame]) -> Predicted:
         """Return the predictions for images in order of exposure."""
         for frame in frames:
-            require_size(frame, self._rig)
+            if frame.image is not None:
+                require_size(frame, frame.image, self._rig)
         times = sorted({frame.time for frame in frames})
         expected = tuple(map(self._expected, times))
         exposures = np.array([times.index(frame.time) for frame in frames])
@@ -301,12 +303,10 @@ def seen_from(
     return inverse, relative
 
 
-def require_size(frame: Frame, rig: CameraRig) -> None:
+def require_size(frame: Frame, image: ImageArray, rig: CameraRig) -> None:
     """Raise InputError if an image does not have the size of its camera's model."""
-    if frame.image is None:
-        return
     camera = rig.cameras[rig.numbers[frame.camera]]
-    height, width = frame.image.shape[:2]
+    height, width = image.shape[:2]
     if (width, height) != (camera.width, camera.height):
         given, allowed = f"{width} x {height}", f"{camera.width} x {camera.height}, as calibrated"
         raise InputError(f"camera {frame.camera}", "image", given, allowed)

@@ -35,8 +35,7 @@ class SelectedPoints:
 
     def _only_kept(self, view: ImagePoints) -> ImagePoints:
         kept, windows = self._kept, view.windows
-        return replace(
-            view,
+        return view._replace(
             points_px=view.points_px[kept],
             covariance_px=view.covariance_px[kept],
             found=view.found[kept],

@@ -38,8 +38,7 @@ def curves_of(joined: IntArray | BoolArray) -> tuple[Curve, ...]:
     return tuple(Curve(part, bool(joined[part[-1]] != ENDS)) for part in parts if len(part) > 1)
 
 
-@dataclass(frozen=True, slots=True)
-class ImagePoints:
+class ImagePoints(NamedTuple):
     """The points measured in one image of one camera.
 
     A measured curve, such as an ellipse, is represented by points that follow from the curve alone;
