@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from vergence.arrays import FloatArray, ImageArray
 from vergence.camera import Camera
 from vergence.estimation.known_object.half_hidden import enough_seen
@@ -13,6 +15,7 @@ from vergence.estimation.known_object.object_follower import (
     Sighting,
     Step,
     missing_again,
+    vague,
 )
 from vergence.estimation.known_object.object_rivals import (
     DECIDED,
@@ -23,6 +26,7 @@ from vergence.estimation.known_object.object_rivals import (
     compare_poses,
     covered,
     covering,
+    covering_each_edge,
     is_near,
     is_new_view,
     neighbours,
@@ -37,6 +41,7 @@ from vergence.estimation.known_object.object_search import (
 from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
 from vergence.geometry import angle_between, se3_compose
 from vergence.vision.known_object import EdgeTracker
+from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.look_alikes import Turn, between
 
 _MISSED = 2  # consecutive images without the object, after which it is searched for elsewhere
@@ -143,6 +148,8 @@ class HypothesisFollower:
             self._settled = not self._by_edges
         if not self._settled and step.sighting is Sighting.SEEN:
             self._settle(image, time, step)
+        if isinstance(self._tracker, EdgeTracker) and step.sighting is Sighting.SEEN:
+            step = self._without_an_edge(image, step, self._tracker)
         step = self._beside_rivals(image, time, step)
         if step.sighting in (Sighting.SEEN, Sighting.AMBIGUOUS):
             self._last, self._last_time = step.T_camera_target, time
@@ -181,6 +188,18 @@ class HypothesisFollower:
         memory = self._tracker.elsewhere(self._main.memory)
         self._rivals += [Rival(self._begin(T, time, memory)) for T in near]
         self._settled = True
+
+    def _without_an_edge(self, image: ImageArray, step: Step, tracker: EdgeTracker) -> Step:
+        """Return the step if any one of the edges may be that of something else."""
+        main = self._main
+        assert isinstance(main.seen, EdgeMeasurement)
+        poses = tracker.without_an_edge(
+            image, self._camera, main.seen, main.start_covariance, main.memory
+        )
+        step = covering_each_edge(step, poses)
+        distance = float(np.linalg.norm(step.T_camera_target[:3, 3]))
+        reason = vague(step.deviation, distance, tracker.sought, self._rule)
+        return replace(step, sighting=Sighting.PREDICTED, reason=reason) if reason else step
 
     def _sought(self, image: ImageArray, time: float, step: Step) -> Step:
         """Search for the object; return the step that says it is not seen if it is not found."""

@@ -331,16 +331,28 @@ class ObjectFollower:
 
     def _vague(self) -> str:
         """Return why the pose is too uncertain to be reported; empty if it is not."""
-        place, turn = self._deviation()
-        distance = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
-        if turn > self._rule.turn_max_rad or place > self._rule.distance_max * distance:
-            turn_deg = np.rad2deg(turn)
-            turned = f"{turn_deg:.2g}°" if turn_deg < _HALF_TURN_DEG else "more than half a turn"
-            return (
-                f"what is seen of {self._tracker.sought} does not determine the pose: standard "
-                f"deviations of {place:.3g} m and {turned}"
-            )
-        return ""
+        place = float(np.linalg.norm(self._belief.T_world_target[:3, 3]))
+        return vague(self._deviation(), place, self._tracker.sought, self._rule)
+
+
+def vague(deviation: tuple[float, float], distance: float, sought: str, rule: FollowRule) -> str:
+    """Return why a pose is too uncertain to be reported; empty if it is not.
+
+    Args:
+        deviation: m and rad, largest.
+        distance: of the object, m.
+        sought: what it was searched by.
+        rule: with the largest deviations of a pose that is known.
+    """
+    place, turn = deviation
+    if turn > rule.turn_max_rad or place > rule.distance_max * distance:
+        turn_deg = np.rad2deg(turn)
+        turned = f"{turn_deg:.2g}°" if turn_deg < _HALF_TURN_DEG else "more than half a turn"
+        return (
+            f"what is seen of {sought} does not determine the pose: standard "
+            f"deviations of {place:.3g} m and {turned}"
+        )
+    return ""
 
 
 def missing_again(seen: Measurement, sought: str, rule: FollowRule) -> str:

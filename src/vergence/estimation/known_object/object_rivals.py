@@ -205,10 +205,27 @@ def _fitted(
 
 def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
     """Return the step with a covariance that covers equally likely poses (4, 4) nearby, too."""
+    return _with_squares(step, poses, 1.0 / (len(poses) + 1))
+
+
+def covering_each_edge(step: Step, poses: Sequence[FloatArray]) -> Step:
+    """Return the step with a covariance that also covers what leaving one edge out makes of it.
+
+    Errors of edges are independent, so their squares add up: the jackknife estimate [Tukey1958].
+
+    Args:
+        step: after an image.
+        poses: (4, 4) each, without one of the edges.
+    """
+    return _with_squares(step, poses, 1.0)
+
+
+def _with_squares(step: Step, poses: Sequence[FloatArray], weight: float) -> Step:
+    """Return the step with the squared distances of poses (4, 4) added to its covariance."""
     if not poses:
         return step
     errors = np.array([pose_difference(T, step.T_camera_target) for T in poses])
-    added = errors.T @ errors / (len(poses) + 1)
+    added = weight * errors.T @ errors
     covariance = step.covariance.copy()
     covariance[:6, :6] += added
     place, turn = np.sqrt(np.diag(added).reshape(2, 3).max(axis=1))

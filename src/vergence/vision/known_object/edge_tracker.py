@@ -28,6 +28,7 @@ from vergence.vision.known_object.edge_samples import (
 )
 from vergence.vision.known_object.look_alikes import Turn, symmetries
 from vergence.vision.known_object.object_model import ObjectModel
+from vergence.vision.known_object.partial_view import decisive_edges
 from vergence.vision.known_object.pose_evidence import edge_nats
 from vergence.vision.known_object.turn_test import SURE, TurnTest
 
@@ -104,6 +105,53 @@ class EdgeTracker:
             InputError: if the image is not grey 8 bit or not of the camera's size.
         """
         require_image(image, camera)
+        seen = self._measured(
+            image, camera, T_camera_target, pose_covariance, self.geometry, memory
+        )
+        if seen.found and seen.share < _FEW:
+            wider = (_FEW / seen.share) ** _WIDER
+            seen = seen._replace(covariance_px=wider * seen.covariance_px)
+        return seen
+
+    def without_an_edge(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        seen: EdgeMeasurement,
+        pose_covariance: FloatArray,
+        memory: EdgeMemory,
+    ) -> list[FloatArray]:
+        """Return the poses (4, 4) that fit if one edge or another is that of something else.
+
+        Each of the edges that decide the pose of a partly hidden object is left out in turn.
+
+        Args:
+            image: the image that was measured.
+            camera: the camera's model.
+            seen: the measurement.
+            pose_covariance: size of the search around its pose, (6, 6).
+            memory: appearance of the edges.
+        """
+        poses = []
+        for edge in decisive_edges(seen):
+            places = self.geometry.places.copy()
+            places[edge] = 0
+            others = self.geometry._replace(places=places)
+            again = self._measured(
+                image, camera, seen.T_camera_target, pose_covariance, others, memory
+            )
+            poses.append(again.T_camera_target)
+        return poses
+
+    def _measured(
+        self,
+        image: ImageArray,
+        camera: Camera,
+        T_camera_target: FloatArray,
+        pose_covariance: FloatArray,
+        geometry: EdgeGeometry,
+        memory: EdgeMemory,
+    ) -> EdgeMeasurement:
         rule = EdgeRule(
             self.contrast,
             self.candidates,
@@ -117,13 +165,10 @@ class EdgeTracker:
             pack_lens(camera),
             np.array(T_camera_target),
             np.array(pose_covariance),
-            self.geometry,
+            geometry,
             rule,
             memory,
         )
-        if seen.found and seen.share < _FEW:
-            wider = (_FEW / seen.share) ** _WIDER
-            seen = seen._replace(covariance_px=wider * seen.covariance_px)
         return seen
 
     def elsewhere(self, _memory: EdgeMemory) -> EdgeMemory:

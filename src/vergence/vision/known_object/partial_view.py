@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vergence.arrays import BoolArray, FloatArray
+from vergence.arrays import BoolArray, FloatArray, IntArray
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.pose_evidence import ALIKE, MOST_OF_EDGE, place_nats
 
 _FOUND = 0.95  # fraction of the places found on visible edges
 _PRECISE_PX = 0.5  # standard deviation of their residuals
 _COMPLETE = 0.9  # fraction found of an object that nothing hides
+_DECISIVE = 0.5  # share of the information about a motion that one edge holds
 _MOST_GROWTH = 100.0  # of a variance without one of the edges: ten times the deviation
 ONE_EDGE = "a part is hidden, and one edge alone, which may be another object's, decides the pose"
 _DIRECTIONS, _BOUNDS = 12, 24  # of the borders that are tried, and their places along each
@@ -64,10 +65,32 @@ def one_edge_decides(seen: object) -> bool:
     return growth_without_an_edge(seen) > _MOST_GROWTH
 
 
+def decisive_edges(seen: object) -> IntArray:
+    """Return the edges of a partly hidden object that determine a motion as well as the rest does.
+
+    Each could be an edge of what hides the object.
+    """
+    if not isinstance(seen, EdgeMeasurement) or seen.share >= _COMPLETE:
+        return np.zeros(0, dtype=np.int64)
+    edges, shares = _information_shares(seen)
+    return edges[shares > _DECISIVE]
+
+
 def growth_without_an_edge(seen: EdgeMeasurement) -> float:
     """Return the largest factor by which a variance of the pose grows without one of its edges.
 
-    Infinite if the other edges do not determine the pose. Image coordinates count as undistorted.
+    Infinite if the other edges do not determine the pose.
+    """
+    shares = _information_shares(seen)[1]
+    left = 1.0 - float(shares.max()) if len(shares) else 0.0
+    return 1.0 / left if left > 0.0 else float("inf")
+
+
+def _information_shares(seen: EdgeMeasurement) -> tuple[IntArray, FloatArray]:
+    """Return the edges that were found, (E,), and each one's largest share in what is known.
+
+    It is the largest share of the information about any motion of the object. Image coordinates
+    count as undistorted.
     """
     found = seen.samples_found
     places = seen.samples.points[found] @ seen.fit.T[:3, :3].T + seen.fit.T[:3, 3]
@@ -78,12 +101,12 @@ def growth_without_an_edge(seen: EdgeMeasurement) -> float:
     slopes /= np.linalg.norm(slopes, axis=0)
     edges = seen.samples.edge[found]
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    each = np.unique(edges)
     shares = [
         float(np.linalg.eigvals(inverse @ (one.T @ one)).real.max())
-        for one in (slopes[edges == edge] for edge in np.unique(edges))
+        for one in (slopes[edges == edge] for edge in each)
     ]
-    left = 1.0 - max(shares, default=1.0)
-    return 1.0 / left if left > 0.0 else float("inf")
+    return each, np.array(shares)
 
 
 def _visible(points_px: FloatArray, nats: FloatArray) -> BoolArray:
