@@ -190,3 +190,27 @@ def test_neighbours_that_move_between_two_look_alikes_leave_the_point_undecided(
     tracks = SsdTracker(image, points).track(moved)
     assert tracks.found.all(), tracks.reasons
     assert np.sqrt(tracks.covariance_px[0, 0, 0]) > 8.0
+
+
+def test_mark_that_looks_more_like_the_point_than_the_point_itself_is_covered(
+    image: NDArray[np.uint8],
+) -> None:
+    import cv2
+
+    points = np.array([[213, 87], [40, 60], [60, 120], [50, 180], [80, 90], [100, 150]], float)
+    shift = np.array([-5, 6])
+    taken = 0
+    for beside in range(0, 256, 15):  # what is beside the first of four dots changes
+        images = []
+        for shade in (90, beside):
+            image[60:200, 140:220], image[60:200, 216:240] = 50, 110
+            image[60:96, 216:240] = shade
+            for row in range(4):
+                cv2.circle(image, (210, 85 + 17 * row), 4, 255, -1, cv2.LINE_AA)
+            images.append(image.copy())
+        tracks = SsdTracker(images[0], points).track(np.roll(images[1], shift, axis=(1, 0)))
+        assert tracks.found[0], tracks.reasons
+        error = tracks.points_px[0] - points[0] - shift
+        assert error @ np.linalg.solve(tracks.covariance_px[0], error) < 9.0, beside
+        taken += np.linalg.norm(error) > 10.0
+    assert 0 < taken < 10

@@ -33,6 +33,7 @@ from vergence.vision.two_by_two import apply2, inverse2
 
 MOST_PLACES = 32  # candidate positions of a point: search, expected, neighbours' motion, twins
 ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
+POSSIBLE = 0.1  # if the point has look-alikes in the first image, one of which may be found
 NEIGHBOURS = 5  # points whose motion decides between look-alikes
 AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
 CONSENSUS = 3  # points found that predict where the others may have moved
@@ -45,30 +46,36 @@ def track_points(image: ImageArray, state: TrackerState, answers: FloatArray) ->
     """Find all points, each expected at answers[k, PLACE]; return whether all were found."""
     expected, count = answers[:, :2].copy(), len(answers)
     places = np.empty((count, MOST_PLACES, COLUMNS + 4))
-    alike = np.zeros(count, dtype=np.int64)
+    possible, sure = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_)
     for k in range(count):
         out = answers[k]
         out[RESIDUAL], out[CORRELATION], out[DETAIL] = np.nan, np.nan, np.nan
         out[VERDICT] = NO_TEMPLATE
         if state.keys[k, 0] > 0:
-            alike[k] = that_look_alike(places[k], settle_all(image, k, state, out, places[k]))
+            possible[k] = those_alike(
+                k, state, places[k], settle_all(image, k, state, out, places[k])
+            )
+            sure[k] = (
+                out[VERDICT] == FOUND and np.sum(that_look_alike(places[k, : possible[k]])) < 2
+            )
     found = answers[:, VERDICT] == FOUND
-    sure = found & (alike < 2)
     for k in range(count):
         if not found[k]:
             continue
         chosen = 0
-        if alike[k] > 1:
+        if possible[k] > 1:
             x, y = where_neighbours_go(k, expected, answers, sure)
             # The search may not have found it.
-            settle(image, x, y, k, state, worth_finding(places[k]), places[k, alike[k]])
-            alike[k] = that_look_alike(places[k], alike[k] + 1)
-            off = np.hypot(places[k, : alike[k], 0] - x, places[k, : alike[k], 1] - y)
-            chosen = int(np.argmin(off))
+            least = worth_finding(k, state, places[k])
+            settle(image, x, y, k, state, least, places[k, possible[k]])
+            possible[k] = those_alike(k, state, places[k], possible[k] + 1)
+            others = places[k, : possible[k]]
+            off = np.hypot(others[:, 0] - x, others[:, 1] - y)
+            chosen = int(np.argmin(np.where(that_look_alike(others), off, np.inf)))
             near = off[chosen]
             off[chosen] = np.inf
-            if np.sum(sure) < CONSENSUS or (alike[k] > 1 and near > DECIDED * off.min()):
-                widen_for_others(places[k, : alike[k]], chosen)
+            if np.sum(sure) < CONSENSUS or (possible[k] > 1 and near > DECIDED * off.min()):
+                widen_for_others(others, chosen)
         answers[k] = places[k, chosen, :COLUMNS]
         take_over(image, k, state, places[k, chosen])
     if CONSENSUS <= np.sum(found) < count:
@@ -105,7 +112,7 @@ def look_again(
 def track_point(image: ImageArray, k: int, state: TrackerState, out: FloatArray) -> int:
     """Find point k alone, expected at out[PLACE], in an image; return the verdict."""
     places = np.empty((MOST_PLACES, COLUMNS + 4))
-    alike = that_look_alike(places, settle_all(image, k, state, out, places))
+    alike = those_alike(k, state, places, settle_all(image, k, state, out, places))
     if out[VERDICT] == FOUND:
         widen_for_others(places[:alike], 0)
         out[:] = places[0, :COLUMNS]
@@ -148,7 +155,7 @@ def settle_all(
         else:
             promising = correlation_at(image, start_x, start_y, k, state) >= PROMISING
         if promising:
-            least = worth_finding(places) if count else -1.0
+            least = worth_finding(k, state, places) if count else -1.0
             settle(image, start_x, start_y, k, state, least, places[count])
             if n == 0:
                 out[2:] = places[0, 2:COLUMNS]
@@ -165,7 +172,8 @@ def settle_all(
             start_x, start_y = places[0, 0] + sign * away[0], places[0, 1] + sign * away[1]
             if nearest(places[:count, :2], start_x, start_y) < SAME_PX:
                 continue
-            settle(image, start_x, start_y, k, state, worth_finding(places), places[count])
+            least = worth_finding(k, state, places)
+            settle(image, start_x, start_y, k, state, least, places[count])
             count += places[count, VERDICT] == FOUND
     return count
 
@@ -188,24 +196,32 @@ def starting_places(
 
 
 @njit(cache=True, inline="always")
-def worth_finding(places: FloatArray) -> float:
-    """Smallest correlation with which another position looks like the first one found."""
-    least: float = max(places[0, CORRELATION] - ALIKE, LOST_CORRELATION)
+def worth_finding(k: int, state: TrackerState, places: FloatArray) -> float:
+    """Smallest correlation with which another position may be point k, beside the first one."""
+    has_twins = np.any(twins_of(state, k)[0] != 0.0)
+    margin = POSSIBLE if has_twins else ALIKE
+    least: float = max(places[0, CORRELATION] - margin, LOST_CORRELATION)
     return least
 
 
 @njit(cache=True, inline="always")
-def that_look_alike(places: FloatArray, count: int) -> int:
-    """Move the positions that match about as well as the best to the front; return how many.
+def those_alike(k: int, state: TrackerState, places: FloatArray, count: int) -> int:
+    """Move the positions that may be point k, beside the best, to the front; return how many.
 
     If the first one is the best by a margin, it is the only one.
     """
-    alike = min(count, 1)
+    alike, least = min(count, 1), worth_finding(k, state, places)
     for n in range(1, count):
-        found = places[n, VERDICT] == FOUND
-        if found and places[n, CORRELATION] > places[0, CORRELATION] - ALIKE:
+        if places[n, VERDICT] == FOUND and places[n, CORRELATION] > least:
             places[alike] = places[n].copy()
             alike += 1
+    return alike
+
+
+@njit(cache=True, inline="always")
+def that_look_alike(places: FloatArray) -> BoolArray:
+    """Return which positions match about as well as the first, itself included."""
+    alike: BoolArray = places[:, CORRELATION] > places[0, CORRELATION] - ALIKE
     return alike
 
 
