@@ -175,7 +175,7 @@ class ObjectSearch:
                 self._start(seen=False)
                 return found
             best = max(now.fits, key=lambda fit: fit.share).T_camera_target
-            self._round = _Round(self._on_axis(best), self._alike, [], fitted=4, refined=3)
+            self._round = _Round(self._on_axis(best), self._alike, [], fitted=4, refined=0)
 
     @property
     def promising(self) -> bool:
