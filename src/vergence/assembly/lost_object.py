@@ -11,7 +11,7 @@ from vergence.estimation import Measure
 from vergence.estimation.known_object.half_hidden import enough_seen
 from vergence.estimation.known_object.object_rivals import chance_of, choose_pose
 from vergence.estimation.known_object.object_search import ObjectSearch, SearchPace
-from vergence.geometry import angle_between, transform_points
+from vergence.geometry import transform_points
 from vergence.signals import Frame, ImagePoints
 from vergence.vision.known_object import EdgeTracker, ObjectModel
 
@@ -19,7 +19,6 @@ _PACE = SearchPace(40, 130, 6)  # about 12 ms an image
 _LEAST_SHARE = 0.85  # of the edges
 _HALF_PX = 8.0  # of the windows at a pose that was fitted
 _FORGOTTEN_S = 0.5  # after which a search does not continue
-_STALE_RAD = 0.1  # turn of the camera after which it begins again
 
 
 class ObjectFinder:
@@ -59,7 +58,7 @@ class ObjectFinder:
         search = self._searches[frame.camera]
         late = frame.time - self._time > _FORGOTTEN_S
         self._time = frame.time
-        if late or self._begun != frame.camera or _turned(search, T_camera_target):
+        if late or self._begun != frame.camera or search.is_stale(T_camera_target):
             search.begin(T_camera_target, self._tracker.blank())
             self._begun = frame.camera
         fits = search.look(frame.image)
@@ -84,7 +83,3 @@ class ObjectFinder:
         places = self._cameras[frame.camera].project(transform_points(T, self._corners.copy()))
         features = np.arange(len(places))
         return self._measure(frame, features, places, np.full((len(places), 2), _HALF_PX), T)
-
-
-def _turned(search: ObjectSearch, T_camera_target: FloatArray) -> bool:
-    return angle_between(search.T_last, T_camera_target) > _STALE_RAD

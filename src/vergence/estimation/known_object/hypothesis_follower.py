@@ -39,7 +39,7 @@ from vergence.estimation.known_object.object_search import (
     SearchPace,
 )
 from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
-from vergence.geometry import angle_between, se3_compose
+from vergence.geometry import se3_compose
 from vergence.vision.known_object import EdgeTracker
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.look_alikes import Turn, between
@@ -48,7 +48,6 @@ _MISSED = 2  # consecutive images without the object, after which it is searched
 _MOST_RIVALS = 3  # that are tracked in parallel
 # While an object is hidden it turns by this angle and at this rate, rad/s, at most.
 _TURN_RAD, _TURN_RATE = 0.3, 3.0
-_STALE_RAD = 0.1  # turn of the camera after which a search begins again
 
 
 class HypothesisFollower:
@@ -207,7 +206,7 @@ class HypothesisFollower:
         search = self._search
         if self._missed + 1 < _MISSED:
             return step
-        if not self._searching or angle_between(search.T_last, self._last) > _STALE_RAD:
+        if not self._searching or search.is_stale(self._last):
             search.begin(self._last, self._main.memory)
             self._searching, self._undecided = True, ""
         if not search.promising:

@@ -13,7 +13,7 @@ import numpy as np
 from vergence.arrays import FloatArray, ImageArray, IntArray
 from vergence.camera import Camera
 from vergence.estimation.known_object.object_tracker import Measurement, ObjectTracker
-from vergence.geometry import se3, se3_compose, skew, so3_exp
+from vergence.geometry import angle_between, se3, se3_compose, skew, so3_exp
 from vergence.vision.known_object.contour_maps import Maps
 from vergence.vision.known_object.contour_vote import directions_of, vote_place
 from vergence.vision.known_object.look_alikes import centre_of, tried_turns, turns_of
@@ -22,6 +22,7 @@ _CELLS = 24.0  # across the object
 _MOST_COLUMNS = 160  # of the coarse image
 _SCALES = (0.87, 1.0, 1.15)  # of the distance
 _REACH = 3.0  # deviations of the prediction within which places are examined
+_STALE_RAD = 0.1  # turn of the camera after which a search begins again
 _PLACE, _TURN_RAD = 0.12, 0.3  # deviation of a voted pose: relative to the size, and rotation
 
 
@@ -176,6 +177,14 @@ class ObjectSearch:
                 return found
             best = max(now.fits, key=lambda fit: fit.share).T_camera_target
             self._round = _Round(self._on_axis(best), self._alike, [], fitted=4, refined=0)
+
+    def is_stale(self, T_last: FloatArray) -> bool:
+        """Return whether the camera has turned since a search began, which then begins again.
+
+        Args:
+            T_last: last pose of the object in the camera as it is now, (4, 4).
+        """
+        return angle_between(self.T_last, T_last) > _STALE_RAD
 
     @property
     def promising(self) -> bool:
