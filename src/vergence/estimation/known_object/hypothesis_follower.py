@@ -218,7 +218,9 @@ class HypothesisFollower:
         self._undecided, self._chance = "", chance_of(fits)
         enough: list[Fit] | str = self._whole(fits)
         if near:
-            enough = enough_seen(fits, near, self._rule.found_again, self._log_ratio, self._chance)
+            enough = self._enough(fits, near)
+            if not isinstance(enough, str) and enough[0].share < self._rule.found_again:
+                enough = self._enough([*fits, *search.again(image, fits)], near)
         if isinstance(enough, str):
             self._undecided = enough
             return replace(step, reason=enough or step.reason)
@@ -250,6 +252,10 @@ class HypothesisFollower:
     def _log_ratio(self, seen: Measurement, other: Measurement) -> float:
         """Return by how many nats an image supports one pose more than another."""
         return self._tracker.log_ratio(seen, other, self._camera, self._chance)
+
+    def _enough(self, fits: Sequence[Fit], near: Near) -> list[Fit] | str:
+        """Return the poses of an object with edges that explain what is seen, or why none does."""
+        return enough_seen(fits, near, self._rule.found_again, self._log_ratio, self._chance)
 
     def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return the poses of which enough is found."""

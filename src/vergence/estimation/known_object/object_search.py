@@ -5,6 +5,7 @@ image, and the pose is fitted at the best few of them. Images are examined in sl
 control loop need not wait.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -177,6 +178,10 @@ class ObjectSearch:
                 return found
             best = max(now.fits, key=lambda fit: fit.share).T_camera_target
             self._round = _Round(self._on_axis(best), self._alike, [], fitted=4, refined=0)
+
+    def again(self, image: ImageArray, fits: Sequence[Fit]) -> list[Fit]:
+        """Return the poses fitted once more: a vote is coarse, a first fit may end beside it."""
+        return [self._fit(image, fit.T_camera_target) for fit in fits]
 
     def is_stale(self, T_last: FloatArray) -> bool:
         """Return whether the camera has turned since a search began, which then begins again.
