@@ -211,7 +211,7 @@ def covering(step: Step, poses: Sequence[FloatArray]) -> Step:
 def covering_each_edge(step: Step, poses: Sequence[FloatArray]) -> Step:
     """Return the step with a covariance that also covers what leaving one edge out makes of it.
 
-    Errors of edges are independent, so their squares add up: the jackknife estimate [Tukey1958].
+    Errors of edges are independent, so their squares add up: the jackknife estimate [Efron1981].
 
     Args:
         step: after an image.
