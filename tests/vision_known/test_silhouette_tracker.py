@@ -121,6 +121,22 @@ def test_one_image_gives_the_place_of_a_ball_and_none_of_its_turns(
         assert seen.unseen.shape == (6, 3)
 
 
+def test_colours_are_not_learned_where_the_outline_lies_beside_the_contour(
+    tracker: SilhouetteTracker,
+) -> None:
+    """Otherwise the colours would come to say that a wrong pose is right."""
+    rng = np.random.default_rng(2)
+    ground, place = colored_clutter(rng), ball_place(3)
+    held = np.diag(np.repeat([1e-6, 1e-5], 3) ** 2)
+    right, aside = (se3(np.eye(3), place + np.array((x, 0.0, 0.0))) for x in (0.0, 0.001))
+    memory = tracker.blank()
+    for T in (right, *[aside] * 30):
+        seen = tracker.measure(drawn_ball(place, rng, ground), CAMERA, T, held, memory)
+        memory = tracker.remember(memory, seen)
+    free = tracker.measure(drawn_ball(place, rng, ground), CAMERA, aside, LOOSE, memory)
+    assert abs(free.T_camera_target[0, 3] - place[0]) < 0.00004
+
+
 def followed(tracker: SilhouetteTracker, count: int, posts: bool) -> list[tuple[str, float, float]]:
     rng = np.random.default_rng(3)
     ground = colored_clutter(rng)

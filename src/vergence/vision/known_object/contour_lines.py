@@ -150,7 +150,7 @@ def count_colors(
     outline: Outline,
     learned: BoolArray,
     covered: BoolArray,
-    gap_px: float,
+    gaps_px: FloatArray,
     depth_px: float,
     inside: FloatArray,
     outside: FloatArray,
@@ -162,7 +162,7 @@ def count_colors(
         outline: where the lines are.
         learned: lines on which the contour was found, (N,).
         covered: lines on which something is before the object, (N,): all of it is beside.
-        gap_px: how far from the contour to begin.
+        gaps_px: how far from the outline to begin, inward and outward, (N, 2).
         depth_px: and where to end.
         inside: counts of the object.
         outside: counts of what is beside it.
@@ -176,6 +176,7 @@ def count_colors(
         for side in (-1.0, 1.0):
             most = outline.inside_px[n] if side < 0.0 else outline.outside_px[n]
             counts = inside if side < 0.0 and learned[n] else outside
+            gap_px = gaps_px[n, 0] if side < 0.0 else gaps_px[n, 1]
             for k in range(int(min(most, depth_px) - gap_px) + 1):
                 far = side * (gap_px + k)
                 column, row = int(np.floor(u + far * nu + 0.5)), int(np.floor(v + far * nv + 0.5))

@@ -157,7 +157,8 @@ class SilhouetteTracker:
             outline = self._outline(T, lens)
             if outline is not None:
                 everywhere = np.ones(len(outline.points), dtype=np.bool_)
-                colors = self._counted(pixels, outline, everywhere, ~everywhere, gap_px)
+                gaps_px = np.full((len(everywhere), 2), gap_px)
+                colors = self._counted(pixels, outline, everywhere, ~everywhere, gaps_px)
             seen = self._look(pixels, lens, T, prior, colors, None)
             T = seen.T_camera_target
         return seen
@@ -326,6 +327,9 @@ class SilhouetteTracker:
         slopes = slopes[found]
         learned = found & (lines.deep_odds > _LEARNED_ODDS)
         covered = lines.usable & (lines.deep_odds < -_LEARNED_ODDS)
+        # What lies between the contour that was found and the outline that fits may be either's.
+        inner, outer = np.sort((lines.offsets_px, moved), axis=0)
+        gaps_px = _GAP_PX + np.fmax(np.stack((-inner, outer), axis=1), 0.0)
         unseen, shared = self._unseen(T, lens, slopes), shared_error(slopes, self.bias_px)
         expected, count = int(lines.usable.sum()), int(found.sum())
         # The less of the outline is found, the likelier some of it is something else's.
@@ -341,7 +345,7 @@ class SilhouetteTracker:
             int(np.sum(lines.usable & ~found & (lines.deep_odds > DEEP_ODDS))),
             outline.points_px,
             found,
-            self._counted(pixels, outline, learned, covered, _GAP_PX),
+            self._counted(pixels, outline, learned, covered, gaps_px),
             unseen,
             shared,
             self._astray(T, unseen),
@@ -380,9 +384,9 @@ class SilhouetteTracker:
         outline: Outline,
         learned: BoolArray,
         covered: BoolArray,
-        gap_px: float,
+        gaps_px: FloatArray,
     ) -> ColorModel:
         inside, outside = np.zeros((2, *blank_colors(self.channels).inside.shape))
-        count_colors(pixels, outline, learned, covered, gap_px, _LEARNED_DEPTH_PX, inside, outside)
+        count_colors(pixels, outline, learned, covered, gaps_px, _LEARNED_DEPTH_PX, inside, outside)
         colors: ColorModel = colors_of(inside, outside)
         return colors

@@ -34,7 +34,7 @@ _NODE = "vergence_"  # and when it started
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a node that is being discovered
 _STOP_S = 2.0  # for the service that stops the robot
 _INFO_S = 1.0  # for which camera info is waited after the first image
-_LEAVE_S = 1.0  # for the middleware to tell the others
+_LEAVE_S = 4.0  # for the middleware to tell the others, on a busy computer
 _STOPPED, _RUNNING = "protective stop", "running"
 
 
