@@ -216,7 +216,7 @@ class HypothesisFollower:
         if fits is None:
             return replace(step, reason=self._undecided or step.reason)
         self._undecided, self._chance = "", chance_of(fits)
-        enough: list[Fit] | str = self._whole(fits)
+        enough: list[Fit] | str = [fit for fit in fits if self._whole(fit.seen)]
         if near:
             enough = self._enough(fits, near)
             if not isinstance(enough, str) and enough[0].share < self._rule.found_again:
@@ -238,7 +238,9 @@ class HypothesisFollower:
         deviation = self._search.deviation
         main = self._begin(chosen.T_camera_target, time, memory, deviation)
         found = main.follow(image, time)
-        if found.sighting is not Sighting.SEEN:
+        assert main.seen is not None
+        # It has looked again for itself, and may have found less.
+        if found.sighting is not Sighting.SEEN or not (self._by_edges or self._whole(main.seen)):
             return step
         rivals = [T for T in chosen.rivals if not covered(found, T)]
         if len(rivals) > _MOST_RIVALS:
@@ -257,10 +259,9 @@ class HypothesisFollower:
         """Return the poses of an object with edges that explain what is seen, or why none does."""
         return enough_seen(fits, near, self._rule.found_again, self._log_ratio, self._chance)
 
-    def _whole(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return the poses of which enough is found."""
-        sought, rule = self._tracker.sought, self._rule
-        return [fit for fit in fits if not missing_again(fit.seen, sought, rule)]
+    def _whole(self, seen: Measurement) -> bool:
+        """Return whether enough of the object is found after images without it."""
+        return not missing_again(seen, self._tracker.sought, self._rule)
 
     def _beside_rivals(self, image: ImageArray, time: float, step: Step) -> Step:
         """Track the rotated poses too; drop worse ones, adopt one that explains more."""
