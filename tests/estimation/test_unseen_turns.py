@@ -8,10 +8,12 @@ import pytest
 from vergence.estimation import (
     Belief,
     PoseFilter,
+    aside_of,
     shown_covariance,
     told_covariance,
     with_turn,
     with_undecided,
+    with_unknown,
     with_unseen,
     without_unseen,
 )
@@ -92,3 +94,17 @@ def test_after_a_jump_to_another_turn_the_velocity_about_its_axis_is_not_known()
     assert moved == pytest.approx(motion)
     assert axis @ after.velocity[3:] == pytest.approx(0.0, abs=1e-12)
     assert axis @ after.covariance[9:, 9:] @ axis > 9.0
+
+
+def test_a_pose_that_fits_far_along_a_turn_is_covered_though_it_lies_beside_its_line() -> None:
+    rng = np.random.default_rng(4)
+    belief, motions = turning(rng)
+    beside = np.concatenate((rng.normal(0.0, 0.02, 3), np.cross(motions[3:, 0], (0.1, 0.2, 0.3))))
+    far = 2.0 * motions + beside[:, None]
+    aside = aside_of(far, motions)
+    assert aside[:, 0] == pytest.approx(beside)
+    unknown = replace(belief, covariance=with_unknown(1e-8 * np.eye(12), motions))
+    none = np.zeros((6, 6))
+    for astray, least, most in ((none, 1e5, np.inf), (aside @ aside.T, 0.0, 4.0 + 1.0)):
+        P = told_covariance(unknown, motions, none, astray)[:6, :6]
+        assert least < far[:, 0] @ np.linalg.solve(P, far[:, 0]) < most

@@ -12,6 +12,7 @@ from vergence.estimation import (
     Belief,
     PoseFilter,
     Verdict,
+    aside_of,
     shown_covariance,
     told_covariance,
     view_of,
@@ -229,6 +230,8 @@ class ObjectFollower:
                 reason = f"the image {update.verdict.value}"
         self._belief, self._shared = belief, seen.shared
         self._unseen = np.hstack((seen.unseen, _units(undecided)))
+        aside = aside_of(turns.undecided, self._unseen)
+        astray = seen.astray + aside @ aside.T  # up to the farthest that fits
         if not reason:
             self._missed = 0
             self._memory = self._tracker.remember(self._memory, seen)
@@ -237,13 +240,13 @@ class ObjectFollower:
         else:
             self._missed += 1
             sighting = Sighting.LOST if self._missed > self._rule.missed_max else Sighting.PREDICTED
-        return self._step(time, sighting, reason, seen, doubt.share_decided)
+        return self._step(time, sighting, reason, seen, doubt.share_decided, astray)
 
     def skip(self, time: float) -> Step:
         """Account for an image that is not examined, because the object is lost."""
         self._belief = self._filter.predict(self._belief, time)
         self._missed += 1
-        return self._step(time, Sighting.LOST, self._reason, None, share_decided=False)
+        return self._step(time, Sighting.LOST, self._reason, None, False, np.zeros((6, 6)))
 
     def _step(
         self,
@@ -252,9 +255,9 @@ class ObjectFollower:
         reason: str,
         seen: Measurement | None,
         share_decided: bool,
+        astray: FloatArray,
     ) -> Step:
         belief, self._reason, self.seen = self._belief, reason, seen
-        astray = np.zeros((6, 6)) if seen is None else seen.astray
         return Step(
             time,
             sighting,

@@ -107,8 +107,10 @@ def compare_turns(
     def turn_from(T_from: FloatArray, T_to: FloatArray) -> float:
         return abs(float(motion[3:] @ pose_difference(T_to, T_from)[3:]))
 
-    def farthest(fit: _Fit, others: Sequence[_Fit]) -> float:
-        return max(turn_from(fit.T, other.T) for other in others)
+    def farthest(fit: _Fit, others: Sequence[_Fit]) -> FloatArray:
+        far = max(others, key=lambda other: turn_from(fit.T, other.T))
+        known = turn_from(fit.T, far.T) <= _SURE_RAD  # a measurement may state it by itself
+        return np.zeros((6, 0)) if known else pose_difference(far.T, fit.T)[:, None]
 
     own = fitted(T, scale)[-1]
     tried = likely = [own]
@@ -116,25 +118,19 @@ def compare_turns(
         tried = [*tried, fitted(turned(T, angle * motion), scale)[-1]]
         likely = _likely(tried)
         if len(likely) > _MOST_FINE:  # more would not decide it
-            return TurnTest(np.zeros(6), _open(motion, farthest(own, likely)))
+            return TurnTest(np.zeros(6), farthest(own, likely))
     fine = refined(T)
     own = fine[-1]
     for fit in sorted(likely, key=lambda fit: -turn_from(T, fit.T)):
         fine += refined(fit.T)
         as_good = _likely(fine)
-        if as_good[0].nats < own.nats + _DECIDED and farthest(own, as_good) > _SURE_RAD:
-            return TurnTest(np.zeros(6), _open(motion, farthest(own, [*likely, *as_good])))
+        if as_good[0].nats < own.nats + _DECIDED and farthest(own, as_good).size:
+            return TurnTest(np.zeros(6), farthest(own, [*likely, *as_good]))
     best = as_good[0]
     if best.nats > own.nats + _DECIDED and turn_from(T, best.T) > _SURE_RAD:
         moved = pose_difference(best.T, T)
-        return TurnTest(moved, _open(motion, farthest(best, as_good)))
-    return TurnTest(np.zeros(6), _open(motion, farthest(own, as_good)))
-
-
-def _open(motion: FloatArray, angle: float) -> FloatArray:
-    """Return a motion by an angle, (6, 1); (6, 0) if a measurement may state it by itself."""
-    motions: FloatArray = (angle * motion)[:, None][:, : int(angle > _SURE_RAD)]
-    return motions
+        return TurnTest(moved, farthest(best, as_good))
+    return TurnTest(np.zeros(6), farthest(own, as_good))
 
 
 def turned(T: FloatArray, motion: FloatArray) -> FloatArray:
