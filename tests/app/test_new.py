@@ -74,6 +74,11 @@ def test_a_photograph_of_its_board_is_sharp_and_the_next_command_goes_there(
     assert command("goal", "mine", "--out", "goal.png") == 0
     said = capsys.readouterr().out
     assert "blurred" not in said
+    assert command("goal", "mine", "--out", "goal.png") == 2
+    assert (
+        "goal.png, which exists; allowed: another file, or --overwrite" in capsys.readouterr().err
+    )
+    assert command("goal", "mine", "--out", "goal.png", "--overwrite") == 0
     expected = ["vergence", "run", "mine", "--goal", "goal.png"]
     _, _, following = said.partition("  next: ")
     assert following.split() == [*expected, "--set", "target.motion=stationary"]

@@ -29,6 +29,9 @@ def goal(options: "GoalOptions") -> int:
 
     if options.out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise InputError("--out", "", options.out, "a file name that ends in .png or .jpg")
+    if options.out.exists() and not options.overwrite:
+        given = f"{options.out}, which exists"
+        raise InputError("--out", "", given, "another file, or --overwrite")
     cell = load_cell(options.cell, overrides(options.settings))
     if options.driver is not None and options.at is not None:
         raise InputError(

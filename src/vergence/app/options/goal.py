@@ -30,6 +30,9 @@ class GoalOptions:
             max=1e3,
         ),
     ] = None
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a photograph that is in --out.")
+    ] = False
     settings: Settings = None
     driver: Driver = None
     as_json: Json = False
