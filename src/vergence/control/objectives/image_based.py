@@ -67,7 +67,7 @@ class ImageBased:
         """Return the quadratic for this tick."""
         desired = state.desired_points
         assert desired is not None
-        desired_depth = state.depth_m if state.desired_depth_m is None else state.desired_depth_m
+        desired_depth = state.depth_at_goal
         feature = COMPILED_FEATURES.get(self.feature) if len(state.points) else POINTS
         if feature is not None:
             velocity, weights = state.desired_velocity, state.weights

@@ -89,11 +89,15 @@ class CameraState:
         return Points(self.points, self.depth_m)
 
     @property
+    def depth_at_goal(self) -> FloatArray:
+        """Depth of the features at the goal, (M,), m; the present one if that is unknown."""
+        return self.depth_m if self.desired_depth_m is None else self.desired_depth_m
+
+    @property
     def desired(self) -> Points:
-        """The desired features; at their present depth if the desired depth is unknown."""
+        """The desired features."""
         assert self.desired_points is not None
-        depth = self.depth_m if self.desired_depth_m is None else self.desired_depth_m
-        return Points(self.desired_points, depth)
+        return Points(self.desired_points, self.depth_at_goal)
 
     @property
     def J_camera(self) -> FloatArray:

@@ -45,10 +45,9 @@ class PointPose:
         Raises:
             InputError: if the points do not determine a pose.
         """
-        desired, there = state.desired_points, state.desired_depth_m
+        desired = state.desired_points
         assert desired is not None
-        seen = lifted(state.points, state.depth_m)
-        goal = lifted(desired, state.depth_m if there is None else there)
+        seen, goal = lifted(state.points, state.depth_m), lifted(desired, state.depth_at_goal)
         if not (fixes_orientation(seen) and fixes_orientation(goal)):
             raise no_pose(len(seen))
         result: Quadratic = pose_quadratic(self.numbers, seen, goal)
