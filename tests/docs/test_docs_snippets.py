@@ -32,6 +32,7 @@ SHOWN_ONLY = {
     "{cell-file}",
     "{command-line}",
     "{gallery}",
+    "{public-names}",
 }
 SHOWN_ONLY |= {"{figure}", "{image}", "{note}", "{checks}", "{include}", "{gallery}"}
 SHOWN_ONLY |= {"console"}  # commands that need a robot

@@ -34,6 +34,7 @@ from vergence.vision.two_by_two import apply2, inverse2
 MOST_PLACES = 32  # candidate positions of a point: search, expected, neighbours' motion, twins
 ALIKE = 0.05  # positions whose correlation is within this of the search's are look-alikes
 POSSIBLE = 0.1  # if the point has look-alikes in the first image, one of which may be found
+UNCHANGED = 0.995  # correlation beyond which it is the point itself, as it was
 NEIGHBOURS = 5  # points whose motion decides between look-alikes
 AT_BORDER_PX = 20.0  # a point lost when expected this close to the border has probably left
 CONSENSUS = 3  # points found that predict where the others may have moved
@@ -198,9 +199,9 @@ def starting_places(
 @njit(cache=True, inline="always")
 def worth_finding(k: int, state: TrackerState, places: FloatArray) -> float:
     """Smallest correlation with which another position may be point k, beside the first one."""
-    has_twins = np.any(twins_of(state, k)[0] != 0.0)
-    margin = POSSIBLE if has_twins else ALIKE
-    least: float = max(places[0, CORRELATION] - margin, LOST_CORRELATION)
+    correlation = places[0, CORRELATION]
+    changed = correlation < UNCHANGED and np.any(twins_of(state, k)[0] != 0.0)
+    least: float = max(correlation - (POSSIBLE if changed else ALIKE), LOST_CORRELATION)
     return least
 
 
