@@ -68,9 +68,7 @@ _FOUND_PX = 2.0  # residual of a line that found the contour
 _ASIDE, _FARTHER = 0.04, 0.2
 _FORGOTTEN = 0.2  # of the share found, by one image
 _AS_USUAL = 0.85  # of it, with which a narrow search is content
-_UNCOVERED = 0.97  # of what nothing covers, likewise
 _BETTER = 1.2  # times as many lines a wide search has to find
-_CLEARER = 0.5  # of the contradictions that it may leave
 _LEARNED_ODDS = 1.0  # and on one whose colours are learned
 _CLEAR = 1.0 / 3.0**2  # information of a line that tells where the contour is, 1/px²
 
@@ -253,17 +251,15 @@ class SilhouetteTracker:
     def _sought(
         self, pixels: ImageArray, lens: FloatArray, prior: _Prior, memory: SilhouetteMemory
     ) -> SilhouetteMeasurement:
-        """Look close to the prediction; farther away if that finds too little.
+        """Look close to the prediction; farther away if less is found there than recently.
 
-        Something that comes before the object draws a wide search towards itself, unless the
-        narrow one contradicts the image: the object's colours inside, and no contour.
+        Something that comes before the object draws a wide search towards itself.
         """
         seen = self._look(pixels, lens, prior.T, prior, memory.colors, _FINE)
-        if seen.share > _AS_USUAL * memory.share and seen.uncovered > _UNCOVERED:
+        if seen.share > _AS_USUAL * memory.share:
             return seen
         wide = self._look(pixels, lens, prior.T, prior, memory.colors, None)
-        clearer = wide.found >= seen.found and wide.contradicted < _CLEARER * seen.contradicted
-        return wide if clearer or wide.found > _BETTER * seen.found else seen
+        return wide if wide.found > _BETTER * seen.found else seen
 
     def _pixels(self, image: ImageArray, camera: Camera) -> ImageArray:
         shape = (camera.height, camera.width) + ((3,) if self.channels == 3 else ())
