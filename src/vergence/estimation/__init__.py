@@ -9,7 +9,6 @@ from vergence.estimation.filters.rpy_belief import RpyBelief
 from vergence.estimation.filters.rpy_filter import RpyPoseFilter
 from vergence.estimation.filters.target_filter import TargetBelief, TargetFilter, Update, Verdict
 from vergence.estimation.filters.unseen_turns import (
-    aside_of,
     shown_covariance,
     told_covariance,
     with_turn,
@@ -102,7 +101,6 @@ __all__ = [
     "with_unknown",
     "with_turn",
     "with_undecided",
-    "aside_of",
     "with_unseen",
     "without_unseen",
     "SelfCalibration",

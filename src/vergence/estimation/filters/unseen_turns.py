@@ -97,14 +97,6 @@ def with_undecided(predicted: Belief, updated: Belief, motions: FloatArray) -> B
     return replace(updated, covariance=np.ascontiguousarray(P))
 
 
-def aside_of(motions: FloatArray, unseen: FloatArray) -> FloatArray:
-    """Return what is left of motions (6, N) without that along unobservable motions (6, K).
-
-    Far along an unobservable rotation the poses that fit do not lie on its line.
-    """
-    return motions - unseen @ (unseen[3:].T @ motions[3:])
-
-
 def with_unknown(covariance: FloatArray, motions: FloatArray) -> FloatArray:
     """Return a covariance (12, 12) in which motions that no image shows are unknown."""
     P = _projected(covariance, motions) + _along(motions, MOST_RAD**2)

@@ -12,7 +12,6 @@ from vergence.estimation import (
     Belief,
     PoseFilter,
     Verdict,
-    aside_of,
     shown_covariance,
     told_covariance,
     view_of,
@@ -230,8 +229,8 @@ class ObjectFollower:
                 reason = f"the image {update.verdict.value}"
         self._belief, self._shared = belief, seen.shared
         self._unseen = np.hstack((seen.unseen, _units(undecided)))
-        aside = aside_of(turns.undecided, self._unseen)
-        astray = seen.astray + aside @ aside.T  # up to the farthest that fits
+        # Far along a turn, the poses that fit lie beside its line.
+        astray = seen.astray + turns.undecided @ turns.undecided.T
         if not reason:
             self._missed = 0
             self._memory = self._tracker.remember(self._memory, seen)
