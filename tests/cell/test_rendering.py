@@ -187,3 +187,23 @@ def test_a_lens_that_folds_the_image_is_refused_with_its_key(tmp_path: Path) -> 
     lens = LENSES["barrel"] | {"distortion": [-2.0]}
     with pytest.raises(InputError, match=r"cameras\.eye\.distortion.*one-to-one"):
         SimulatedDriver(spot_cell(tmp_path, disc, turn=0.0, x=0.0, y=0.0, **lens), images=False)
+
+
+def test_a_camera_that_looks_past_the_floor_sees_the_sky() -> None:
+    cell = load_cell("eye_to_hand").replace(cameras={"stand": {"noise_grey": 0.0}})
+    driver = SimulatedDriver(cell)
+    try:
+        first, second = (driver.first_frame("stand").image for _ in range(2))
+    finally:
+        driver.close()
+    assert first is not None
+    assert second is not None
+    assert first[0].min() > 150  # above the floor's edge
+    # It is drawn again, once, after the first image without it; nothing else differs.
+    np.testing.assert_array_equal(first, second)
+
+
+def test_behind_a_room_without_a_sky_it_is_black(tmp_path: Path) -> None:
+    disc = {"kind": "cylinder", "size": "0.02 0.0001"}
+    image, _ = first_image(spot_cell(tmp_path, disc, turn=0.0, x=0.0, y=0.0, **LENSES["central"]))
+    assert image[0].max() == 0.0

@@ -80,14 +80,14 @@ def with_hulls(spec: Any) -> Any:
 def under_a_sky(cell: Cell) -> Any:
     """Return the compiled model of a cell for display, with a sky; it takes the same states.
 
-    The cell's cameras do not see the sky.
+    A cell's own room is as its model says for its cameras; one without a sky gets one here.
     """
     spec = assemble(cell)
     sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
     if not any(texture.type == sky for texture in spec.textures):
         gradient = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
         spec.add_texture(
-            name="sky", type=sky, builtin=gradient, width=256, height=256,
+            name="sky", type=sky, builtin=gradient, width=64, height=64,
             rgb1=[0.75, 0.84, 0.93], rgb2=[0.93, 0.95, 0.97],
         )  # fmt: skip
     return spec.compile()
