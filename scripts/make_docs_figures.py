@@ -72,8 +72,31 @@ def reproduce(paper: str) -> None:
         )
     lines += ["", "Further measurements:", ""]
     lines += [f"- `{check['name']}`: {check['note']}" for check in checks if check["note"]]
+    lines += _others(paper, checks)
     (DOCS / "papers" / f"_{paper}.md").write_text("\n".join(lines) + "\n")
     _copy_figures(paper)
+
+
+def _others(paper: str, checks: list[dict[str, Any]]) -> list[str]:
+    """Return tables of what else was tried, a column a check; checks of the same share a table."""
+    tables: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for check in checks:
+        if others := check["others"]:
+            tables.setdefault((others["meaning"], *others["results"]), []).append(check)
+    lines = []
+    for (meaning, *names), columns in tables.items():
+        headings = (_words(check["name"].removeprefix(f"{paper}.")) for check in columns)
+        lines += ["", f"{meaning}:", "", f"| | {' | '.join(headings)} |"]
+        lines.append("|---" + "|--:" * len(columns) + "|")
+        for name in names:
+            results = (column["others"]["results"][name] for column in columns)
+            lines.append(f"| {name} | {' | '.join(results)} |")
+    return lines
+
+
+def _words(name: str) -> str:
+    """Return a check's name as words, which a narrow column may break."""
+    return name.replace(".", " ").replace("_", " ")
 
 
 def _checks(checks: list[dict[str, Any]], spreads: dict[str, dict[str, float]]) -> list[str]:

@@ -421,7 +421,7 @@ def test_a_studys_checks_decide_the_exit_code(
     )
     [check] = answer["checks"]
     assert list(check) == [
-        *("name", "paper", "bound", "measured", "unit", "holds", "note", "spread"),
+        *("name", "paper", "bound", "measured", "unit", "holds", "note", "others", "spread"),
     ]
     assert check["holds"] is holds
     assert check["spread"] is None

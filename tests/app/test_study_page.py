@@ -9,7 +9,7 @@ from browser import Browser
 
 from vergence.app.study_page import write_study_page
 from vergence.drawing import figure
-from vergence.studies import Check, Spread, StudyResult
+from vergence.studies import Check, Others, Spread, StudyResult
 from vergence.studies.figure_files import save_figures
 
 CHECKS = (
@@ -30,6 +30,10 @@ CHECKS = (
         note="90 degrees: target lost at 5.27 s: no feature found: out of sight",
         bound="at least 10 of 12 over 2.5 m, 0 and 180 degrees among them; the others hidden",
         spread=Spread(3, 2, 10.0, 8.0, 11.0),
+        others=Others(
+            "Share that arrives with other laws",
+            (("image-based, <mean> L", "0.59"), ("position-based", "0.61")),
+        ),
     ),
 )
 
@@ -74,3 +78,12 @@ def test_checks_need_no_scrolling_and_their_words_no_towers(
         browser.wait("document.querySelector('figure').tabIndex === 0")
     for scheme in ("light", "dark"):
         assert accessibility.complaints(browser, scheme) == []
+
+
+def test_what_else_was_tried_is_a_list_below_its_check(browser: Browser, page: Path) -> None:
+    browser.open(page.as_uri())
+    browser.wait("document.readyState === 'complete' && document.querySelector('.remark') !== null")
+    listed = "[...document.querySelectorAll('.remark li')].map((line) => line.textContent)"
+    assert browser.value(listed) == ["image-based, <mean> L: 0.59", "position-based: 0.61"]
+    remark = browser.value("document.querySelector('.remark').textContent")
+    assert "out of sightShare that arrives with other laws:" in remark

@@ -1,5 +1,7 @@
 """No set-point of a run among obstacles touches anything; without law and guard many do."""
 
+import re
+
 from vergence.experiments.workers import Workers
 from vergence.signals import OutcomeKind
 from vergence.studies.guarantees.collisions import LAWS, collisions_check, try_obstacles
@@ -17,4 +19,7 @@ def test_runs_among_obstacles_touch_nothing_and_would_without_the_clearance():
 def test_the_check_counts_and_tells_the_runs_of_each_law():
     check = collisions_check(8, 2, Workers(1), lambda done: None)
     assert (check.measured, check.holds) == (0, True)
-    assert "plain: braked by the guard in" in check.note
+    assert check.others is not None
+    braked = dict(check.others.results)
+    assert set(braked) == set(LAWS)
+    assert re.fullmatch(r"\d of \d, \d+\.\d mm", braked["plain"])

@@ -137,7 +137,7 @@ def _table(findings: Sequence["Finding"]) -> str:
     headings = ("check", "measured", "unit", "allowed", "holds")
     rows = [(f.name, _number(f), f.unit, f.allowed, "yes" if f.holds else "NO") for f in findings]
     holds = [bool(found.holds) for found in findings]
-    return table_with_notes(headings, rows, holds, [_advice(found) for found in findings])
+    return table_with_notes(headings, rows, holds, [escape(_advice(found)) for found in findings])
 
 
 def _advice(found: "Finding") -> str:

@@ -20,8 +20,16 @@ def as_json(check: Check) -> Mapping[str, object]:
         "unit": check.unit,
         "holds": bool(check.holds),
         "note": check.note,
+        "others": _others(check),
         "spread": check.spread._asdict() if check.spread else None,
     }
+
+
+def _others(check: Check) -> Mapping[str, object] | None:
+    """Return what else was tried as JSON values."""
+    if check.others is None:
+        return None
+    return {"meaning": check.others.meaning, "results": dict(check.others.results)}
 
 
 def table(checks: Sequence[Check]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -46,8 +54,17 @@ def _cells(check: Check) -> tuple[str, ...]:
 def html_table(checks: Sequence[Check]) -> str:
     """Return the checks as a table of a page."""
     headings, rows = table(checks)
-    notes = [check.note for check in checks]
+    notes = [_html_note(check) for check in checks]
     return table_with_notes(headings, rows, [check.holds for check in checks], notes)
+
+
+def _html_note(check: Check) -> str:
+    """Return a check's note, and as a list what else was tried."""
+    if check.others is None:
+        return escape(check.note)
+    lines = (f"<li>{escape(name)}: {escape(result)}</li>" for name, result in check.others.results)
+    meaning = f"<div>{escape(check.others.meaning)}:</div>"
+    return f"{escape(check.note)}{meaning}<ul>{''.join(lines)}</ul>"
 
 
 def table_with_notes(
@@ -56,7 +73,7 @@ def table_with_notes(
     holds: Sequence[bool],
     notes: Sequence[str],
 ) -> str:
-    """Return a table of a page: of each check a row, and its note below it."""
+    """Return a table of a page: of each check a row, and its note, HTML, below it."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(
         _html_row(headings, cells, held) + _note(note, len(headings))
@@ -85,4 +102,4 @@ def _html_row(headings: Sequence[str], cells: Sequence[str], holds: bool) -> str
 
 def _note(note: str, columns: int) -> str:
     """Return a row below its check, over the whole width of the table."""
-    return f'\n<tr class="remark"><td colspan="{columns}">{escape(note)}</td></tr>' if note else ""
+    return f'\n<tr class="remark"><td colspan="{columns}">{note}</td></tr>' if note else ""

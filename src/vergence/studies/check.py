@@ -21,6 +21,13 @@ class Spread(NamedTuple):
     high: float
 
 
+class Others(NamedTuple):
+    """What else was tried besides what a check measures, such as other laws."""
+
+    meaning: str  # of the results
+    results: tuple[tuple[str, str], ...]  # what was tried, and what came of it, in words
+
+
 @dataclass(frozen=True, slots=True)
 class Check:
     """One claim of a paper, measured."""
@@ -33,6 +40,7 @@ class Check:
     note: str = ""
     bound: str = ""  # within which the check holds, where the paper's words give none
     spread: Spread | None = None  # over several seeds
+    others: Others | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vergence.arrays import BoolArray
-from vergence.studies.check import Check
+from vergence.studies.check import Check, Others
 from vergence.studies.defaults.choices import CHOICES, EVERY, MOVING, Tried
 from vergence.studies.defaults.judge import End
 from vergence.studies.defaults.moving import KEPT_PX
@@ -43,18 +43,19 @@ def _reached(name: str, tried: Sequence[Tried], noisy: bool) -> Check:
         share,
         "",
         share >= REACHED,
-        f"{len(tried)} starts, {len(tried) - len(feasible)} left out as proved infeasible; "
-        f"share that arrives without a plan, by {_SETTINGS}: {_served(feasible)}"
+        f"{len(tried)} starts, {len(tried) - len(feasible)} left out as proved infeasible"
         + "".join(f"; {count} × {what}" for what, count in missed.items()),
+        others=_served(feasible),
     )
 
 
-def _served(tried: Sequence[Tried]) -> str:
-    shares = (
-        sum(one.served[k].end is End.REACHED for one in tried) / len(tried)
-        for k in range(len(CHOICES))
+def _served(tried: Sequence[Tried]) -> Others:
+    counts = (sum(one.served[k].end is End.REACHED for one in tried) for k in range(len(CHOICES)))
+    shares = tuple(
+        (choice.name, f"{count / len(tried):.2f}")
+        for choice, count in zip(CHOICES, counts, strict=True)
     )
-    return "; ".join(f"{c.name}: {share:.2f}" for c, share in zip(CHOICES, shares, strict=True))
+    return Others(f"Share that arrives without a plan, by {_SETTINGS}; the default first", shares)
 
 
 def _others(found: Mapping[str, Sequence[Tried]]) -> tuple[Check, ...]:
@@ -106,8 +107,8 @@ def _every(tried: Sequence[Tried]) -> Check:
 def _moving(name: str, tried: Sequence[Tried]) -> Check:
     kept = np.array([[one.kept for one in each.moving] for each in tried])
     rms = np.array([[one.rms_px for one in each.moving] for each in tried])
-    told = "; ".join(
-        f"{how.name}: {share:.2f}, {median:.1f} px"
+    told = tuple(
+        (how.name, f"{share:.2f}, {median:.1f} px")
         for how, share, median in zip(
             MOVING, kept.mean(axis=0), np.median(rms, axis=0), strict=True
         )
@@ -118,8 +119,8 @@ def _moving(name: str, tried: Sequence[Tried]) -> Check:
         ahead := better(kept),
         "choices",
         ahead == 0,
-        f"{len(tried)} targets that move; share followed within {KEPT_PX:g} px, and median error: "
-        + told,
+        f"{len(tried)} targets that move",
+        others=Others(f"Share followed within {KEPT_PX:g} px, and median error", told),
     )
 
 

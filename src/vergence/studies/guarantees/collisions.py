@@ -20,7 +20,7 @@ from vergence.simulation import ExactPoints, KinematicCell, KinematicDriver
 from vergence.simulation.cell_model import CellModel
 from vergence.simulation.clearance import CellClearance
 from vergence.simulation.kinematic_driver import ARM, CAMERA
-from vergence.studies.check import Check
+from vergence.studies.check import Check, Others
 from vergence.studies.guarantees.runs import CAMERA_MODEL, build, facing, goal, joint_path
 from vergence.studies.guarantees.wrong_beliefs import WrongDepthPose
 
@@ -144,15 +144,18 @@ def collisions_check(
         f"of {count} runs",
         penetrations == 0,
         f"a post, a ball and a block up to {100 * _BESIDE_M:.0f} cm beside the path of some link, "
-        f"or across it; arms of {', '.join(CELLS)}; every pair measured at every set-point; "
-        + "; ".join(_told(law, [run for run in runs if run.law == law]) for law in LAWS),
+        f"or across it; arms of {', '.join(CELLS)}; every pair measured at every set-point",
+        others=Others(
+            "Runs that the guard braked, and least distance, by law",
+            tuple((law, _told([run for run in runs if run.law == law])) for law in LAWS),
+        ),
     )
 
 
-def _told(law: str, runs: Sequence[Encounter]) -> str:
+def _told(runs: Sequence[Encounter]) -> str:
     braked = Counter(run.kind for run in runs)[OutcomeKind.COLLISION]
     least = 1e3 * min((run.least_m for run in runs), default=np.nan)
-    return f"{law}: braked by the guard in {braked} of {len(runs)}, least distance {least:.1f} mm"
+    return f"{braked} of {len(runs)}, {least:.1f} mm"
 
 
 @cache
