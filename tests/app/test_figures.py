@@ -6,6 +6,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from vergence.app.figures import (
     Chart,
@@ -31,6 +32,7 @@ from vergence.geometry import se3_exp
 from vergence.runtime import ArmInfo
 from vergence.runtime.recording import Recording
 from vergence.runtime.results import Event, TargetTrace
+from vergence.studies.mezouar2001.path_panels import camera_paths, space
 
 CHARTS = ["error", "paths", "joints", "twist", "measures", "camera", "target", "constraints"]
 
@@ -310,3 +312,22 @@ def test_a_logarithmic_axis_names_more_than_one_of_its_values(span: tuple[float,
     named = [label.get_text() for place, label in ticks if low <= place <= high]
     assert len(named) > 1
     assert all(named)
+
+
+@pytest.mark.parametrize("size_m", [(1.2, 0.8, 1.2), (0.2, 0.2, 0.4), (0.1, 0.1, 1.0), (1, 1, 0.1)])
+def test_a_path_in_space_lies_in_its_figure_with_all_names(
+    size_m: tuple[float, float, float],
+) -> None:
+    width, depth, height = size_m
+    T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (10, 1, 1))
+    T[:, :3, 3] = np.linspace((0.0, 0.0, height), (width / 2, depth / 2, 0.8 * height), 10)
+    object_m = np.array([[0.0, 0, 0], [width, 0, 0], [width, depth, 0], [0, depth, 0]])
+    drawn, axes = space(8.6, 5.4)
+    camera_paths(axes, [("camera", T)], object_m)
+    axes.view_init(elev=22, azim=-60)
+    canvas = FigureCanvasAgg(drawn)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    boxes = [axis.get_tightbbox(renderer) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    assert all(box is not None for box in boxes)
+    assert all(drawn.bbox.contains(*corner) for box in boxes for corner in box.corners())

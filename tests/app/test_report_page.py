@@ -101,8 +101,15 @@ def test_a_narrow_screen_shows_text_that_can_be_read_and_no_page_wider_than_itse
         assert min(browser.value(notes)) > 200
         browser.wait("document.querySelector('figure:has(> [data-time])').tabIndex === 0")
         assert accessibility.complaints(browser, scheme) == []
+        # A chart that goes on fades at the edge, until its end is reached.
+        figure = "document.querySelector('figure:has(> [data-time])')"
+        assert browser.value(f"getComputedStyle({figure}).maskImage") != "none"
+        browser.value(f"{figure}.scrollLeft = 1000")
+        browser.wait(f"getComputedStyle({figure}).maskImage === 'none'")
+        browser.value(f"{figure}.scrollLeft = 0")
     finally:
         browser.resize(1000)
+    browser.wait("document.querySelector('.more') === null")
 
 
 @pytest.mark.parametrize(("scheme", "bright"), [("light", True), ("dark", False)])

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from vergence.app.main import main
+from vergence.app.tracking.pose_subject import PoseSubject
 from vergence.app.tracking.start import starting_poses
 from vergence.arrays import FloatArray
+from vergence.estimation.known_object.object_follower import Sighting, Step
 from vergence.geometry import quaternion_to_matrix, se3, so3_exp
 
 sys.path.append(str(Path(__file__).parents[1] / "vision_known"))
@@ -122,6 +124,39 @@ def test_json_is_one_object_and_nothing_else(track: Track, capsys: object) -> No
     assert answer["overlay"] is None
     assert Path(answer["report"]).is_file()
     assert answer["position_deviation_max_m"] < 0.005
+
+
+class Followed:
+    """Says two poses, the second of them by an image that does not show one of the rotations."""
+
+    free, symmetries, note = "", (), ""
+
+    def __init__(self) -> None:
+        self.tracker, self.count = self, 0
+
+    def follow(self, image: np.ndarray, time: float) -> Step:
+        told_deg, unseen = ((0.5, np.zeros((6, 0))), (3.0, np.eye(6)[:, 5:]))[self.count]
+        self.count += 1
+        covariance = np.diag([1e-6] * 3 + [np.deg2rad(0.4) ** 2] * 2 + [np.deg2rad(told_deg) ** 2])
+        deviation = (1e-3, np.deg2rad(0.5))
+        return Step(
+            time, Sighting.SEEN, "", np.eye(4), np.zeros(6), covariance, deviation, unseen, 1.0,
+            np.zeros((0, 2)), np.zeros(0, dtype=bool),
+        )  # fmt: skip
+
+
+def test_the_largest_deviation_is_that_of_the_files_too(tmp_path: Path) -> None:
+    subject = PoseSubject(Followed(), CAMERA)
+    with subject.writing(tmp_path):
+        subject.follow(np.zeros((240, 320), np.uint8), 0.0)
+        alone = subject.result(1.0).lines[0]
+        subject.follow(np.zeros((240, 320), np.uint8), 0.1)
+        both = subject.result(1.0).lines[0]
+    assert "standard deviation up to 1 mm, 0.5° · 1.0 ms" in alone
+    turned = (
+        "standard deviation up to 1 mm, 0.5°, and 3° where an image does not show every rotation"
+    )
+    assert turned in both
 
 
 def test_an_object_that_goes_is_lost_with_a_reason(

@@ -28,8 +28,8 @@ _REMARK = (
     "goal. Features are {features}; the cell's rate and acceleration limits apply; {motion}."
 )
 _LAG = (
-    "The target moves, so every law lags behind it, and most those without feed-forward; "
-    "--tolerance-px says how far is allowed."
+    "The target moves, so every law lags behind it, those without feed-forward the most; "
+    "--tolerance-px sets the error that is allowed."
 )
 
 

@@ -64,8 +64,8 @@ def _figures(folder: Path, trajectory: Trajectory) -> list[str]:
         ),
         "space": (
             plan_space_figure(path),
-            "The camera's path; strokes show its viewing direction. The scale is as the task has "
-            "it: from the target's model, task.distance_m or task.length.",
+            "The camera's path; strokes show its viewing direction. The scale comes "
+            "from the target's model, task.distance_m or task.length.",
         ),
     }
     figures = []

@@ -113,7 +113,7 @@ def _mark_bases(plane: "Axes", bases: Mapping[str, tuple[float, float]], reach: 
     plane.plot(0.0, 0.0, "+", color=INK, markersize=12, zorder=5)
     for name, (x, y) in bases.items():
         if max(abs(x), abs(y)) < reach:
-            plane.plot(x, y, "s", color=INK, markersize=9)
+            plane.plot(x, y, "s", color=INK, markersize=10, markeredgecolor="white")
             ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5}
             offset: Any = {"textcoords": "offset points", "xytext": (9, -3)}
             plane.annotate(name, (x, y), **offset, color=INK, bbox=ground)

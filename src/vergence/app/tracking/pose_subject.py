@@ -23,6 +23,7 @@ _NO_SAMPLES: dict[str, Any] = {
     "samples_found": np.zeros(0, dtype=np.bool_),
 }
 _TOLD_TURNS = 3
+_APART = 1.2  # ratio of two deviations that are worth telling apart
 
 
 class PoseSubject:
@@ -93,9 +94,12 @@ class PoseSubject:
             "note": follower.note or None,
             "last": pose_record(steps[-1]),
         }
-        spread = f"standard deviation up to {1e3 * place_m:.2g} mm, {turn_deg:.2g}° · "
+        spread = f"standard deviation up to {1e3 * place_m:.2g} mm, {turn_deg:.2g}°"
+        told_deg = np.rad2deg(max((_told_turn(step) for step in seen), default=np.nan))
+        if not free and told_deg > _APART * turn_deg:
+            spread += f", and {told_deg:.2g}° where an image does not show every rotation"
         lines = [
-            f"seen in {len(seen)} of {len(steps)} images · {spread if seen else ''}"
+            f"seen in {len(seen)} of {len(steps)} images · {spread + ' · ' if seen else ''}"
             f"{median_ms:.1f} ms per image"
         ]
         if free:
@@ -107,6 +111,11 @@ class PoseSubject:
         if follower.note:
             lines.append(follower.note)
         return Result(_outcome(steps), answer, tuple(lines))
+
+
+def _told_turn(step: Step) -> float:
+    """Return the largest standard deviation of the rotation that the files say, rad."""
+    return float(np.sqrt(np.diag(step.covariance)[3:6].max()))
 
 
 def _outcome(steps: list[Step]) -> Outcome:

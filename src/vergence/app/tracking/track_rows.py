@@ -63,7 +63,7 @@ def pose_rows(record: TrackRecord, pose: TrackedPose) -> list[Row]:
     ):
         rows.append(_value_row(name, 1e3 * float(value), 1e3 * float(deviation), "mm"))
     place, turn = 1e3 * deviations[seen, :3].max(), np.degrees(deviations[seen, 3:].max())
-    note = "standard deviation along the least certain axis, where it was seen"
+    note = "standard deviation along the camera's least certain axis, where it was seen"
     rows.append(Row("largest σ of the position", _rounded(place, place), "mm", note))
     rows.append(
         Row("largest σ of the rotation", _rounded(turn, turn), "°", note.replace("along", "about"))

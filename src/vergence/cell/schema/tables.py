@@ -35,7 +35,7 @@ _Noise = Annotated[float, Field(ge=1e-4, le=100)]  # px
 class SceneTable(Table):
     """Surroundings of the arms."""
 
-    # MJCF file of floor, walls and lights; a plain floor and a lamp if absent.
+    # MJCF file of floor, walls, lights and sky; a plain floor, lamps and a sky if absent.
     model: Path | None = None
     light: Annotated[float, Field(ge=0, le=2)] = 1.0  # brightness of all lamps
 

@@ -141,13 +141,18 @@ def _image_frame(axes: "Axes", camera: Camera, points_px: FloatArray | None = No
     axes.set_ylabel("v (px)")
 
 
+_HIGH_SHARE = 0.6  # height of a box whose labels just fit below it, as a share of its diagonal
+
+
 def _equal_scale(axes: Any, low: FloatArray, high: FloatArray) -> None:
     """Give a metre the same length along all three axes, ticks at the same distance."""
     from matplotlib.ticker import MultipleLocator
 
     spans = high - low
     step = next(s for s in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 1e9) if spans.max() / s <= 8)
-    axes.set_box_aspect(tuple(spans))
+    # The box keeps its diagonal: one that is high would reach beyond the figure.
+    high_share = spans[2] / np.linalg.norm(spans)
+    axes.set_box_aspect(tuple(spans), zoom=min(1.0, _HIGH_SHARE / high_share))
     for name, near, far in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{name}lim")(near, far)
         getattr(axes, f"set_{name}label")(f"{name} (m)")
