@@ -14,7 +14,7 @@ from vergence.signals import JointCommand, JointState, Observation, Reference
 class Transpose:
     """v = -λ Lᵀ e: no inverse anywhere, slow but hard to upset."""
 
-    gain: float = vg.knob(0.4, "1/s", above=0, upto=10)  # λ
+    gain: float = vg.knob(0.4, "1/s", above=0, upto=10)  # decay rate λ of the error
 
     def bind(self, setting: LawSetting) -> "TransposeLaw":
         """Return the law for an arm and its cameras."""
