@@ -210,6 +210,40 @@ def test_joints_without_a_name_get_one(command, tmp_path: Path) -> None:
     assert result.outcome.succeeded
 
 
+@pytest.mark.parametrize(
+    ("model", "body"),
+    [
+        ("alex_description/urdf/alex_nub_hands.urdf", "LeftWristRollLink"),  # an arm below the base
+        ("talos_data/robots/talos_reduced.urdf", "gripper_right_inner_single_link"),  # at the side
+        ("go1_description/urdf/go1.urdf", "FR_foot"),  # another leg before the board
+    ],
+)
+def test_the_other_limbs_of_a_robot_are_not_in_the_way_at_the_start(
+    command, model: str, body: str
+) -> None:
+    assert command("new", f"{ROBOTS}/{model}", "--body", body, "--out", "mine") == 0
+    result = run_cell(load_cell("mine", {"duration_s": "1"}), images=False)
+    assert result.outcome.succeeded, str(result.outcome)
+
+
+def test_a_start_with_a_collision_is_pointed_out_where_no_other_is_found(command, capsys) -> None:
+    model = f"{ROBOTS}/laikago_description/urdf/laikago.urdf"
+    assert command("new", model, "--body", "FR_foot", "--out", "mine") == 0
+    said = capsys.readouterr().out
+    assert "no start without a collision was found: at this one, arm/trunk and arm/FR_calf" in said
+    with pytest.raises(InputError, match="a start in collision"):
+        run_cell(load_cell("mine"), images=False)
+
+
+def test_limits_that_stand_for_none_are_none(command, tmp_path: Path) -> None:
+    limits = '<limit lower="-1e16" upper="1e16" effort="1"'
+    text = RAIL.format(velocity="").replace('<limit lower="-2" upper="2" effort="1"', limits)
+    (tmp_path / "rail.urdf").write_text(text)
+    assert command("new", "rail.urdf", "--body", "tip") == 0
+    start = load_cell("rail").arms["arm"].start_deg
+    assert all(abs(angle) < 120 for angle in start)
+
+
 def test_an_arm_that_cannot_see_anything_is_refused(tmp_path: Path) -> None:
     in_a_ball = """<mujoco><worldbody><body name="arm" pos="0 0 1"><joint axis="0 0 1"/>
       <geom size="0.1"/><body name="hand" pos="1.5 0 0"><joint axis="0 1 0"/><geom size="0.25"/>

@@ -3,7 +3,9 @@
 import json
 import os
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from vergence.simulation.draft import Bodies, Draft
 
 _LIST = "list"  # as --body: which bodies there are
+_MOST_STARTS = 20  # that are tried until the arm collides with nothing
 _SHARE = 0.85  # of the image's height that the board fills
 _BOARD = """<!-- A speckled board; its frame lies in the middle of its upper face. -->
 <mujoco model="board">
@@ -125,7 +128,7 @@ def new(options: "NewOptions") -> int:
     """Write a cell for an arm into a new folder, or list the bodies; return the exit code."""
     from vergence.camera import read_camera
     from vergence.cell.locate import locate_model
-    from vergence.simulation.draft import SPAN, draft_cell, list_bodies
+    from vergence.simulation.draft import SPAN, drafts, list_bodies
 
     path = locate_model(Path(options.model), Path.cwd(), "vergence new", "MODEL")
     if options.body == _LIST and _LIST not in (bodies := list_bodies(path)).joints:
@@ -138,7 +141,25 @@ def new(options: "NewOptions") -> int:
     lens = None if options.camera is None else read_camera(options.camera)
     span = SPAN if lens is None else min(SPAN, _span(lens))
     target = None if options.target is None else _Target.of(options.target, options.target_scale)
-    draft = draft_cell(path, options.body, span, None if target is None else target.half_side_m)
+    half_side_m = None if target is None else target.half_side_m
+    colliding: tuple[str, ...] = ()
+    for draft in islice(drafts(path, options.body, span, half_side_m), _MOST_STARTS):
+        _write(folder, draft, options, path, target)
+        if not (colliding := _colliding(folder)):
+            break
+    what = "board" if target is None else "target"
+    if options.as_json:
+        answer = {"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()}
+        emit({**answer, "advice": [*colliding, *_advice(folder, draft)]})
+    else:
+        _tell(folder, options.body, draft, what, colliding)
+    return SUCCESS
+
+
+def _write(
+    folder: Path, draft: "Draft", options: "NewOptions", path: Path, target: "_Target | None"
+) -> None:
+    """Write a cell and its target into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     what = "board" if target is None else "target"
     shape = _BOARD.format(half=draft.half_side_m) if target is None else target.as_mjcf(folder)
@@ -150,12 +171,17 @@ def new(options: "NewOptions") -> int:
         calibration = json.dumps(os.path.relpath(options.camera, folder))
         text = text.replace(_LENS, f"calibration = {calibration}")
     (folder / CELL).write_text(text)
-    if options.as_json:
-        answer = {"cell": folder / CELL, "joints": draft.arm.names, "start": draft.start.tolist()}
-        emit({**answer, "advice": _advice(folder, draft)})
-    else:
-        _tell(folder, options.body, draft, what)
-    return SUCCESS
+
+
+def _colliding(folder: Path) -> tuple[str, ...]:
+    """Return what of the arm collides at the start of the cell in a folder."""
+    from vergence.cell import load_cell
+    from vergence.simulation.cell_model import CellModel
+    from vergence.simulation.collision_pairs import collision_pairs
+
+    cell = load_cell(folder)
+    model, table = CellModel(cell, hulls=True), cell.collision
+    return collision_pairs(model, cell.task.arm, table.avoid, table.margin_m).colliding
 
 
 def _advice(folder: Path, draft: "Draft") -> list[str]:
@@ -195,13 +221,16 @@ def _tell_bodies(bodies: "Bodies", model: str, as_json: bool) -> None:
         say(f"  {name:{width}}  {count:3d}{note}")
 
 
-def _tell(folder: Path, body: str, draft: "Draft", what: str) -> None:
+def _tell(folder: Path, body: str, draft: "Draft", what: str, colliding: Sequence[str]) -> None:
     from vergence.robot import unserved_directions
 
     say(f"wrote {folder / CELL} and {what}.xml: {len(draft.arm.names)} joints up to {body}")
     if len(draft.arm.names) < 6:
         unserved = unserved_directions(draft.J_camera, draft.distance_m)
         say(f"  with so few joints the camera {unserved} (its own axes, at the start)")
+    if colliding:
+        say(f"  no start without a collision was found: at this one, {colliding[0]}; enter another")
+        say('  start_deg, or leave "self" out of collision.avoid')
     for line in _advice(folder, draft):
         say(f"  {line}")
     typed = shlex.quote(str(folder))

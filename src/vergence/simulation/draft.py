@@ -29,6 +29,7 @@ _ASIDE_M = (0.08, 0.15)  # sideways mounting distances where something blocks th
 _HANGING_M = 0.1  # below its own zero: an arm that reaches lower is assumed to hang, and is raised
 _ABOVE_FLOOR_M = 0.05
 _WITHOUT_LIMITS = 2.0  # rad or m: range in which a joint without limits starts
+_NO_LIMIT = 100.0  # rad or m: stands in models for a joint without limits
 _RATES = 0.25, np.pi / 2  # m/s (prismatic), rad/s (revolute): where the model has no limit
 _NO_RATE = 100.0  # rad/s or m/s: stands in models that have no limit; no joint is that fast
 _ACCELERATIONS = 1.0, 2 * np.pi  # m/s², rad/s²
@@ -59,11 +60,18 @@ class Draft:
 def draft_cell(
     model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
 ) -> Draft:
-    """Find a posture from which a camera on an arm's last body has a good view of a board.
+    """Return the best of `drafts`."""
+    return next(drafts(model_path, body, span, half_side_m))
 
-    Good means far from singularities and joint limits, looking down rather than up, without
-    needless twists, unobstructed by the arm, and with the board above the floor. If the arm has no
-    such posture, it is put on a pedestal.
+
+def drafts(
+    model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
+) -> Iterator[Draft]:
+    """Yield postures from which a camera on an arm's last body has a good view of a board.
+
+    The best come first. Good means far from singularities and joint limits, looking down rather
+    than up, without needless twists, unobstructed by the arm, and with the board and all that moves
+    above the floor. After them come those for which the arm is put on a pedestal.
 
     Args:
         model_path: MJCF or URDF.
@@ -83,16 +91,25 @@ def draft_cell(
     distance = _distance(_reach(arm, postures), span, half_side_m)
     own_height = _height(model, data)
     half_side = span * distance if half_side_m is None else half_side_m
-    for highest in (own_height, np.inf):
+    found = False
+    for on_pedestal in (False, True):
         for T_body_camera, q in _candidates(model, data, arm, body, postures):
             T_world_camera = se3_compose(arm.forward_kinematics(q), T_body_camera)
             board = _before(T_world_camera, distance)
             points = _grid(board, half_side)
             lowest = min(points[:, 2].min(), T_world_camera[2, 3])
             height = max(own_height, math.ceil(100 * (_ABOVE_FLOOR_M - lowest)) / 100)
-            if height <= highest and _sees(model, data, arm, q, T_world_camera, points):
+            if height > own_height and not on_pedestal:
+                continue
+            if not _sees(model, data, arm, q, T_world_camera, points):
+                continue
+            height = max(height, _raised(model, data))  # at q
+            if (height > own_height) == on_pedestal:
                 board[2, 3] += height
-                return Draft(q, arm, T_body_camera, board, height, half_side, distance, rates_from)
+                found = True
+                yield Draft(q, arm, T_body_camera, board, height, half_side, distance, rates_from)
+    if found:
+        return
     given = f"a camera on {body} that sees nothing but the arm in {_TRIED} postures"
     raise InputError(str(model_path), "", given, "an arm with room before its last body")
 
@@ -167,8 +184,8 @@ def _arm(model: Any, body: str) -> tuple[Arm, str]:
 def _postures(arm: Arm) -> FloatArray:
     """Return postures well inside the limits, rounded to 0.1 degrees or 1 mm, (K, n)."""
     rng = np.random.default_rng(0)
-    low = np.where(np.isfinite(arm.q_min), arm.q_min, -_WITHOUT_LIMITS)
-    high = np.where(np.isfinite(arm.q_max), arm.q_max, _WITHOUT_LIMITS)
+    low = np.where(arm.q_min > -_NO_LIMIT, arm.q_min, -_WITHOUT_LIMITS)
+    high = np.where(arm.q_max < _NO_LIMIT, arm.q_max, _WITHOUT_LIMITS)
     share = rng.uniform(0.1, 0.9, (_POSTURES, arm.joint_count))
     step = np.where(arm.sliding, 1e-3, np.deg2rad(0.1))
     postures: FloatArray = np.round((low + share * (high - low)) / step) * step
@@ -197,12 +214,23 @@ def _reach(arm: Arm, postures: FloatArray) -> float:
 def _height(model: Any, data: Any) -> float:
     """Return the height of the base at which the arm is above the floor at zero, m."""
     mujoco.mj_kinematics(model, data)
+    lowest = float(_bottoms(model, data).min(initial=0.0))
+    return round(-lowest, 2) if lowest < -_HANGING_M else 0.0
+
+
+def _raised(model: Any, data: Any) -> float:
+    """Return the height of the base at which all that the joints move is above the floor, m."""
+    moved = model.body_weldid[model.geom_bodyid] > 0
+    lowest = float(_bottoms(model, data)[moved].min(initial=_ABOVE_FLOOR_M))
+    return math.ceil(100 * (_ABOVE_FLOOR_M - lowest)) / 100
+
+
+def _bottoms(model: Any, data: Any) -> FloatArray:
+    """Return the height of the lowest point of a box around each geom, (G,), m; of planes inf."""
     centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
     up = data.geom_xmat.reshape(-1, 3, 3)[:, 2]  # of each geom's axes
     bottom = data.geom_xpos[:, 2] + np.sum(up * centre, axis=1) - np.sum(np.abs(up) * half, axis=1)
-    solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    lowest = float(bottom[solid].min(initial=0.0))
-    return round(-lowest, 2) if lowest < -_HANGING_M else 0.0
+    return np.where(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE, np.inf, bottom)
 
 
 def _best_first(arm: Arm, postures: FloatArray, T_body_camera: FloatArray) -> FloatArray:
@@ -258,8 +286,8 @@ def _before(T_world_camera: FloatArray, distance: float) -> FloatArray:
 
 
 def _grid(board: FloatArray, half_side: float) -> FloatArray:
-    """Return points (25, 3) spread over a board at a pose (4, 4)."""
-    side = np.linspace(-half_side, half_side, 5)
+    """Return points (121, 3) spread over a board at a pose (4, 4)."""
+    side = np.linspace(-half_side, half_side, 11)  # whatever hides it must not lie between them
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     points: FloatArray = board[:3, 3] + np.outer(x, board[:3, 0]) + np.outer(y, board[:3, 1])
     return points
