@@ -1,6 +1,7 @@
 """How the documentation is built: `make docs`. Nothing is fetched, and a warning is an error."""
 
 import os
+import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -61,6 +62,23 @@ html_theme_options = {"top_of_page_buttons": []}
 def setup(app: Sphinx) -> None:
     """Make of pages what a keyboard and a screen reader can use."""
     app.connect("html-page-context", _accessible, priority=900)  # after the theme's
+    app.connect("html-page-context", _dark_images)
+
+
+def _dark_images(_app: Sphinx, _page: str, _template: str, context: Any, _doctree: Any) -> None:
+    """Add to each screenshot that has one its dark counterpart; the theme shows one of them."""
+    path_to = context["pathto"]
+
+    def both(image: re.Match[str]) -> str:
+        name = image["name"]
+        if not (HERE / "static" / "dark" / name).is_file():
+            return image[0]
+        dark = path_to(f"_static/dark/{name}", resource=True)
+        shown = f'<img class="only-light" alt={image["alt"]} src="{image["folder"]}{name}" />'
+        return f'{shown}<img class="only-dark" alt={image["alt"]} src="{dark}" />'
+
+    image = r'<img alt=(?P<alt>"[^"]*") src="(?P<folder>[^"]*_images/)(?P<name>[^"/]+)" />'
+    context["body"] = re.sub(image, both, context.get("body", ""))
 
 
 def _accessible(*about: Any) -> None:

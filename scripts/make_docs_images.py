@@ -211,19 +211,22 @@ def watch() -> None:
 
 
 def screenshot(address: str, size: tuple[int, int], name: str, wait_ms: int = 0) -> None:
-    """Write what a browser shows, at three quarters of its size."""
+    """Write what a browser shows, in light and for a dark page, at three quarters of its size."""
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         raise SystemExit(f"{name} needs chromium on the path")
-    with tempfile.TemporaryDirectory() as folder:
-        shot = Path(folder, "shot.png")
-        flags = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader")
-        flags += ("--enable-unsafe-swiftshader", "--hide-scrollbars", f"--user-data-dir={folder}/b")
-        flags += (f"--window-size={size[0]},{size[1]}", f"--screenshot={shot}")
-        flags += (f"--virtual-time-budget={wait_ms}",) if wait_ms else ()
-        subprocess.run([browser, *flags, address], check=True, stderr=subprocess.DEVNULL)
-        small = cv2.resize(cv2.imread(str(shot)), None, fx=0.75, fy=0.75, interpolation=3)
-    cv2.imwrite(str(DOCS / "images" / name), small, [cv2.IMWRITE_JPEG_QUALITY, 88])
+    for scheme, place in (("0", DOCS / "static" / "dark"), ("1", DOCS / "images")):
+        with tempfile.TemporaryDirectory() as folder:
+            shot = Path(folder, "shot.png")
+            flags = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader")
+            flags += ("--enable-unsafe-swiftshader", "--hide-scrollbars")
+            flags += (f"--user-data-dir={folder}/b", f"--window-size={size[0]},{size[1]}")
+            flags += (f"--blink-settings=preferredColorScheme={scheme}", f"--screenshot={shot}")
+            flags += (f"--virtual-time-budget={wait_ms}",) if wait_ms else ()
+            subprocess.run([browser, *flags, address], check=True, stderr=subprocess.DEVNULL)
+            small = cv2.resize(cv2.imread(str(shot)), None, fx=0.75, fy=0.75, interpolation=3)
+        place.mkdir(exist_ok=True)
+        cv2.imwrite(str(place / name), small, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
 if __name__ == "__main__":

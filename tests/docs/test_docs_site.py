@@ -4,6 +4,7 @@ import re
 from importlib import import_module
 from pathlib import Path
 
+import cv2
 import pytest
 from cell_file import reference
 from command_line import reference as commands
@@ -143,3 +144,11 @@ def test_the_first_screen_of_a_page_says_who_it_is_for_and_shows_an_image(page):
     first = (DOCS / page).read_text().splitlines()[:16]
     assert any(re.match(r"For [a-z]", line) for line in first), "who it is for"
     assert any(re.match(r"!\[.+\]\(.+\)|```\{gallery\}", line) for line in first), "an image"
+
+
+@pytest.mark.parametrize("name", ["report.jpg", "track-report.jpg", "watch.jpg"])
+def test_a_screenshot_has_a_dark_counterpart_of_its_size(name):
+    light, dark = (cv2.imread(str(DOCS / folder / name)) for folder in ("images", "static/dark"))
+    assert light.shape == dark.shape
+    assert light[:, :8].mean() > 200
+    assert dark[:, :8].mean() < 60
