@@ -178,7 +178,10 @@ BOARD = ["calibrate", ".", "--board", "9x6", "--square-mm", "25"]
         (["map", "puma560", "--out", sys.executable], "--out: given"),
         (["run", "puma560", "--out", "/proc/none"], "no such file or folder; needed: one that"),
         (["run", "ur5", "--goal", "."], "--goal: given .; allowed: an image file"),
-        (["run", "ur5", "--goal", sys.executable], "cannot be read; allowed: a whole image file"),
+        (
+            ["run", "ur5", "--goal", sys.executable],
+            "cannot be read as an image; allowed: a complete image file",
+        ),
         (["run", "ur5", "--goal", "g.png"], "--goal: given g.png; allowed: an image file that"),
         (["run", "ur5", "--points", ""], "--points: given an empty text; allowed: pixels"),
         (["run", "ur5", "--points", "9,9 -5,-5"], "inside the image of 640 x 480"),

@@ -91,3 +91,10 @@ def test_a_stack_of_two_cameras_says_what_it_leaves_free() -> None:
 
     assert "free" in said(image_based("centre"), image_based("centre", camera="wall"))
     assert not said(image_based("points"), image_based("points", camera="wall"))
+
+
+def test_a_kind_beside_objectives_is_pointed_into_them() -> None:
+    with pytest.raises(InputError) as caught:
+        run("ur5", images=False, law={"kind": "sum", "objectives": [{"kind": "image_based"}]})
+    assert (caught.value.key, caught.value.given) == ("law.kind", "sum")
+    assert caught.value.allowed.startswith("a kind in each objective; beside objectives: depth")

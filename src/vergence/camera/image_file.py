@@ -61,7 +61,9 @@ def read_image_file(path: Path) -> np.ndarray:
     require_size(width, height, str(path))
     image = cv2.imdecode(np.frombuffer(raw, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise InputError(str(path), "", "a file that cannot be read", "a whole image file")
+        raise InputError(
+            str(path), "", "a file that cannot be read as an image", "a complete image file"
+        )
     return np.asarray(image)
 
 
@@ -80,7 +82,7 @@ def _bytes(path: Path) -> bytes:
         raise InputError(str(path), "", "a larger file", allowed)
     whole = raw.rfind(_JPEG_END) > raw.rfind(_JPEG_SCAN)
     if raw.startswith(b"\xff\xd8") and not whole:  # OpenCV fills up with grey
-        raise InputError(str(path), "", "an image that is cut off", "a whole image file")
+        raise InputError(str(path), "", "an image that is cut off", "a complete image file")
     return raw
 
 
@@ -101,5 +103,5 @@ def _size(raw: bytes, path: Path) -> tuple[int, int]:
         ) from None
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError):
         raise InputError(
-            str(path), "", "a file that cannot be read", "a whole image file"
+            str(path), "", "a file that cannot be read as an image", "a complete image file"
         ) from None

@@ -97,6 +97,8 @@ class ServoSettings:
             if rest:
                 key, value = next(iter(rest.items()))
                 allowed = f"beside objectives: {nearest(key, field_names(cls))}"
+                if key == "kind":
+                    allowed = f"a kind in each objective; {allowed}"
                 raise InputError(place.source, f"{place.key}.{key}", value, allowed)
             listed = own["objectives"]
             if not isinstance(listed, list | tuple) or len(listed) > _MOST_OBJECTIVES:
