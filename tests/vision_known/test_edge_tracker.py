@@ -1,9 +1,11 @@
 """The edges of an object give its pose, in any light that shows them."""
 
+import cv2
 import numpy as np
 import pytest
 from known_scene import CAMERA, box_model, clutter, drawn_image, off, pose, pose_error
 
+from vergence.arrays import FloatArray, ImageArray
 from vergence.camera.lens import pack_lens
 from vergence.errors import InputError
 from vergence.vision.known_object import EdgeTracker, ObjectModel
@@ -130,6 +132,39 @@ def test_an_object_that_is_not_there_leaves_few_edges() -> None:
     assert tracker.measure(clutter(rng), CAMERA, pose(), LOOSE, memory).share < 0.45
     flat = np.full((CAMERA.height, CAMERA.width), 128, np.uint8)
     assert tracker.measure(flat, CAMERA, pose(), LOOSE, memory).share == 0.0
+
+
+def blotched(T: FloatArray, rng: np.random.Generator, sigma_px: float) -> ImageArray:
+    """The box with spots on it and around it, out of focus: spots displace its edges."""
+    image = drawn_image(T, rng, clutter(rng), noise=0.0)
+    corners = CAMERA.project(MODEL.corners @ T[:3, :3].T + T[:3, 3])
+    for _ in range(40):
+        u, v = rng.uniform(corners.min(axis=0), corners.max(axis=0)).astype(int).tolist()
+        cv2.circle(image, (u, v), int(rng.uniform(3, 6)), rng.uniform(20, 230), -1)
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma_px), np.uint8)
+
+
+@pytest.mark.parametrize(("sigma_px", "blur"), [(1.0, 1.0), (2.0, 1.3), (4.0, 2.5)])
+def test_edges_that_blur_displaces_are_found_as_those_of_a_sharp_image(
+    sigma_px: float, blur: float
+) -> None:
+    rng, tracker = np.random.default_rng(1), EdgeTracker(MODEL)
+    for t in np.linspace(0.0, 6.0, 12):
+        image, start = blotched(pose(t), rng, sigma_px), off(pose(t), rng, 0.002, 0.02)
+        seen = tracker.measure(image, CAMERA, start, LOOSE, tracker.blank())
+        metres, radians = pose_error(seen.T_camera_target, pose(t))
+        assert seen.blur == pytest.approx(blur, rel=0.1)
+        assert seen.share > 0.75
+        assert metres < 0.004
+        assert radians < 0.03
+
+
+@pytest.mark.parametrize("sigma_px", [2.0, 4.0])
+def test_an_object_that_is_not_in_a_blurred_image_leaves_few_edges(sigma_px: float) -> None:
+    rng, tracker = np.random.default_rng(3), EdgeTracker(MODEL)
+    for t in np.linspace(0.0, 6.0, 12):
+        image = np.asarray(cv2.GaussianBlur(clutter(rng), (0, 0), sigma_px), np.uint8)
+        assert tracker.measure(image, CAMERA, pose(t), LOOSE, tracker.blank()).share < 0.5
 
 
 def test_out_of_the_image_nothing_is_expected() -> None:

@@ -18,6 +18,7 @@ START = np.diag(np.repeat([0.01, 0.1], 3) ** 2)  # covariance around each start
 SPOILT = {
     "clean": lambda image, _: image,
     "blurred": lambda image, _: cv2.GaussianBlur(image, (0, 0), 2.0),
+    "strongly blurred": lambda image, _: cv2.GaussianBlur(image, (0, 0), 4.0),
     "smeared": lambda image, _: cv2.blur(image, (7, 1)),
     "dark": lambda image, random: np.clip(0.2 * image + random.normal(0, 2, image.shape), 0, 255),
 }
@@ -100,12 +101,13 @@ def test_the_right_pose_is_never_excluded(spoilt: str, cut: float) -> None:
 def test_places_coincide_beside_each_other_on_parallel_edges_only() -> None:
     across = np.array([[1.0, 0.0]])
     place = np.array([[50.0, 50.0]])
-    for other, normal, expected in (
-        ((51.0, 58.0), (1.0, 0.0), True),
-        ((51.0, 58.0), (-1.0, 0.0), True),
-        ((52.0, 50.0), (1.0, 0.0), False),
-        ((50.0, 62.0), (1.0, 0.0), False),
-        ((50.0, 50.0), (0.0, 1.0), False),
+    for other, normal, apart_px, expected in (
+        ((51.0, 58.0), (1.0, 0.0), 1.5, True),
+        ((51.0, 58.0), (-1.0, 0.0), 1.5, True),
+        ((52.0, 50.0), (1.0, 0.0), 1.5, False),
+        ((52.0, 50.0), (1.0, 0.0), 3.0, True),
+        ((50.0, 62.0), (1.0, 0.0), 1.5, False),
+        ((50.0, 50.0), (0.0, 1.0), 1.5, False),
     ):
-        found = beside(place, across, np.array([other]), np.array([normal]))
+        found = beside(place, across, np.array([other]), np.array([normal]), apart_px)
         assert bool(found[0]) is expected

@@ -5,7 +5,7 @@ from numba import njit
 
 from vergence.arrays import BoolArray, FloatArray, ImageArray
 from vergence.robot.positive_definite import invert_spd
-from vergence.vision.known_object.edge_lines import edge_points
+from vergence.vision.known_object.edge_lines import blur_error, edge_points
 from vergence.vision.known_object.edge_measurement import (
     EdgeGeometry,
     EdgeMeasurement,
@@ -21,12 +21,15 @@ from vergence.vision.known_object.edge_samples import (
     search_steps,
     without_doubles,
 )
+from vergence.vision.known_object.pose_evidence import PRECISE_PX, TOLERANCE_PX
 from vergence.vision.known_object.pose_fit import PoseFit, agreeing, fit_pose, shifted
 from vergence.vision.known_object.projection import pixel_rows
 from vergence.vision.known_object.shift_vote import vote_shift
 
 _FINE_REACH_PX = 5
 _DOUBLE_PX = 5.0  # edges closer than this are not distinguished
+_APART_PX = 2.0  # more than the width of their steps
+_NARROW_PX = 0.6  # tolerance of the last fit to sharp edges
 _LEARNED_PX = 1.0
 _RATE_GAIN = 0.1  # weight of one image: averages over ten
 _REMEMBERED = 0.85  # weight of the old in the remembered appearance of an edge
@@ -61,10 +64,14 @@ def measure_edges(
     x, y = vote_shift(samples, steps, reach)
     start = shifted(T, lens, x, y)
     fit = fit_pose(start, T, prior, lens, samples, steps, 3.0, 1.0, 6)
-    samples = _seen_samples(fit.T, lens, geometry, max(_DOUBLE_PX, _width(fit, steps)))
-    steps = _search(image, samples, _FINE_REACH_PX, rule, memory)
-    fit = fit_pose(fit.T, T, prior, lens, samples, steps, 1.5, 0.6, 5)
-    found = agreeing(fit, steps, rule.likeness, 1.5)
+    width = _width(fit, steps)
+    blur = np.hypot(1.0, blur_error(width) / PRECISE_PX)  # 1 in a sharp image
+    apart = max(_DOUBLE_PX, width + _APART_PX)  # closer edges are blurred into one
+    samples = _seen_samples(fit.T, lens, geometry, apart)
+    steps = _search(image, samples, int(_FINE_REACH_PX * blur), rule, memory)
+    narrowest, widest = _NARROW_PX * blur, max(TOLERANCE_PX, _NARROW_PX * blur)
+    fit = fit_pose(fit.T, T, prior, lens, samples, steps, widest, narrowest, 5)
+    found = agreeing(fit, steps, rule.likeness, TOLERANCE_PX * blur)
     expected, count = int(np.count_nonzero(steps.readable)), int(np.count_nonzero(found))
     points, places, covariances = edge_points(fit, lens, samples, steps, found, rule.bias_px)
     return EdgeMeasurement(
@@ -81,6 +88,7 @@ def measure_edges(
         fit,
         samples,
         steps,
+        blur,
     )
 
 
@@ -136,14 +144,14 @@ def _reach(
 
 @njit(cache=True)
 def _width(fit: PoseFit, steps: Steps) -> float:
-    """Return the width of the edges' steps, px; closer edges are blurred into one."""
+    """Return the width of the edges' steps, px."""
     widths = np.empty(len(fit.chosen))
     count = 0
     for n in range(len(widths)):
         if fit.chosen[n] >= 0:
             widths[count] = steps.widths[n, fit.chosen[n]]
             count += 1
-    return np.median(widths[:count]) + 2.0 if count else 0.0
+    return np.median(widths[:count]) if count else 0.0
 
 
 @njit(cache=True)

@@ -72,6 +72,13 @@ def edge_points(
 
 
 @njit(cache=True)
+def blur_error(width: float) -> float:
+    """Return the standard deviation by which blur displaces an edge whose step is so wide, px."""
+    error: float = BLUR_SHARE * max(width - SHARP_WIDTH, 0.0)
+    return error
+
+
+@njit(cache=True)
 def _line(
     fit: PoseFit,
     lens: FloatArray,
@@ -108,8 +115,7 @@ def _line(
     if n == 0:
         return 0
     middle, spread = ss / n, sss - ss * ss / n
-    blur = BLUR_SHARE * max(width / n - SHARP_WIDTH, 0.0)
-    systematic = (bias_px**2 + blur**2) * max(1.0, LONG / n)
+    systematic = (bias_px**2 + blur_error(width / n) ** 2) * max(1.0, LONG / n)
     if n < LEAST_SAMPLES or spread < 4.0 * n:  # too short for a direction: one position
         middle_sample = first
         for i in range(first, last):

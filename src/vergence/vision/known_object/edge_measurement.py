@@ -52,6 +52,7 @@ class EdgeMeasurement(NamedTuple):
     fit: PoseFit
     samples: EdgeSamples
     steps: Steps
+    blur: float  # deviation of the edges' places relative to that in a sharp image, at least 1
 
     @property
     def unseen(self) -> FloatArray:

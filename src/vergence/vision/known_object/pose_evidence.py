@@ -13,11 +13,11 @@ from vergence.geometry import transform_points
 from vergence.vision.known_object.edge_measurement import EdgeMeasurement
 from vergence.vision.known_object.edge_samples import EdgeSamples
 
-TOLERANCE_PX = 1.5  # within which an edge is found, also by chance
+TOLERANCE_PX = 1.5  # within which an edge of a sharp image is found, also by chance
 ALIKE = 4.0  # places that count as one
 MOST_OF_EDGE = 3.0  # independent places that an edge counts as, at most: it may lie on a line
 _FOUND = 0.9  # fraction of the places found on edges that show
-_PRECISE_PX = 0.7  # standard deviation of their residuals
+PRECISE_PX = 0.7  # standard deviation of their residuals in a sharp image
 _SHOWS = 0.9  # fraction of the edges that have contrast and are not hidden
 _LEAST_CHANCE, _MOST_CHANCE = 0.3, 0.9
 _ALONG_PX, _PARALLEL = 10.0, 0.9  # of two edges at one place
@@ -27,16 +27,17 @@ def place_nats(seen: EdgeMeasurement, chance: float, found: float, precise_px: f
     """Return the log likelihood ratio of an edge to chance at each place, (N,).
 
     log(s N(r; 0, σ) / (c U(r))) with a residual r if the edge was found, which chance spreads
-    evenly over the tolerance, and log((1 - s) / (1 - c)) if it was not.
+    evenly over the tolerance, and log((1 - s) / (1 - c)) if it was not. Both lengths grow with the
+    blur of the edges.
 
     Args:
         seen: the measurement at a pose.
         chance: c, fraction of the places that is found at wrong poses.
         found: s, fraction that is found on visible edges.
-        precise_px: σ, standard deviation of their residuals.
+        precise_px: σ, standard deviation of their residuals in a sharp image.
     """
     chance = float(np.clip(chance, _LEAST_CHANCE, _MOST_CHANCE))
-    residuals = np.where(seen.samples_found, seen.fit.residuals, 0.0)
+    residuals = np.where(seen.samples_found, seen.fit.residuals, 0.0) / seen.blur
     precise = np.exp(-0.5 * (residuals / precise_px) ** 2) / (precise_px * np.sqrt(2.0 * np.pi))
     of_found = np.log(found * precise / (chance / (2.0 * TOLERANCE_PX)))
     nats: FloatArray = np.where(
@@ -60,10 +61,11 @@ def edge_nats(seen: EdgeMeasurement, other: EdgeSamples, camera: Camera, chance:
     """
     own, T = seen.samples, seen.T_camera_target
     points_px = camera.project(transform_points(T, own.points))  # the fit has moved them
-    alone = ~beside(points_px, own.normals, other.points_px, other.normals)
+    apart = TOLERANCE_PX * seen.blur
+    alone = ~beside(points_px, own.normals, other.points_px, other.normals, apart)
     if not alone.any():
         return 0.0
-    nats = place_nats(seen, chance, _FOUND, _PRECISE_PX)[alone]
+    nats = place_nats(seen, chance, _FOUND, PRECISE_PX)[alone]
     _, edge, places = np.unique(own.edge[alone], return_inverse=True, return_counts=True)
     of_edge = np.bincount(edge, nats) / places * np.minimum(places / ALIKE, MOST_OF_EDGE)
     return float(np.logaddexp(np.log(_SHOWS) + of_edge, np.log(1.0 - _SHOWS)).sum())
@@ -71,7 +73,11 @@ def edge_nats(seen: EdgeMeasurement, other: EdgeSamples, camera: Camera, chance:
 
 @njit(cache=True)
 def beside(
-    points_px: FloatArray, normals: FloatArray, others_px: FloatArray, other_normals: FloatArray
+    points_px: FloatArray,
+    normals: FloatArray,
+    others_px: FloatArray,
+    other_normals: FloatArray,
+    apart_px: float,
 ) -> BoolArray:
     """Return which places on edges coincide with others, (N,).
 
@@ -80,6 +86,7 @@ def beside(
         normals: of their edges, (N, 2) unit.
         others_px: the others, (M, 2), at most `_ALONG_PX` apart along their edges.
         other_normals: of their edges, (M, 2) unit.
+        apart_px: distance across the edges within which they coincide.
     """
     coincide = np.zeros(len(points_px), dtype=np.bool_)
     for n in range(len(points_px)):
@@ -88,7 +95,7 @@ def beside(
             du, dv = others_px[m, 0] - points_px[n, 0], others_px[m, 1] - points_px[n, 1]
             parallel = abs(nu * other_normals[m, 0] + nv * other_normals[m, 1]) > _PARALLEL
             across, along = abs(du * nu + dv * nv), abs(dv * nu - du * nv)
-            if parallel and across < TOLERANCE_PX and along < _ALONG_PX:
+            if parallel and across < apart_px and along < _ALONG_PX:
                 coincide[n] = True
                 break
     return coincide
