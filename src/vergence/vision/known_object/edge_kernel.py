@@ -73,7 +73,9 @@ def measure_edges(
     fit = fit_pose(fit.T, T, prior, lens, samples, steps, widest, narrowest, 5)
     found = agreeing(fit, steps, rule.likeness, TOLERANCE_PX * blur)
     expected, count = int(np.count_nonzero(steps.readable)), int(np.count_nonzero(found))
-    points, places, covariances = edge_points(fit, lens, samples, steps, found, rule.bias_px)
+    # Those that blur displaces farther are the object's, but say less of where it is.
+    used = agreeing(fit, steps, rule.likeness, TOLERANCE_PX)
+    points, places, covariances = edge_points(fit, lens, samples, steps, used, rule.bias_px)
     return EdgeMeasurement(
         points,
         places,
