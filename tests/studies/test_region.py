@@ -52,6 +52,17 @@ def test_a_pear_seen_along_its_axis_may_be_tilted_either_way() -> None:
     assert np.median([image.deviations for image in followed[40:]]) < 3.5  # 6.5 along the line
 
 
+@pytest.mark.parametrize(("name", "seed"), [("bottle", 42), ("mug", 42)])
+def test_what_contradicts_a_pose_is_no_exception_because_the_rest_fits(
+    name: str, seed: int
+) -> None:
+    """The ends of a bottle show its tilt, its sides fit any; a rim may open or close."""
+    kind = list(OBJECTS).index(name)
+    followed = follow_film(name, "clutter", 60, np.random.default_rng([seed, kind]))
+    assert max(image.error_deg for image in followed) < 5.0  # 8 and 7.3 as first fitted
+    assert max(image.deviations for image in followed) < 5.0  # 12 and 11.7
+
+
 def image(error_mm: float, deviations: float, seen: bool = True, reason: str = "") -> Followed:
     return Followed("can", next(iter(CONDITIONS)), seen, reason, error_mm, 0.1, deviations, 0.0)
 

@@ -1,5 +1,8 @@
 """The pose under which the outline of an object lies where lines across it find the contour."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -16,7 +19,22 @@ _CLIPPED_PX = 4.0  # residual that no line of a run exceeds
 SLIDING_PX = 100.0  # standard deviation along the contour
 DEEP_ODDS = 0.5  # mean log odds of the object's pixels on a line that counts
 _MOST_SCALE = 5  # pixels in a segment; odd
+_MOST_MISFIT_PX = 1.5  # residual that counts no more
 _LEAST_SLOPE = 1e-9  # relative, of a motion that moves the outline at all
+
+
+class Round(NamedTuple):
+    """How one outline is compared with an image; several in turn fit a pose."""
+
+    scale: int = 1  # pixels in a segment of a line
+    tolerance_px: float = 1.5  # residual outward at which a line counts a quarter
+    run_px: float = 0.6  # mean residual of a run of lines at which it counts a quarter, at least
+
+
+# For a pose that is known to some pixels. What strict rounds count as exceptions may be what shows
+# that the pose is wrong: forgiving ones begin with nearly none.
+FINE = (Round(), Round())
+FORGIVING = (Round(1, 6.0, np.inf), Round(1, 6.0, np.inf), Round(1, 3.0, 1.5), Round())
 
 
 @njit(cache=True)
@@ -174,10 +192,23 @@ def line_weights(lines: ContourLines) -> FloatArray:
     return np.where(lines.usable, np.clip(lines.deep_odds - DEEP_ODDS, 0.0, 1.0), 0.0)
 
 
-def segment_scales(
+def misfit_of(residuals: FloatArray, lines: ContourLines) -> float:
+    """Return the weighted root mean square residual of the lines, px.
+
+    Args:
+        residuals: how far outside the outline each line finds the contour, (N,), px.
+        lines: where they find the contour.
+    """
+    weights = line_weights(lines) * lines.information
+    squares = np.minimum(np.nan_to_num(residuals) ** 2, _MOST_MISFIT_PX**2)
+    total = float(weights.sum())
+    return float(np.sqrt(weights @ squares / total)) if total > 0.0 else _MOST_MISFIT_PX
+
+
+def rounds_for(
     T: FloatArray, lens: FloatArray, outline: Outline, covariance: FloatArray
-) -> list[int]:
-    """Return pixels in a segment, step by step: at first as three standard deviations need."""
+) -> Sequence[Round]:
+    """Return the rounds of a fit, at first as coarse as three standard deviations need."""
     widest, rows = 0.0, np.empty((2, 6))
     for n in range(0, len(outline.points), 10):
         pixel_rows(T, lens, outline.points[n], rows)
@@ -185,7 +216,11 @@ def segment_scales(
         widest = max(widest, float(across @ covariance @ across))
     needed = 3.0 * np.sqrt(widest) / REACH
     first = int(np.clip(2 * np.ceil(0.5 * (needed - 1.0)) + 1, 1, _MOST_SCALE))
-    return [*range(first, 1, -2), 1, 1]
+    fine = Round()
+    coarse = [
+        fine._replace(scale=k, tolerance_px=k * fine.tolerance_px) for k in range(first, 1, -2)
+    ]
+    return *coarse, *FINE
 
 
 def shared_error(slopes: FloatArray, bias_px: float) -> FloatArray:

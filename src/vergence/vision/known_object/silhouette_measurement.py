@@ -25,7 +25,9 @@ class SilhouetteMeasurement(NamedTuple):
     unseen: FloatArray  # (6, K) motions (δp, δθ) that do not show, the turns of unit length
     shared: FloatArray  # (6, 6) covariance of what all images have wrong alike, (δp, δθ)
     astray: FloatArray  # (6, 6) and of what more is wrong while a turn is unknown
-    weakest: FloatArray  # (6,) the motion of a turn that shows least; 0 if none does
+    weakest: FloatArray  # (6, K) motions of the turns that show least, K = 0 … 2
+    misfit_px: float  # root mean square distance of the contour from the outline
+    searched: bool = False  # whether poses elsewhere were tried, none of which has less
 
     @property
     def share(self) -> float:
@@ -43,6 +45,7 @@ class SilhouetteMemory(NamedTuple):
 
     colors: ColorModel
     share: float  # of its outline that was found recently, 0 … 1
+    misfit_px: float  # that no pose elsewhere reduced recently
 
 
 def share_log_ratio(
@@ -80,5 +83,5 @@ def nothing_found(T: FloatArray, colors: ColorModel) -> SilhouetteMeasurement:
     return SilhouetteMeasurement(
         np.zeros((0, 3)), none, np.zeros((0, 2, 2)), T, 0, 0, 0.0, 0, none,
         np.zeros(0, dtype=np.bool_), colors, np.zeros((6, 0)), np.zeros((6, 6)), np.zeros((6, 6)),
-        np.zeros(6),
+        np.zeros((6, 0)), np.inf,
     )  # fmt: skip

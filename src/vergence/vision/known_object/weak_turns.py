@@ -18,7 +18,8 @@ from vergence.vision.known_object.symmetry import FreeAxes
 
 # Relative to half the object's size: motion of the outline per radian above which a rotation is
 # observable. What is wrong with an outline alike in all images moves it by 0.01 to 0.02.
-USUAL, ELLIPSOID = 0.02, 0.03
+USUAL, ELLIPSOID = 0.01, 0.03
+_HIDDEN = 0.02  # motion in the view that shows a rotation least, below which it may be hidden
 _LIKE_ELLIPSOID = 0.0145  # smallest motion, as a median over views
 _CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
 _VIEWS = 15
@@ -43,16 +44,14 @@ def weak_turns(
     return motions[:, squares < least**2]
 
 
-def weakest_turn(slopes: FloatArray, free: FloatArray) -> FloatArray:
-    """Return the motion (δp, δθ), (6,), with a unit rotation, that moves an outline least.
+def weakest_turns(slopes: FloatArray, free: FloatArray) -> FloatArray:
+    """Return the motions (δp, δθ), with unit rotations, that move an outline least: (6, K ≤ 2).
 
     Args:
         slopes: motion of each place across the outline by (δp, δθ), (N, 6), px.
-        free: motions known to be unobservable, (6, F); the one returned rotates differently. It is
-            zero if there is no other.
+        free: motions known to be unobservable, (6, F); those returned rotate differently.
     """
-    squares, motions = _shown(slopes, free)
-    return motions[:, 0] if len(squares) else np.zeros(6)
+    return _shown(slopes, free)[1][:, :2]
 
 
 def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
@@ -72,7 +71,7 @@ def hidden_turn_of(model: ObjectModel, axes: FreeAxes) -> FloatArray:
     """
     views = _views(model, axes, 2 * _VIEWS)
     share, motion = min(views, key=lambda view: view[0], default=(np.inf, np.zeros(6)))
-    return motion if share < USUAL else np.zeros(6)
+    return motion if share < _HIDDEN else np.zeros(6)
 
 
 def _views(model: ObjectModel, axes: FreeAxes, count: int) -> list[tuple[float, FloatArray]]:
