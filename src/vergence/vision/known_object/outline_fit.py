@@ -121,17 +121,18 @@ class OutlineFit:
         """
         covariance = prior.covariance + _ELSEWHERE_RAD**2 * seen.weakest @ seen.weakest.T
         loose = prior_of(prior.T, covariance)
-        T, best = seen.T_camera_target, None
+        T, fits = seen.T_camera_target, []
         turns = _ELSEWHERE_RAD * np.hstack((seen.weakest, -seen.weakest)).T
         for start in (T, *(turned(T, turn) for turn in turns)):
             fit = self.near(start, loose, colors, FORGIVING)
-            if fit.share >= seen.share and (best is None or fit.misfit_px < best.misfit_px):
-                best = fit
-            if best is not None and best.misfit_px < MISFIT_PX:
+            if fit.share >= seen.share:
+                fits.append(fit)
+            if fits and fits[-1].misfit_px < MISFIT_PX:
                 break
-        if best is not None and best.misfit_px < _CLEARLY * seen.misfit_px:
+        best = min(fits, key=lambda fit: fit.misfit_px, default=seen)
+        if best.misfit_px < _CLEARLY * seen.misfit_px:
             seen = best
-        elif best is not None and _CLEARLY * best.misfit_px < seen.misfit_px:
+        elif _CLEARLY * best.misfit_px < seen.misfit_px:  # it fits as well
             apart = pose_difference(best.T_camera_target, T)
             seen = seen._replace(shared=seen.shared + np.outer(apart, apart))
         return seen._replace(searched=True)

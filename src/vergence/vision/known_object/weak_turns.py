@@ -17,7 +17,7 @@ from vergence.vision.known_object.silhouette import outline_of
 from vergence.vision.known_object.symmetry import FreeAxes
 
 # Relative to half the object's size: motion of the outline per radian above which a rotation is
-# observable. What is wrong with an outline alike in all images moves it by 0.01 to 0.02.
+# observable. A turn of 0.1 rad then moves the outline by about what all images have wrong alike.
 USUAL, ELLIPSOID = 0.01, 0.03
 _HIDDEN = 0.02  # motion in the view that shows a rotation least, below which it may be hidden
 _LIKE_ELLIPSOID = 0.0145  # smallest motion, as a median over views
