@@ -18,7 +18,8 @@ from vergence.vision.known_object.symmetry import FreeAxes
 
 # Relative to half the object's size: motion of the outline per radian above which a rotation is
 # observable. A turn of 0.1 rad then moves the outline by about what all images have wrong alike.
-USUAL, ELLIPSOID = 0.01, 0.03
+USUAL = 0.01
+ELLIPSOID, _ITS_OTHERS = 0.03, 0.02  # of the weakest rotation of what is like an ellipsoid, others
 _HIDDEN = 0.02  # motion in the view that shows a rotation least, below which it may be hidden
 _LIKE_ELLIPSOID = 0.0145  # smallest motion, as a median over views
 _CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
@@ -36,10 +37,11 @@ def weak_turns(
         free: motions known to be unobservable, (6, F); those returned rotate differently.
         half_px: half the object's size in the image.
         least_shown: motion of the outline relative to `half_px`, above which its weakest rotation
-            is observable; for the others it is `USUAL`.
+            is observable; that of the others depends on it.
     """
     squares, motions = _shown(slopes, free)
-    least = np.full(len(squares), USUAL * half_px)
+    others = _ITS_OTHERS if least_shown > USUAL else USUAL
+    least = np.full(len(squares), others * half_px)
     least[:1] = least_shown * half_px
     return motions[:, squares < least**2]
 
