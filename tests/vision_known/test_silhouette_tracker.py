@@ -153,6 +153,21 @@ def followed(tracker: SilhouetteTracker, count: int, posts: bool) -> list[tuple[
     return steps
 
 
+def test_an_outline_beside_the_contour_has_a_large_misfit(tracker: SilhouetteTracker) -> None:
+    rng = np.random.default_rng(2)
+    place, held = ball_place(3), np.diag(np.repeat([1e-6, 1e-5], 3) ** 2)
+    image = drawn_ball(place, rng, colored_clutter(rng))
+    T = se3(np.eye(3), place)
+    memory = tracker.remember(
+        tracker.blank(), tracker.measure(image, CAMERA, T, held, tracker.blank())
+    )
+    beside = se3(np.eye(3), place + (0.0, 0.0, 0.01))  # its radius in the image is 3 % smaller
+    fits, misfits = (tracker.measure(image, CAMERA, pose, held, memory) for pose in (T, beside))
+    assert fits.misfit_px < 0.4 and not fits.searched
+    assert misfits.misfit_px > 0.8 and misfits.searched  # in vain: the pose is held
+    assert np.trace(misfits.shared) > 3.0 * np.trace(fits.shared)  # so it tells that it is unsure
+
+
 def test_a_post_that_passes_before_a_ball_does_not_draw_it_along(
     tracker: SilhouetteTracker,
 ) -> None:
