@@ -10,14 +10,14 @@ from vergence.app.first_axes import _words, poorly_measured, poorly_served
 from vergence.camera import Camera
 from vergence.geometry import se3, se3_inverse, so3_exp, transform_points
 from vergence.places import CELLS
-from vergence.simulation.draft import Draft, draft_cell
+from vergence.simulation.draft import Draft, drafts
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 
 
 @pytest.fixture(scope="module")
 def draft() -> Draft:
-    return draft_cell(CELLS / "puma560" / "puma560.xml", "flange")
+    return next(drafts(CELLS / "puma560" / "puma560.xml", "flange"))
 
 
 def numbers(text: str) -> list[float]:

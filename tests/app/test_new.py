@@ -14,7 +14,7 @@ from vergence.cell.locate import locate_model
 from vergence.errors import InputError
 from vergence.places import CELLS
 from vergence.simulation import SimulatedDriver
-from vergence.simulation.draft import draft_cell
+from vergence.simulation.draft import drafts
 
 ROBOTS = "package:example-robot-data/robots"
 ARMS = {  # by their number of joints
@@ -185,19 +185,19 @@ def test_a_target_that_is_no_mesh_is_refused_with_what_may_be_one(
 
 def test_a_model_that_is_no_model_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        draft_cell(tmp_path / "no.urdf", "tool")
+        next(drafts(tmp_path / "no.urdf", "tool"))
     (tmp_path / "no.urdf.xacro").write_text("<robot/>")
     with pytest.raises(InputError, match=r"xacro no.urdf.xacro > no.urdf"):
-        draft_cell(tmp_path / "no.urdf.xacro", "tool")
+        next(drafts(tmp_path / "no.urdf.xacro", "tool"))
     include = '<xacro:include xmlns:xacro="http://www.ros.org/wiki/xacro" filename="arm.xacro"/>'
     (tmp_path / "no.urdf").write_text(f'<robot name="r">{include}</robot>')
     with pytest.raises(InputError, match="given an xacro; allowed: a URDF; expand it first"):
-        draft_cell(tmp_path / "no.urdf", "tool")
+        next(drafts(tmp_path / "no.urdf", "tool"))
     with pytest.raises(InputError, match="given a folder; allowed: an MJCF or URDF file"):
-        draft_cell(tmp_path, "tool")
+        next(drafts(tmp_path, "tool"))
     (tmp_path / "no.xml").write_text("<mujoco>")
     with pytest.raises(InputError, match=r"no\.xml"):
-        draft_cell(tmp_path / "no.xml", "tool")
+        next(drafts(tmp_path / "no.xml", "tool"))
 
 
 def test_joints_without_a_name_get_one(command, tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_an_arm_that_cannot_see_anything_is_refused(tmp_path: Path) -> None:
       </body></body></worldbody></mujoco>"""
     (tmp_path / "arm.xml").write_text(in_a_ball)
     with pytest.raises(InputError, match="sees nothing"):
-        draft_cell(tmp_path / "arm.xml", "hand")
+        next(drafts(tmp_path / "arm.xml", "hand"))
 
 
 def test_a_cell_that_is_not_there_is_answered_with_those_of_this_folder(
@@ -342,6 +342,6 @@ def test_the_lens_of_a_camera_file_is_the_cameras(command, tmp_path: Path) -> No
     ],
 )
 def test_an_arm_that_reaches_nothing_from_the_floor_is_put_on_a_stand(model, body) -> None:
-    draft = draft_cell(locate_model(Path(f"{ROBOTS}/{model}"), Path(), "", ""), body)
+    draft = next(drafts(locate_model(Path(f"{ROBOTS}/{model}"), Path(), "", ""), body))
     assert 0.05 < draft.height_m < 2.0
     assert draft.T_world_target[2, 3] > 0.04

@@ -57,13 +57,6 @@ class Draft:
         return self.arm.with_tip(self.T_body_camera).jacobian(self.start)
 
 
-def draft_cell(
-    model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
-) -> Draft:
-    """Return the best of `drafts`."""
-    return next(drafts(model_path, body, span, half_side_m))
-
-
 def drafts(
     model_path: Path, body: str, span: float = SPAN, half_side_m: float | None = None
 ) -> Iterator[Draft]:

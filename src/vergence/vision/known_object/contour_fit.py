@@ -1,6 +1,5 @@
 """The pose under which the outline of an object lies where lines across it find the contour."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -192,22 +191,23 @@ def line_weights(lines: ContourLines) -> FloatArray:
     return np.where(lines.usable, np.clip(lines.deep_odds - DEEP_ODDS, 0.0, 1.0), 0.0)
 
 
-def misfit_of(residuals: FloatArray, lines: ContourLines) -> float:
+def misfit_of(residuals: FloatArray, lines: ContourLines, weights: FloatArray) -> float:
     """Return the weighted root mean square residual of the lines, px.
 
     Args:
         residuals: how far outside the outline each line finds the contour, (N,), px.
         lines: where they find the contour.
+        weights: of the lines, (N,) 0 … 1.
     """
-    weights = line_weights(lines) * lines.information
+    information = weights * lines.information
     squares = np.minimum(np.nan_to_num(residuals) ** 2, _MOST_MISFIT_PX**2)
-    total = float(weights.sum())
-    return float(np.sqrt(weights @ squares / total)) if total > 0.0 else _MOST_MISFIT_PX
+    total = float(information.sum())
+    return float(np.sqrt(information @ squares / total)) if total > 0.0 else _MOST_MISFIT_PX
 
 
 def rounds_for(
     T: FloatArray, lens: FloatArray, outline: Outline, covariance: FloatArray
-) -> Sequence[Round]:
+) -> list[Round]:
     """Return the rounds of a fit, at first as coarse as three standard deviations need."""
     widest, rows = 0.0, np.empty((2, 6))
     for n in range(0, len(outline.points), 10):
@@ -216,11 +216,7 @@ def rounds_for(
         widest = max(widest, float(across @ covariance @ across))
     needed = 3.0 * np.sqrt(widest) / REACH
     first = int(np.clip(2 * np.ceil(0.5 * (needed - 1.0)) + 1, 1, _MOST_SCALE))
-    fine = Round()
-    coarse = [
-        fine._replace(scale=k, tolerance_px=k * fine.tolerance_px) for k in range(first, 1, -2)
-    ]
-    return *coarse, *FINE
+    return [*(Round(k, k * Round().tolerance_px) for k in range(first, 1, -2)), *FINE]
 
 
 def shared_error(slopes: FloatArray, bias_px: float) -> FloatArray:

@@ -90,7 +90,7 @@ class OutlineFit:
         outline = self._outline(T)
         left = list(rounds)
         while outline is not None:
-            left = left or list(rounds_for(T, self.lens, outline, prior.covariance))
+            left = left or rounds_for(T, self.lens, outline, prior.covariance)
             scale, tolerance_px, run_px = left.pop(0)
             lines = read_lines(self.pixels, outline, colors.odds, scale)
             T = fit_contour(
@@ -144,8 +144,8 @@ class OutlineFit:
         self, T: FloatArray, outline: Outline, lines: ContourLines
     ) -> SilhouetteMeasurement:
         moved, slopes = outline_motion(T, self.lens, outline)
-        residuals = lines.offsets_px - moved
-        runs = means_of_runs(residuals, outline, lines, line_weights(lines))
+        residuals, weights = lines.offsets_px - moved, line_weights(lines)
+        runs = means_of_runs(residuals, outline, lines, weights)
         found = (
             lines.usable
             & (np.abs(residuals) < _FOUND_PX)
@@ -162,7 +162,7 @@ class OutlineFit:
         expected, count = int(lines.usable.sum()), int(found.sum())
         # The less of the outline is found, the likelier some of it is something else's.
         doubt = (expected / max(count, 1)) ** 3
-        misfit_px = misfit_of(residuals, lines)
+        misfit_px = misfit_of(residuals, lines, weights)
         shared = doubt * max(misfit_px / MISFIT_PX, 1.0) ** 2 * shared
         enlarged = doubt * max(count / INDEPENDENT, 1.0)
         return SilhouetteMeasurement(

@@ -8,12 +8,7 @@ from vergence.arrays import FloatArray
 from vergence.vision.known_object.object_model import ObjectModel
 from vergence.vision.known_object.silhouette import Outline, outline_of
 from vergence.vision.known_object.symmetry import FreeAxes, free_axes
-from vergence.vision.known_object.weak_turns import (
-    USUAL,
-    hidden_turn_of,
-    least_shown_of,
-    weak_turns,
-)
+from vergence.vision.known_object.weak_turns import hidden_turn_of, like_ellipsoid, weak_turns
 
 _MOST_TRIANGLES = 20_000  # of the mesh that is drawn: half a millisecond
 # Of the object's size, by which its origin is wrong while a turn is unknown: across the line of
@@ -29,7 +24,7 @@ class OutlinedShape:
     closed: bool  # whether the mesh is
     size: float  # of the object, m
     axes: FreeAxes  # of the turns that no outline shows
-    least_shown: float  # see `least_shown_of`
+    like_ellipsoid: bool  # see there
     hidden_turn: FloatArray  # (6,) see `hidden_turn_of`
 
     @staticmethod
@@ -42,14 +37,9 @@ class OutlinedShape:
             mesh.closed,
             model.size,
             axes,
-            least_shown_of(mesh, axes),
+            like_ellipsoid(mesh, axes),
             hidden_turn_of(mesh, axes),
         )
-
-    @property
-    def like_ellipsoid(self) -> bool:
-        """Whether one of its turns is never observable, whatever a single image suggests."""
-        return self.least_shown > USUAL
 
     def outline(self, T: FloatArray, lens: FloatArray, count: int) -> Outline | None:
         """Return about so many places on the outline at a pose (4, 4); None if there is none."""
@@ -71,7 +61,7 @@ class OutlinedShape:
             slopes: motion of each place across it by (δp, δθ), (N, 6), px.
         """
         free = self.axes.motions(T)
-        weak = weak_turns(slopes, free, self.half_px(T, lens), self.least_shown)
+        weak = weak_turns(slopes, free, self.half_px(T, lens), self.like_ellipsoid)
         return np.hstack((free, weak))
 
     def astray(self, T: FloatArray, unseen: FloatArray) -> FloatArray:

@@ -18,8 +18,8 @@ from vergence.vision.known_object.symmetry import FreeAxes
 
 # Relative to half the object's size: motion of the outline per radian above which a rotation is
 # observable. A turn of 0.1 rad then moves the outline by about what all images have wrong alike.
-USUAL = 0.01
-ELLIPSOID, _ITS_OTHERS = 0.03, 0.02  # of the weakest rotation of what is like an ellipsoid, others
+_USUAL = 0.01
+_OF_ELLIPSOIDS = 0.03, 0.02  # of the weakest rotation of what is like an ellipsoid, of the others
 _HIDDEN = 0.02  # motion in the view that shows a rotation least, below which it may be hidden
 _LIKE_ELLIPSOID = 0.0145  # smallest motion, as a median over views
 _CAMERA = Camera(400, 400, 600.0, 600.0, 199.5, 199.5)
@@ -28,7 +28,7 @@ _PLACES = 200
 
 
 def weak_turns(
-    slopes: FloatArray, free: FloatArray, half_px: float, least_shown: float
+    slopes: FloatArray, free: FloatArray, half_px: float, of_ellipsoid: bool
 ) -> FloatArray:
     """Return the motions (δp, δθ) that hardly move an outline, (6, K), with unit rotations.
 
@@ -36,13 +36,12 @@ def weak_turns(
         slopes: motion of each place across the outline by (δp, δθ), (N, 6), px.
         free: motions known to be unobservable, (6, F); those returned rotate differently.
         half_px: half the object's size in the image.
-        least_shown: motion of the outline relative to `half_px`, above which its weakest rotation
-            is observable; that of the others depends on it.
+        of_ellipsoid: whether the object is like an ellipsoid, see `like_ellipsoid`.
     """
     squares, motions = _shown(slopes, free)
-    others = _ITS_OTHERS if least_shown > USUAL else USUAL
+    weakest, others = _OF_ELLIPSOIDS if of_ellipsoid else (_USUAL, _USUAL)
     least = np.full(len(squares), others * half_px)
-    least[:1] = least_shown * half_px
+    least[:1] = weakest * half_px
     return motions[:, squares < least**2]
 
 
@@ -56,14 +55,13 @@ def weakest_turns(slopes: FloatArray, free: FloatArray) -> FloatArray:
     return _shown(slopes, free)[1][:, :2]
 
 
-def least_shown_of(model: ObjectModel, axes: FreeAxes) -> float:
-    """Return the outline's motion, relative to half the size, at which a rotation is observable.
+def like_ellipsoid(model: ObjectModel, axes: FreeAxes) -> bool:
+    """Return whether an object is similar to an ellipsoid.
 
-    An object similar to an ellipsoid has a rotation that is never observable, whatever a single
-    image suggests.
+    It then has a rotation that is never observable, whatever a single image suggests.
     """
     least = [share for share, _ in _views(model, axes, _VIEWS)]
-    return ELLIPSOID if least and float(np.median(least)) < _LIKE_ELLIPSOID else USUAL
+    return bool(least) and float(np.median(least)) < _LIKE_ELLIPSOID
 
 
 def hidden_turn_of(model: ObjectModel, axes: FreeAxes) -> FloatArray:
